@@ -1,0 +1,1 @@
+"""Evolve robot controllers, measure the reality gap, shrink it."""

@@ -1,0 +1,35 @@
+"""The exceptions that a careful caller may catch; a bad argument is a plain `ValueError` or `TypeError`."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class RealityGapError(Exception):
+    """Anything that realitygap says about a file, a study or a machine; its text is meant for people."""
+
+
+class StudyError(RealityGapError):
+    """A study, or the file that describes it, cannot be carried out as written."""
+
+
+class RecordError(RealityGapError):
+    """A folder of results holds something that cannot be trusted or cannot be written."""
+
+
+class RecordVersionError(RecordError):
+    """Results were computed by a version whose numbers may differ."""
+
+
+class CaseError(RealityGapError):
+    """A case file for `realitygap simulate` cannot be carried out as written."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """A hint that names the known word nearest to `name`, or lists all; empty when nothing is known."""
+    choices = sorted(known)
+    near = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
+    if near:
+        return f"Did you mean {near[0]!r}?"
+    return f"Known: {', '.join(choices)}." if choices else ""

@@ -1,0 +1,264 @@
+"""Genomes as arrays, one row an individual, and the first ones of a run.
+
+Node ids: inputs 0 .. i-1, outputs i .. i+o-1, hidden nodes from i+o on, numbered as they arise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._compile import kernel
+from ._philox import PURPOSE_GENOME, make_stream, uniform
+
+
+class Genomes(NamedTuple):
+    """The genomes of n individuals, with room for c connection genes and h hidden nodes each."""
+
+    n_connections: NDArray[np.int32]  # (n,)
+    n_hidden: NDArray[np.int32]  # (n,)
+    innovation: NDArray[np.int32]  # (n, c) ascending in a row
+    source: NDArray[np.int32]  # (n, c) node ids
+    target: NDArray[np.int32]  # (n, c) node ids
+    weight: NDArray[np.float64]  # (n, c)
+    enabled: NDArray[np.bool_]  # (n, c)
+    hidden: NDArray[np.int32]  # (n, h) ids of hidden nodes, ascending
+    bias: NDArray[np.float64]  # (n, o + h) of each output and hidden node; zero without node biases
+    full: NDArray[np.bool_]  # (1,) set when a gene found no room: the rows are then worth nothing
+
+
+class NeatRules(NamedTuple):
+    """Every rate and choice of NEAT in the form that kernels read; `NeatSettings` explains them."""
+
+    n_inputs: int
+    n_outputs: int
+    recurrent: bool
+    node_bias: bool
+    bias_input: int  # id of the input that is constant, -1 where there is none
+    activation: int
+    activation_slope: float
+    initial_weight: float
+    weight_limit: float
+    mutate_weights: float
+    replace_weight: float
+    weight_step: float
+    replaced_weight: float
+    add_node: float
+    add_link: float
+    add_link_tries: int
+    reenable: float
+    one_structural_mutation: bool
+    split_bias_links: bool
+    crossover: float
+    crossover_only: float
+    average_weights: float
+    interspecies: float
+    stay_disabled: float
+    disabled_bit_inherited: bool
+    equal_parents_mix: bool
+    excess_weight: float
+    disjoint_weight: float
+    weight_difference_weight: float
+    normalize_from: int  # genes from which distances are divided by size; a huge number: never
+    threshold: float
+    nearest_species: bool
+    champion_represents: bool
+    target_species: int  # 0: the threshold stays as it is
+    threshold_step: float
+    survival: float
+    champion_from: int
+    champion_by_members: bool
+    stagnation: int
+    stagnation_factor: float
+    best_species_spared: bool
+    population_stagnation: int
+
+
+@kernel
+def make_genomes(n, n_outputs, room, hidden_room):
+    """Empty genomes of n individuals with room for so many connection genes and hidden nodes."""
+    return Genomes(
+        np.zeros(n, np.int32),
+        np.zeros(n, np.int32),
+        np.zeros((n, room), np.int32),
+        np.zeros((n, room), np.int32),
+        np.zeros((n, room), np.int32),
+        np.zeros((n, room)),
+        np.zeros((n, room), np.bool_),
+        np.zeros((n, hidden_room), np.int32),
+        np.zeros((n, n_outputs + hidden_room)),
+        np.zeros(1, np.bool_),
+    )
+
+
+@kernel
+def next_uniform(stream, cursor):
+    """The next number of a stream; `cursor[0]` counts those taken."""
+    index = cursor[0]
+    cursor[0] = index + 1
+    return uniform(stream, index)
+
+
+@kernel
+def next_below(stream, cursor, n):
+    """The next whole number in 0 .. n-1 of a stream."""
+    value = int(next_uniform(stream, cursor) * n)
+    return min(value, n - 1)
+
+
+@kernel
+def next_signed(stream, cursor, size):
+    """The next number in (-size, size) of a stream."""
+    return (2.0 * next_uniform(stream, cursor) - 1.0) * size
+
+
+@kernel
+def first_genomes(genomes, rules, key, replicate, generation):
+    """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4)."""
+    cursor = np.zeros(1, np.int64)
+    n = genomes.n_connections.size
+    for row in range(n):
+        stream = make_stream(key, replicate, generation, row, 0, PURPOSE_GENOME)
+        cursor[0] = 0
+        gene = 0
+        for output in range(rules.n_outputs):
+            for source in range(rules.n_inputs):
+                genomes.innovation[row, gene] = gene
+                genomes.source[row, gene] = source
+                genomes.target[row, gene] = rules.n_inputs + output
+                genomes.weight[row, gene] = next_signed(stream, cursor, rules.initial_weight)
+                genomes.enabled[row, gene] = True
+                gene += 1
+        genomes.n_connections[row] = gene
+        genomes.n_hidden[row] = 0
+        for output in range(rules.n_outputs):
+            genomes.bias[row, output] = (
+                next_signed(stream, cursor, rules.initial_weight) if rules.node_bias else 0.0
+            )
+
+
+@kernel
+def copy_genome(old, from_row, new, to_row):
+    """Copy one individual's genome into a row of other arrays."""
+    n = old.n_connections[from_row]
+    h = old.n_hidden[from_row]
+    outputs = old.bias.shape[1] - old.hidden.shape[1]
+    new.n_connections[to_row] = n
+    new.n_hidden[to_row] = h
+    for gene in range(n):
+        new.innovation[to_row, gene] = old.innovation[from_row, gene]
+        new.source[to_row, gene] = old.source[from_row, gene]
+        new.target[to_row, gene] = old.target[from_row, gene]
+        new.weight[to_row, gene] = old.weight[from_row, gene]
+        new.enabled[to_row, gene] = old.enabled[from_row, gene]
+    for node in range(h):
+        new.hidden[to_row, node] = old.hidden[from_row, node]
+    for node in range(outputs + h):
+        new.bias[to_row, node] = old.bias[from_row, node]
+
+
+@kernel
+def has_link(genomes, row, source, target):
+    """Whether a genome holds a gene, enabled or not, from one node to another."""
+    for gene in range(genomes.n_connections[row]):
+        if genomes.source[row, gene] == source and genomes.target[row, gene] == target:
+            return True
+    return False
+
+
+@kernel
+def closes_cycle(genomes, row, source, target, reached):
+    """Whether a link from `source` to `target` would close a cycle, disabled genes counted.
+
+    `reached` is room for the ids of nodes, one for each hidden node and two more.
+    """
+    if source == target:
+        return True
+    n_reached = 1
+    reached[0] = target
+    at = 0
+    while at < n_reached:
+        node = reached[at]
+        at += 1
+        for gene in range(genomes.n_connections[row]):
+            if genomes.source[row, gene] != node:
+                continue
+            onward = genomes.target[row, gene]
+            if onward == source:
+                return True
+            known = False
+            for k in range(n_reached):
+                if reached[k] == onward:
+                    known = True
+                    break
+            if not known:
+                reached[n_reached] = onward
+                n_reached += 1
+    return False
+
+
+@kernel
+def insert_gene(genomes, row, innovation, source, target, weight, enabled):
+    """Put a connection gene where its innovation number belongs; sets `full` where there is no room."""
+    gene = genomes.n_connections[row]
+    if gene == genomes.innovation.shape[1]:
+        genomes.full[0] = True
+        return
+    while gene > 0 and genomes.innovation[row, gene - 1] > innovation:
+        genomes.innovation[row, gene] = genomes.innovation[row, gene - 1]
+        genomes.source[row, gene] = genomes.source[row, gene - 1]
+        genomes.target[row, gene] = genomes.target[row, gene - 1]
+        genomes.weight[row, gene] = genomes.weight[row, gene - 1]
+        genomes.enabled[row, gene] = genomes.enabled[row, gene - 1]
+        gene -= 1
+    genomes.innovation[row, gene] = innovation
+    genomes.source[row, gene] = source
+    genomes.target[row, gene] = target
+    genomes.weight[row, gene] = weight
+    genomes.enabled[row, gene] = enabled
+    genomes.n_connections[row] += 1
+
+
+@kernel
+def insert_hidden(genomes, row, node, bias):
+    """Put a hidden node where its id belongs, unless the genome has it; sets `full` where there is no room."""
+    outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
+    n = genomes.n_hidden[row]
+    for k in range(n):
+        if genomes.hidden[row, k] == node:
+            return
+    if n == genomes.hidden.shape[1]:
+        genomes.full[0] = True
+        return
+    place = n
+    while place > 0 and genomes.hidden[row, place - 1] > node:
+        genomes.hidden[row, place] = genomes.hidden[row, place - 1]
+        genomes.bias[row, outputs + place] = genomes.bias[row, outputs + place - 1]
+        place -= 1
+    genomes.hidden[row, place] = node
+    genomes.bias[row, outputs + place] = bias
+    genomes.n_hidden[row] += 1
+
+
+@kernel
+def node_bias_of(genomes, row, rules, node):
+    """The bias of an output or hidden node; 0 where the genome lacks the node."""
+    if node < rules.n_inputs + rules.n_outputs:
+        return genomes.bias[row, node - rules.n_inputs]
+    for k in range(genomes.n_hidden[row]):
+        if genomes.hidden[row, k] == node:
+            return genomes.bias[row, rules.n_outputs + k]
+    return 0.0
+
+
+@kernel
+def has_node(genomes, row, rules, node):
+    """Whether a genome has a node; inputs and outputs are in every genome."""
+    if node < rules.n_inputs + rules.n_outputs:
+        return True
+    for k in range(genomes.n_hidden[row]):
+        if genomes.hidden[row, k] == node:
+            return True
+    return False

@@ -1,0 +1,92 @@
+"""Random numbers as a pure function of a key and a counter: Philox4x32-10.
+
+Source: Salmon, Moraes, Dror & Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
+
+The 64-bit key comes from the seed of the study and the name of the condition. The counter says which number
+is meant, so that no order of execution, no thread and no interruption can change it:
+
+    word 0  block: which group of four numbers (in a trial: the step)
+    word 1  individual (24 bits) and purpose (8 bits)
+    word 2  generation (20 bits) and repeat (12 bits)
+    word 3  replicate
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._compile import kernel
+
+PURPOSE_NOISE = 1  # sensor noise of a trial
+PURPOSE_GENOME = 2  # the first genomes
+PURPOSE_CHILD = 3  # making one child: parents, crossover, mutation
+PURPOSE_SPECIES = 4  # representatives of species
+
+MAX_INDIVIDUALS = 1 << 24
+MAX_GENERATIONS = 1 << 20
+MAX_REPEATS = 1 << 12
+
+_M0 = np.uint64(0xD2511F53)
+_M1 = np.uint64(0xCD9E8D57)
+_W0 = np.uint32(0x9E3779B9)
+_W1 = np.uint32(0xBB67AE85)
+_LOW = np.uint64(0xFFFFFFFF)
+_32 = np.uint64(32)
+_TO_UNIT = 1.0 / 4294967296.0
+
+
+@kernel
+def philox(c0, c1, c2, c3, k0, k1):
+    """Four 32-bit words from a counter of four words and a key of two, all uint32."""
+    for _ in range(10):
+        p0 = _M0 * np.uint64(c0)
+        p1 = _M1 * np.uint64(c2)
+        high0 = np.uint32(p0 >> _32)
+        low0 = np.uint32(p0 & _LOW)
+        high1 = np.uint32(p1 >> _32)
+        low1 = np.uint32(p1 & _LOW)
+        c0 = np.uint32(high1 ^ c1 ^ k0)
+        c1 = low1
+        c2 = np.uint32(high0 ^ c3 ^ k1)
+        c3 = low0
+        k0 = np.uint32(k0 + _W0)
+        k1 = np.uint32(k1 + _W1)
+    return c0, c1, c2, c3
+
+
+@kernel
+def draw_words(stream, block):
+    """Words number 4 * block to 4 * block + 3 of a stream."""
+    return philox(np.uint32(block), stream[0], stream[1], stream[2], stream[3], stream[4])
+
+
+@kernel
+def make_stream(key, replicate, generation, individual, repeat, purpose):
+    """The three fixed counter words and two key words that name one stream of numbers."""
+    return (
+        np.uint32((np.uint64(individual) << np.uint64(8)) | np.uint64(purpose)),
+        np.uint32((np.uint64(generation) << np.uint64(12)) | np.uint64(repeat)),
+        np.uint32(replicate),
+        np.uint32(np.uint64(key) & _LOW),
+        np.uint32(np.uint64(key) >> _32),
+    )
+
+
+@kernel
+def unit(word):
+    """A float64 in (0, 1), centered: the mean over all words is exactly one half."""
+    return (np.float64(word) + 0.5) * _TO_UNIT
+
+
+@kernel
+def uniform(stream, index):
+    """Number `index` of a stream, uniform in (0, 1)."""
+    words = draw_words(stream, index >> 2)
+    lane = index & 3
+    if lane == 0:
+        return unit(words[0])
+    if lane == 1:
+        return unit(words[1])
+    if lane == 2:
+        return unit(words[2])
+    return unit(words[3])

@@ -1,0 +1,205 @@
+"""Fitness sharing, offspring, survival, stagnation and the next generation (EC02, sections 3.3 and 4.1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ._compile import kernel
+from ._crossover import crossover
+from ._genome import copy_genome, next_below, next_uniform
+from ._mutation import mutate, start_generation
+from ._philox import PURPOSE_CHILD, make_stream
+from ._species import BEST_EVER, N_SPECIES
+
+
+@kernel
+def note_improvement(fitness, species_of, species, generation):
+    """Keep for each species, and for the run, the best fitness and the generation that first had it."""
+    for k in range(species.counts[N_SPECIES]):
+        best = -math.inf
+        for row in range(fitness.size):
+            if species_of[row] == species.identity[k]:
+                best = max(best, fitness[row])
+        if best > species.best[k]:
+            species.best[k] = best
+            species.improved[k] = generation
+    best = np.max(fitness)
+    if best > species.floats[BEST_EVER]:
+        species.floats[BEST_EVER] = best
+        species.improved_at[0] = generation
+
+
+@kernel
+def round_to_sum(share, total, count):
+    """Whole numbers in proportion to `share` that add up to `total`, by largest remainder.
+
+    Args:
+        share: (k,) not negative; all zero is not allowed.
+        total: What the counts add up to.
+        count: (k,) int64, written. Of equal remainders the earlier one is rounded up.
+    """
+    whole = 0.0
+    for k in range(share.size):
+        whole += share[k]
+    rest = np.empty(share.size)
+    given = 0
+    for k in range(share.size):
+        exact = share[k] / whole * total
+        count[k] = int(math.floor(exact))
+        rest[k] = exact - count[k]
+        given += count[k]
+    while given < total:
+        largest = 0
+        for k in range(1, share.size):
+            if rest[k] > rest[largest]:
+                largest = k
+        count[largest] += 1
+        rest[largest] -= 1.0
+        given += 1
+    while given > total:  # only where a rounding error lifted a quota over a whole number
+        most = 0
+        for k in range(1, share.size):
+            if count[k] > count[most]:
+                most = k
+        count[most] -= 1
+        given -= 1
+
+
+@kernel
+def share_offspring(fitness, species_of, species, rules, generation, offspring):
+    """How many children each species has; they add up to the size of the population.
+
+    A species' share is the mean fitness of its members (that is explicit fitness sharing). One whose best
+    fitness has not risen for `stagnation` generations counts with `stagnation_factor`; when the whole
+    population has not improved for more than `population_stagnation` generations, only the two best species
+    have children. Where every share is zero the shares are the sizes.
+    """
+    n = fitness.size
+    n_species = species.counts[N_SPECIES]
+    share = np.zeros(n_species)
+    best_now = np.full(n_species, -math.inf)
+    for k in range(n_species):
+        for row in range(n):
+            if species_of[row] == species.identity[k]:
+                share[k] += fitness[row] / species.size[k]
+                best_now[k] = max(best_now[k], fitness[row])
+    if n_species > 2 and generation - species.improved_at[0] > rules.population_stagnation:
+        first = 0
+        for k in range(1, n_species):
+            if best_now[k] > best_now[first]:
+                first = k
+        second = 1 if first == 0 else 0
+        for k in range(n_species):
+            if k != first and best_now[k] > best_now[second]:
+                second = k
+        share[:] = 0.0
+        share[first] = 1.0
+        share[second] = 1.0
+    else:
+        leader = 0
+        for k in range(1, n_species):
+            if best_now[k] > best_now[leader]:
+                leader = k
+        for k in range(n_species):
+            stagnant = generation - species.improved[k] >= rules.stagnation
+            if stagnant and not (rules.best_species_spared and k == leader):
+                share[k] *= rules.stagnation_factor
+    total = 0.0
+    for k in range(n_species):
+        total += share[k]
+    if not (0.0 < total < math.inf):
+        for k in range(n_species):
+            share[k] = species.size[k]
+    round_to_sum(share, n, offspring)
+
+
+@kernel
+def ranked_members(fitness, species_of, identity, members):
+    """Rows of a species from the fittest down, equally fit ones in their order; returns how many."""
+    n = 0
+    for row in range(fitness.size):
+        if species_of[row] != identity:
+            continue
+        place = n
+        while place > 0 and fitness[members[place - 1]] < fitness[row]:
+            members[place] = members[place - 1]
+            place -= 1
+        members[place] = row
+        n += 1
+    return n
+
+
+@kernel
+def _other_champion(fitness, species_of, species, own, stream, cursor):
+    """The fittest individual of another species drawn at random."""
+    k = next_below(stream, cursor, species.counts[N_SPECIES] - 1)
+    if k >= own:
+        k += 1
+    champion = -1
+    for row in range(fitness.size):
+        if species_of[row] == species.identity[k] and (champion < 0 or fitness[row] > fitness[champion]):
+            champion = row
+    return champion
+
+
+@kernel
+def reproduce(old, fitness, species_of, species, rules, innovations, key, replicate, generation, new, parents):
+    """Fill `new` with the next generation, whole; `old` stays as it is.
+
+    Args:
+        old: The n genomes that were tried.
+        fitness: (n,) not negative.
+        species_of: (n,) identity of each one's species.
+        species: The species; best fitness and stagnation are brought up to date.
+        rules: NEAT's rates and choices.
+        innovations: The numbers of the run; what arose in the generation before is forgotten first.
+        key, replicate, generation: Which random numbers; `generation` is that of `old`.
+        new: Room for the n children.
+        parents: (n, 2) int32, written: rows of `old`; -1 where there is no second parent.
+    """
+    n = fitness.size
+    note_improvement(fitness, species_of, species, generation)
+    n_species = species.counts[N_SPECIES]
+    offspring = np.zeros(n_species, np.int64)
+    share_offspring(fitness, species_of, species, rules, generation, offspring)
+    start_generation(innovations)
+    members = np.empty(n, np.int64)
+    reached = np.empty(new.hidden.shape[1] + rules.n_outputs + 2, np.int32)
+    cursor = np.zeros(1, np.int64)
+    child = 0
+    for k in range(n_species):
+        if offspring[k] == 0:
+            continue
+        size = ranked_members(fitness, species_of, species.identity[k], members)
+        n_parents = min(int(math.floor(rules.survival * size + 1.0)), size)
+        counted = size if rules.champion_by_members else offspring[k]
+        for place in range(offspring[k]):
+            if place == 0 and counted >= rules.champion_from:
+                copy_genome(old, members[0], new, child)
+                parents[child, 0] = members[0]
+                parents[child, 1] = -1
+                child += 1
+                continue
+            stream = make_stream(key, replicate, generation + 1, child, 0, PURPOSE_CHILD)
+            cursor[0] = 0
+            first = members[next_below(stream, cursor, n_parents)]
+            second = -1
+            if next_uniform(stream, cursor) < rules.crossover:
+                if n_species > 1 and next_uniform(stream, cursor) < rules.interspecies:
+                    second = _other_champion(fitness, species_of, species, k, stream, cursor)
+                else:
+                    second = members[next_below(stream, cursor, n_parents)]
+                if second == first:
+                    second = -1
+            if second < 0:
+                copy_genome(old, first, new, child)
+                mutate(new, child, rules, innovations, stream, cursor, reached)
+            else:
+                crossover(old, first, second, fitness, rules, new, child, stream, cursor, reached)
+                if next_uniform(stream, cursor) >= rules.crossover_only:
+                    mutate(new, child, rules, innovations, stream, cursor, reached)
+            parents[child, 0] = first
+            parents[child, 1] = second
+            child += 1

@@ -1,1 +1,32 @@
-"""evolution."""
+"""NEAT and novelty search: settings, genomes, populations to ask and tell, archives."""
+
+from ._genome import ConnectionGene, Genome, Network, NodeGene, genome_from_record
+from ._novelty import (
+    NearestArchive,
+    NoveltySettings,
+    PaperArchive,
+    euclidean,
+    largest_cell_distance,
+    sorted_cells_distance,
+)
+from ._population import Population
+from ._random import random_key
+from ._settings import NAMED_SETTINGS, NeatSettings
+
+__all__ = [
+    "NAMED_SETTINGS",
+    "ConnectionGene",
+    "Genome",
+    "NearestArchive",
+    "NeatSettings",
+    "Network",
+    "NodeGene",
+    "NoveltySettings",
+    "PaperArchive",
+    "Population",
+    "euclidean",
+    "genome_from_record",
+    "largest_cell_distance",
+    "random_key",
+    "sorted_cells_distance",
+]

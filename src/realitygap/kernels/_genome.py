@@ -58,9 +58,9 @@ class NeatRules(NamedTuple):
     stay_disabled: float
     disabled_bit_inherited: bool
     equal_parents_mix: bool
-    excess_weight: float
-    disjoint_weight: float
-    weight_difference_weight: float
+    excess_coefficient: float
+    disjoint_coefficient: float
+    weight_coefficient: float
     normalize_from: int  # genes from which distances are divided by size; a huge number: never
     threshold: float
     nearest_species: bool
@@ -74,6 +74,7 @@ class NeatRules(NamedTuple):
     stagnation_factor: float
     best_species_spared: bool
     population_stagnation: int
+    clip_negative: bool
 
 
 @kernel

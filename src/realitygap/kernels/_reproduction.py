@@ -31,6 +31,21 @@ def note_improvement(fitness, species_of, species, generation):
         species.improved_at[0] = generation
 
 
+# What Stanley's C++ makes of a negative fitness.
+LOWEST_FITNESS = 0.0001
+
+
+@kernel
+def not_negative(fitness, rules, shared):
+    """Write to `shared` the fitness that sharing can use: lifted by the lowest, or cut off below."""
+    lowest = min(np.min(fitness), 0.0)
+    for row in range(fitness.size):
+        if rules.clip_negative:
+            shared[row] = fitness[row] if fitness[row] >= 0.0 else LOWEST_FITNESS
+        else:
+            shared[row] = fitness[row] - lowest
+
+
 @kernel
 def round_to_sum(share, total, count):
     """Whole numbers in proportion to `share` that add up to `total`, by largest remainder.
@@ -74,7 +89,7 @@ def share_offspring(fitness, species_of, species, rules, generation, offspring):
     A species' share is the mean fitness of its members (that is explicit fitness sharing). One whose best
     fitness has not risen for `stagnation` generations counts with `stagnation_factor`; when the whole
     population has not improved for more than `population_stagnation` generations, only the two best species
-    have children. Where every share is zero the shares are the sizes.
+    have children. Where every share is zero the shares are the sizes. `fitness` must not be negative.
     """
     n = fitness.size
     n_species = species.counts[N_SPECIES]
@@ -150,7 +165,7 @@ def reproduce(old, fitness, species_of, species, rules, innovations, key, replic
 
     Args:
         old: The n genomes that were tried.
-        fitness: (n,) not negative.
+        fitness: (n,) finite.
         species_of: (n,) identity of each one's species.
         species: The species; best fitness and stagnation are brought up to date.
         rules: NEAT's rates and choices.
@@ -163,7 +178,9 @@ def reproduce(old, fitness, species_of, species, rules, innovations, key, replic
     note_improvement(fitness, species_of, species, generation)
     n_species = species.counts[N_SPECIES]
     offspring = np.zeros(n_species, np.int64)
-    share_offspring(fitness, species_of, species, rules, generation, offspring)
+    shared = np.empty(n)
+    not_negative(fitness, rules, shared)
+    share_offspring(shared, species_of, species, rules, generation, offspring)
     start_generation(innovations)
     members = np.empty(n, np.int64)
     reached = np.empty(new.hidden.shape[1] + rules.n_outputs + 2, np.int32)

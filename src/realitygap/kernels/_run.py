@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import kernel
+from ._evolve import next_generation
 from ._genome import first_genomes, make_genomes
 from ._mutation import make_innovations
 from ._network import decode, make_networks
 from ._novelty import nearest_archive_step, paper_archive_step, sort_cells
 from ._philox import PURPOSE_NOISE, make_stream
-from ._reproduction import reproduce
 from ._species import make_species, speciate
 from ._trial import make_trace, make_workspace, run_trial
 
@@ -173,7 +173,7 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
             if rules.selection == RANDOM:
                 first_genomes(genomes, neat, key, replicate, generation + 1)
                 continue
-            reproduce(
+            next_generation(
                 genomes,
                 fitness,
                 species_of,
@@ -188,6 +188,5 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
             )
             if children.full[0]:
                 return False
-            speciate(children, genomes, fitness, species_of, species, neat, key, replicate, generation + 1)
             genomes, children = children, genomes
     return True

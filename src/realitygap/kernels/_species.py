@@ -94,9 +94,9 @@ def genome_distance(one, a, other, b, rules):
     larger = max(n_a, n_b)
     size = float(larger) if larger >= rules.normalize_from else 1.0
     return (
-        rules.excess_weight * excess / size
-        + rules.disjoint_weight * disjoint / size
-        + rules.weight_difference_weight * difference / matching
+        rules.excess_coefficient * excess / size
+        + rules.disjoint_coefficient * disjoint / size
+        + rules.weight_coefficient * difference / matching
     )
 
 

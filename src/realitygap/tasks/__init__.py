@@ -1,1 +1,5 @@
-"""tasks."""
+"""What is rewarded."""
+
+from ._coverage import CoverageTask
+
+__all__ = ["CoverageTask"]

@@ -1,1 +1,27 @@
-"""world."""
+"""Plain descriptions of arenas, bodies and sensors; nothing here moves."""
+
+from ._arena import (
+    INCH,
+    NAMED_STARTS,
+    Arena,
+    Grid,
+    Pose,
+    distance_to_walls,
+    is_inside,
+    paper_arena,
+)
+from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
+
+__all__ = [
+    "INCH",
+    "JYRO_SCRIBBLER",
+    "NAMED_STARTS",
+    "Arena",
+    "Body",
+    "Grid",
+    "Pose",
+    "RangeSensors",
+    "distance_to_walls",
+    "is_inside",
+    "paper_arena",
+]

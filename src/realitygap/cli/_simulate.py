@@ -1,0 +1,31 @@
+"""`realitygap simulate`: one case on the platform `jyro`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def simulate(
+    case: Annotated[Path, typer.Argument(metavar="CASE.json", help="The scene, and what drives its robots.")],
+    out: Annotated[Path, typer.Option("--out", metavar="OUT.csv", help="Where the track is written.")],
+) -> None:
+    """Run a case as the Jyro simulator would, and write what each robot did at each step.
+
+    The case is a JSON file: walls, lights, robots with their devices, and commands or a network. The track
+    is a CSV file: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy and the readings s0, s1, ...
+    Stall flags are Jyro's at every step, and so are poses under given commands. Numbers are float64.
+
+    Example: realitygap simulate tests/data/jyro/s15_net_linear_a.json --out track.csv
+
+    In Python: realitygap.trials.simulate_file(case, out)
+    """
+    from realitygap.trials._scene import simulate_file
+
+    described, track = simulate_file(case, out)
+    for i, robot in enumerate(described.robots):
+        blocked = int(track.stalls[:, i].sum())
+        typer.echo(f"SIM jyro, {robot.name}: {described.steps} steps, {blocked} of them blocked.")
+    typer.echo(f"Written: {out}")

@@ -1,0 +1,239 @@
+"""Novelty: distances between behaviors, and the archives that remember them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from realitygap.kernels import _novelty
+
+Cells = Sequence[int] | NDArray[np.integer]
+
+
+class NoveltySettings(BaseModel):
+    """How novelty is measured, and what is remembered.
+
+    `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
+    mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in
+    population and archive, which takes what exceeds a moving threshold. Both compare sorted lists of cells.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Which novelty search.")
+    sort: Literal["x-then-y", "y-then-x"] = Field(
+        "x-then-y",
+        description="How the cells of a behavior are sorted. The paper does not say; it names cells (0,0) and "
+        "(11,5), pairs that Python sorts by x first.",
+    )
+    archive_size: int = Field(
+        8, ge=1, le=100_000, description="paper: behaviors in the archive, which is filled first. Not printed."
+    )
+    enter: Literal["above-all", "above-least"] = Field(
+        "above-all",
+        description="paper: who replaces the oldest behavior: one more novel than all in the archive ('more novel than "
+        "the other behaviors in the archive'), or than the least novel.",
+    )
+    neighbors: int = Field(15, ge=1, le=100_000, description="lehman-stanley: k (2011: 15).")
+    threshold: float = Field(6.0, ge=0, description="lehman-stanley: novelty from which on a behavior enters at first.")
+    patience: int = Field(
+        2500, ge=1, description="lehman-stanley: evaluations without an entry after which the threshold falls by 5 %."
+    )
+
+
+def largest_cell_distance(columns: int, rows: int) -> float:
+    """The largest distance of two cells of a grid [cells], the paper's padding."""
+    return math.hypot(columns - 1, rows - 1)
+
+
+def _sorted_points(
+    cells: Cells, columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
+) -> NDArray[np.float64]:
+    numbers = np.unique(np.asarray(cells, np.int64))
+    if numbers.size and (numbers[0] < 0 or numbers[-1] >= columns * rows):
+        raise ValueError(
+            f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
+            f"expected 0 to {columns * rows - 1}: the grid has {columns} columns and {rows} rows."
+        )
+    points = np.empty((columns * rows, 2))
+    _novelty.sort_cells(numbers, numbers.size, columns, rows, sort == "x-then-y", points)
+    return points[: numbers.size]
+
+
+def sorted_cells_distance(
+    one: Cells,
+    other: Cells,
+    *,
+    columns: int = 12,
+    rows: int = 6,
+    sort: Literal["x-then-y", "y-then-x"] = "x-then-y",
+) -> float:
+    """The paper's distance of two behaviors [cells].
+
+    The sum of the distances of the cells at equal places of the two sorted lists; each cell that only the
+    longer one has counts with the largest distance in the grid.
+
+    Args:
+        one, other: Cells, numbered columns * row + column; order and repeats do not matter.
+        columns, rows: Size of the grid.
+        sort: By which coordinate first.
+
+    Raises:
+        ValueError: A cell outside the grid.
+
+    Source: Rosenzweig & Remy, section 2.4.
+    """
+    a = _sorted_points(one, columns, rows, sort)
+    b = _sorted_points(other, columns, rows, sort)
+    padding = largest_cell_distance(columns, rows)
+    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), padding))
+
+
+class PaperArchive:
+    """The paper's novelty: mean distance to a short archive whose oldest behavior is replaced.
+
+    While there is room, the behaviors of a generation go into the archive first, in order; then each
+    individual is compared with it, itself left out. Afterwards one that is more novel than the archived ones
+    (whose novelty is their mean distance to one another) replaces the oldest, in the order of individuals.
+
+    Source: Rosenzweig & Remy, section 2.4; size, filling and formula are not printed there and are ours.
+    """
+
+    def __init__(self, settings: NoveltySettings | None = None, *, columns: int = 12, rows: int = 6) -> None:
+        self.settings = settings or NoveltySettings()
+        self._columns = columns
+        self._rows = rows
+        size, cells = self.settings.archive_size, columns * rows
+        self._archive = np.empty((size, cells, 2))
+        self._n_archive = np.zeros(size, np.int32)
+        self._state = np.zeros(2, np.int64)
+
+    def __len__(self) -> int:
+        return int(self._state[0])
+
+    def update(self, behaviors: Sequence[Cells]) -> NDArray[np.float64]:
+        """Novelty of one generation, which the archive then takes in.
+
+        Args:
+            behaviors: n lists of visited cells, in the order of individuals.
+
+        Returns:
+            (n,) float64 [cells]; 0 where there is nothing to compare with.
+
+        Raises:
+            ValueError: A cell outside the grid.
+        """
+        points, n_points = _pack(behaviors, self._columns, self._rows, self.settings.sort)
+        novelty = np.empty(len(behaviors))
+        _novelty.paper_archive_step(
+            points,
+            n_points,
+            largest_cell_distance(self._columns, self._rows),
+            self._archive,
+            self._n_archive,
+            self._state,
+            self.settings.enter == "above-all",
+            novelty,
+        )
+        return novelty
+
+
+def _pack(
+    behaviors: Sequence[Cells], columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    points = np.zeros((len(behaviors), columns * rows, 2))
+    n_points = np.zeros(len(behaviors), np.int32)
+    for k, cells in enumerate(behaviors):
+        found = _sorted_points(cells, columns, rows, sort)
+        points[k, : len(found)] = found
+        n_points[k] = len(found)
+    return points, n_points
+
+
+def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+    """Straight distance of two behaviors that are points."""
+    return float(np.linalg.norm(one - other))
+
+
+class NearestArchive:
+    """Lehman & Stanley's novelty: mean distance to the k nearest in population and archive.
+
+    A behavior enters the archive when its novelty exceeds a threshold, which falls by 5 % after `patience`
+    evaluations without an entry and rises by 20 % when more than four enter in a row.
+
+    Source: Lehman & Stanley (2011). Differs: by generation rather than steady state; the individuals of a
+    generation are compared with each other first and then enter in order.
+    """
+
+    def __init__(
+        self,
+        distance: Callable[[NDArray[np.float64], NDArray[np.float64]], float] = euclidean,
+        *,
+        k: int = 15,
+        threshold: float = 6.0,
+        patience: int = 2500,
+    ) -> None:
+        """Make an empty archive.
+
+        Args:
+            distance: Of two behaviors, (d,) each.
+            k: Neighbors to average over, >= 1; all of them while there are fewer.
+            threshold: Novelty from which on a behavior enters at first.
+            patience: Evaluations.
+
+        Raises:
+            ValueError: k < 1.
+        """
+        if k < 1:
+            raise ValueError(f"k is {k}, expected at least 1.")
+        self._distance = distance
+        self._k = k
+        self._patience = patience
+        self._threshold = np.array([threshold], np.float64)
+        self._counters = np.zeros(2, np.int64)
+        self.behaviors: list[NDArray[np.float64]] = []
+
+    def __len__(self) -> int:
+        return len(self.behaviors)
+
+    @property
+    def threshold(self) -> float:
+        """The novelty from which on a behavior enters now."""
+        return float(self._threshold[0])
+
+    def update(self, behaviors: ArrayLike) -> NDArray[np.float64]:
+        """Novelty of one generation, of which the novel ones then enter.
+
+        Args:
+            behaviors: (n, d), one row per individual, in their order.
+
+        Returns:
+            (n,) float64, in the unit of the distance; 0 where there is nothing to compare with.
+
+        Raises:
+            ValueError: Not two-dimensional, a value that is not finite, or another d than before.
+        """
+        rows = np.asarray(behaviors, np.float64)
+        if rows.ndim != 2 or not np.isfinite(rows).all():
+            raise ValueError(f"behaviors has shape {rows.shape}, expected (n, d) finite numbers.")
+        if self.behaviors and self.behaviors[0].shape != rows[0].shape:
+            raise ValueError(
+                f"behaviors has {rows.shape[1]} columns, expected {self.behaviors[0].size}: as in the archive."
+            )
+        n = len(rows)
+        others = [*rows, *self.behaviors]
+        distances = np.empty((n, len(others)))
+        for i in range(n):
+            for j, other in enumerate(others):
+                distances[i, j] = -1.0 if i == j else self._distance(rows[i], other)
+        novelty = np.empty(n)
+        _novelty.nearest_novelty(distances, self._k, novelty)
+        entered = np.empty(n, np.bool_)
+        _novelty.admit(novelty, self._counters, self._threshold, self._patience, entered)
+        self.behaviors.extend(rows[k].copy() for k in np.flatnonzero(entered))
+        return novelty

@@ -1,0 +1,287 @@
+"""NEAT's settings: every number and every choice, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from realitygap.errors import did_you_mean
+from realitygap.kernels._genome import NeatRules
+from realitygap.kernels._network import IDENTITY, SIGMOID, TANH
+
+_NEVER = 2**31 - 1
+
+
+class NeatSettings(BaseModel):
+    """NEAT after Stanley & Miikkulainen (2002), with the choices that the paper leaves open settled by name.
+
+    The marks in the descriptions: *EC02*, the paper (Evolutionary Computation 10(2), with its section);
+    *C++*, Stanley's own release 1.2.1, where it is the only source; *JAIR04*, Stanley & Miikkulainen (2004),
+    appendix. Where neither says, the choice is ours and said to be.
+
+    What is fixed: a genome is node genes and connection genes; all start fully wired from inputs to outputs
+    without hidden nodes (EC02 3.4); structures that arise twice in a generation get the same innovation
+    numbers and are forgotten after it (3.2); a split leaves the old gene disabled, with weight 1 into the
+    new node and the old weight out of it (3.1); fitness is shared within a species, whose share of the
+    children is its mean fitness (3.3); the whole population is replaced (3.3), and its size is exact, by
+    largest remainder (ours: C++ gives what is missing to the largest species). A link out of an output node
+    counts as recurrent (C++).
+
+    Differs from C++: no traits; a new link's weight is drawn anew also when another genome made the same
+    link in the generation; no "severe" half in weight mutation; no worst species marked for removal every 30
+    generations; interspecies mating takes the champion of a species drawn uniformly.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    settings: str = Field("default", description="The named set that these settings began from.")
+    population: int = Field(150, ge=2, le=1_000_000, description="Individuals in each generation (EC02 4.1: 150).")
+    generations: int = Field(100, ge=1, le=1_000_000, description="Generations, the first one counted.")
+
+    recurrent: bool = Field(
+        False,
+        description="Whether links may lead back. A recurrent network makes one pass a step, in which each node "
+        "sees the others as they were a step before (C++).",
+    )
+    activation: Literal["tanh", "sigmoid", "identity"] = Field(
+        "sigmoid",
+        description="Of hidden and output nodes, of slope * x. EC02 4.1: sigmoid, 1 / (1 + exp(-4.9 x)). "
+        "tanh reaches -1..1; tanh(2.45 x) is that sigmoid stretched to it.",
+    )
+    activation_slope: float = Field(4.9, gt=0, le=100, description="Slope of the activation (EC02 4.1: 4.9).")
+    node_bias: bool = Field(
+        False,
+        description="Whether each output and hidden node has a bias of its own that mutates as weights do, as in "
+        "neat-python. EC02 has a constant input instead.",
+    )
+    bias_value: float = Field(
+        1.0, description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5)."
+    )
+
+    initial_weight: float = Field(
+        1.0, ge=0, le=100, description="First weights, and those of new links, are uniform within +- this (C++: 1)."
+    )
+    mutate_weights: float = Field(
+        0.8, ge=0, le=1, description="Share of children whose weights are mutated (EC02 4.1: 0.8)."
+    )
+    replace_weight: float = Field(
+        0.1, ge=0, le=1, description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others "
+        "are moved."
+    )
+    weight_step: float = Field(
+        2.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+    )
+    replaced_weight: float = Field(
+        2.5, ge=0, le=100, description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step)."
+    )
+    weight_limit: float = Field(8.0, gt=0, le=1e6, description="Weights stay within +- this (C++: 8).")
+
+    add_node: float = Field(0.03, ge=0, le=1, description="Share of children that split a link (EC02 4.1: 0.03).")
+    add_link: float = Field(
+        0.05, ge=0, le=1, description="Share of children that add a link (EC02 4.1: 0.05; 0.3 in large populations)."
+    )
+    add_link_tries: int = Field(
+        20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
+    )
+    structural_mutations: Literal["one", "independent"] = Field(
+        "one",
+        description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, "
+        "link and weights are drawn apart, as in neat-python.",
+    )
+    split_bias_links: bool = Field(False, description="Whether links out of the constant input may be split (C++: no).")
+    reenable: float = Field(
+        0.0, ge=0, le=1, description="Share of children whose oldest disabled gene is switched on (C++: 0)."
+    )
+
+    crossover: float = Field(
+        0.75, ge=0, le=1, description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone)."
+    )
+    crossover_only: float = Field(
+        0.2, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
+    )
+    average_weights: float = Field(
+        0.0, ge=0, le=1, description="Share of crossovers in which matching weights are averaged, in place of one "
+        "being chosen (EC02: 0; C++ and JAIR04: 0.4)."
+    )
+    interspecies: float = Field(
+        0.001, ge=0, le=1, description="Share of crossovers with another species (EC02 4.1: 0.001)."
+    )
+    equal_parents: Literal["mix", "smaller"] = Field(
+        "mix",
+        description="Disjoint and excess genes of equally fit parents: by coin from both (EC02, figure 4), or those "
+        "of the smaller genome (C++). A gene that would close a cycle is left out.",
+    )
+    stay_disabled: float = Field(
+        0.75, ge=0, le=1, description="Chance that a gene disabled in either parent is so in the child (EC02 4.1: 0.75)."
+    )
+    disabled_rule: Literal["coin", "inherit"] = Field(
+        "coin",
+        description="Otherwise it is on ('coin': exactly that chance), or as in the parent it came from ('inherit', "
+        "C++: 0.875 where one parent has it disabled, 1 where both have).",
+    )
+
+    excess_coefficient: float = Field(1.0, ge=0, le=1e6, description="c1 of the distance (EC02 4.1: 1).")
+    disjoint_coefficient: float = Field(1.0, ge=0, le=1e6, description="c2 of the distance (EC02 4.1: 1).")
+    weight_coefficient: float = Field(0.4, ge=0, le=1e6, description="c3 of the distance (EC02 4.1: 0.4).")
+    normalize_genes: Literal["never", "large", "always"] = Field(
+        "never",
+        description="Whether excess and disjoint genes are divided by the larger genome's size: never (C++, JAIR04), "
+        "from 20 genes on (EC02 3.3 allows 1 below), or always.",
+    )
+    threshold: float = Field(3.0, gt=0, le=1e6, description="Distance below which genomes are compatible (EC02 4.1: 3).")
+    assign: Literal["first", "nearest"] = Field(
+        "first", description="A genome joins the first compatible species (EC02 3.3), or the nearest (neat-python)."
+    )
+    representative: Literal["random", "champion"] = Field(
+        "random",
+        description="Who stands for a species: a random member of the generation before (EC02 3.3), or its champion "
+        "(C++).",
+    )
+    target_species: int = Field(
+        0, ge=0, le=1_000_000, description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10."
+    )
+    threshold_step: float = Field(
+        0.3, ge=0, le=1e6, description="How far the threshold moves in a generation, never below 0.3 (C++)."
+    )
+
+    survival: float = Field(
+        0.2, ge=0, le=1, description="Share of a species that may become parents, floor(share * size + 1) of them "
+        "(EC02: not given; C++: 0.2)."
+    )
+    champion_from: int = Field(
+        6, ge=1, le=1_000_000, description="The champion is copied unchanged in species of this many (EC02 4.1: more "
+        "than five)."
+    )
+    champion_counts: Literal["members", "offspring"] = Field(
+        "members", description="Many members (EC02), or many children to come (C++)."
+    )
+    stagnation: int = Field(
+        15, ge=1, le=1_000_000, description="Generations without a better best fitness after which a species is "
+        "stagnant (EC02 4.1: 15)."
+    )
+    stagnation_factor: float = Field(
+        0.01, ge=0, le=1, description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01)."
+    )
+    best_species_spared: bool = Field(
+        False, description="Whether the species with the fittest individual is never called stagnant (EC02: no)."
+    )
+    population_stagnation: int = Field(
+        20, ge=1, le=2**31 - 1, description="After more generations than this without a better best fitness only the "
+        "two best species have children (EC02 3.3: 20)."
+    )
+    negative_fitness: Literal["shift", "clip"] = Field(
+        "shift",
+        description="Sharing needs fitness that is not negative: lift all by the lowest ('shift', ours), or make "
+        "negative ones 0.0001 ('clip', C++).",
+    )
+
+    @classmethod
+    def named(cls, name: str, **changes: Any) -> NeatSettings:
+        """A named set of settings, some of them changed.
+
+        Args:
+            name: 'default', 'stanley-2002', 'rosenzweig-remy' or 'rosenzweig-remy-neat-python'.
+            changes: Settings by name.
+
+        Raises:
+            ValueError: No such set, or a setting is wrong (pydantic's message names it).
+        """
+        if name not in NAMED_SETTINGS:
+            raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(name, NAMED_SETTINGS)}")
+        return cls.model_validate({**NAMED_SETTINGS[name], **changes})
+
+    def rules(self, n_inputs: int, n_outputs: int, *, bias_input: int = -1) -> NeatRules:
+        """The settings in the form that the kernels read.
+
+        Args:
+            n_inputs, n_outputs: Nodes, the constant input counted.
+            bias_input: Which input is constant; -1 where none is.
+        """
+        return NeatRules(
+            n_inputs=n_inputs,
+            n_outputs=n_outputs,
+            recurrent=self.recurrent,
+            node_bias=self.node_bias,
+            bias_input=bias_input,
+            activation={"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}[self.activation],
+            activation_slope=float(self.activation_slope),
+            initial_weight=float(self.initial_weight),
+            weight_limit=float(self.weight_limit),
+            mutate_weights=float(self.mutate_weights),
+            replace_weight=float(self.replace_weight),
+            weight_step=float(self.weight_step),
+            replaced_weight=float(self.replaced_weight),
+            add_node=float(self.add_node),
+            add_link=float(self.add_link),
+            add_link_tries=self.add_link_tries,
+            reenable=float(self.reenable),
+            one_structural_mutation=self.structural_mutations == "one",
+            split_bias_links=self.split_bias_links,
+            crossover=float(self.crossover),
+            crossover_only=float(self.crossover_only),
+            average_weights=float(self.average_weights),
+            interspecies=float(self.interspecies),
+            stay_disabled=float(self.stay_disabled),
+            disabled_bit_inherited=self.disabled_rule == "inherit",
+            equal_parents_mix=self.equal_parents == "mix",
+            excess_coefficient=float(self.excess_coefficient),
+            disjoint_coefficient=float(self.disjoint_coefficient),
+            weight_coefficient=float(self.weight_coefficient),
+            normalize_from={"never": _NEVER, "large": 20, "always": 1}[self.normalize_genes],
+            threshold=float(self.threshold),
+            nearest_species=self.assign == "nearest",
+            champion_represents=self.representative == "champion",
+            target_species=self.target_species,
+            threshold_step=float(self.threshold_step),
+            survival=float(self.survival),
+            champion_from=self.champion_from,
+            champion_by_members=self.champion_counts == "members",
+            stagnation=self.stagnation,
+            stagnation_factor=float(self.stagnation_factor),
+            best_species_spared=self.best_species_spared,
+            population_stagnation=self.population_stagnation,
+            clip_negative=self.negative_fitness == "clip",
+        )
+
+
+# The paper's text alone, and Stanley's C++ only where the paper is silent.
+_STANLEY: dict[str, Any] = {
+    "settings": "stanley-2002",
+    "population": 150,
+    "generations": 100,
+    "normalize_genes": "large",
+    "stagnation_factor": 0.0,
+}
+
+# Table 1 on top; its words are those of an old neat-python, whose networks answered from -1 to 1.
+_ROSENZWEIG: dict[str, Any] = {
+    **_STANLEY,
+    "settings": "rosenzweig-remy",
+    "population": 8,
+    "generations": 5,
+    "add_link": 0.1,
+    "add_node": 0.05,
+    "activation": "tanh",
+    "activation_slope": 2.45,
+}
+
+NAMED_SETTINGS: Mapping[str, Mapping[str, Any]] = {
+    "default": {
+        "settings": "default",
+        "add_link": 0.3,
+        "champion_counts": "offspring",
+        "best_species_spared": True,
+    },
+    "stanley-2002": _STANLEY,
+    "rosenzweig-remy": _ROSENZWEIG,
+    "rosenzweig-remy-neat-python": {
+        **_ROSENZWEIG,
+        "settings": "rosenzweig-remy-neat-python",
+        "node_bias": True,
+        "activation_slope": 2.5,
+        "structural_mutations": "independent",
+        "split_bias_links": True,
+    },
+}

@@ -1,0 +1,27 @@
+"""Result files of simulated studies: the only code that reads or writes them.
+
+A `ResultsFolder` holds `study.json`, the study as resolved; `trials/CONDITION.FIRST-LAST.parquet`, one file
+per chunk of replicates, written beside, synced and renamed into place; and `log.jsonl`, times and hosts,
+outside the digest. This package handles plain dicts, arrays and polars frames. It knows nothing of genomes or
+studies.
+"""
+
+from realitygap.records._chunk import Chunk
+from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
+from realitygap.records._folder import ResultsFolder
+from realitygap.records._version import RESULTS_VERSION, RecordWarning
+
+__all__ = [  # noqa: RUF022 - grouped by subject
+    # the folder and what is in it
+    "ResultsFolder",
+    "Chunk",
+    "RESULTS_VERSION",
+    "RecordWarning",
+    # the columns of its frames
+    "SCHEMA",
+    "KEYS",
+    "COLUMNS",
+    "Column",
+    "column_table",
+    "list_column",
+]

@@ -1,0 +1,246 @@
+"""One chunk of a study: a Parquet file with the rows of one condition's replicates, first to last."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from realitygap.errors import RecordError, RecordVersionError
+from realitygap.records._columns import SCHEMA, check_rows
+from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest
+from realitygap.records._files import reading
+from realitygap.records._seal import BrokenSeal, check_seal, seal
+from realitygap.records._version import RESULTS_VERSION
+
+_FORMAT = "simulated trials 1"
+_MAX_REPLICATE = 10**9 - 1
+_MAX_CONDITION = 150
+"""Longest name of a condition; file systems allow 255 bytes, and a chunk's temporary file adds some 50."""
+
+_CONDITION = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_MAX_CONDITION - 1}}}")
+_NAME = re.compile(rf"(?P<condition>{_CONDITION.pattern})\.(?P<first>\d{{9}})-(?P<last>\d{{9}})\.parquet")
+
+_AGAIN = (
+    "Move it elsewhere or delete it, then run the same command again: only its replicates are computed anew."
+)
+
+
+@dataclass(frozen=True)
+class ChunkName:
+    """What a chunk's file name says."""
+
+    condition: str
+    first: int
+    last: int
+
+    @classmethod
+    def parse(cls, name: str) -> ChunkName | None:
+        """The parts of a file name; None when it is not the name of a chunk."""
+        match = _NAME.fullmatch(name)
+        if match is None or int(match["last"]) < int(match["first"]):
+            return None
+        return cls(match["condition"], int(match["first"]), int(match["last"]))
+
+    def __str__(self) -> str:
+        return f"{self.condition}.{self.first:09d}-{self.last:09d}.parquet"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A published chunk whose bytes are as they were written.
+
+    Attributes:
+        path: its file.
+        condition: name of the condition.
+        first: first replicate.
+        last: last replicate, inclusive.
+        condition_hash: hash of the condition as resolved, as given by who published.
+        results_version: what computed the numbers.
+        n_rows: number of rows.
+        rows_digest: digest of the rows' values, hexadecimal sha256.
+    """
+
+    path: Path
+    condition: str
+    first: int
+    last: int
+    condition_hash: str
+    results_version: int
+    n_rows: int
+    rows_digest: str
+
+    @property
+    def replicates(self) -> range:
+        """The replicates in this chunk."""
+        return range(self.first, self.last + 1)
+
+
+def check_condition(name: str) -> None:
+    """Return when `name` can be part of a file name on every system.
+
+    Raises:
+        ValueError: it is empty, too long, begins with a dot, or holds other characters.
+    """
+    if not isinstance(name, str) or not _CONDITION.fullmatch(name):
+        raise ValueError(
+            f"Condition {name!r} cannot name a file: expected 1 to {_MAX_CONDITION} characters "
+            "out of A-Z a-z 0-9 . _ - and no dot at the start."
+        )
+
+
+def encode_chunk(
+    folder: Path, condition: str, first: int, frame: pl.DataFrame, condition_hash: str
+) -> tuple[Chunk, bytes]:
+    """A chunk and the bytes of its file.
+
+    Raises:
+        TypeError: `frame` is not a polars frame, or the hash is not text.
+        ValueError: `condition`, `first` or the rows are not fit to be published.
+    """
+    check_condition(condition)
+    if not isinstance(condition_hash, str):
+        raise TypeError(f"The condition's hash is {condition_hash!r}, expected text.")
+    last = check_rows(frame, condition, first)
+    if last > _MAX_REPLICATE:
+        raise ValueError(f"Replicate {last} is too large, expected at most {_MAX_REPLICATE}.")
+    frame = frame.select(list(SCHEMA))
+    path = folder / str(ChunkName(condition, first, last))
+    chunk = Chunk(
+        path, condition, first, last, condition_hash, RESULTS_VERSION, frame.height, rows_digest(frame)
+    )
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, compression="zstd", metadata=_to_metadata(chunk))
+    return chunk, seal(buffer.getvalue())
+
+
+def load_chunk(path: Path) -> Chunk:
+    """The chunk in a file, after a look at all of its bytes.
+
+    Raises:
+        RecordError: the file is torn, foreign, or not what its name says.
+    """
+    return _open(path)[0]
+
+
+def read_rows(path: Path, columns: Sequence[str] | None = None) -> tuple[Chunk, pl.DataFrame]:
+    """A chunk and its rows, or some columns of them; all columns are held to the digest in the file.
+
+    Raises:
+        RecordError: the file is torn, foreign, or not what its name says.
+    """
+    chunk, sealed = _open(path)
+    if columns is not None:
+        return chunk, _decode(chunk, sealed, columns)
+    return chunk, _read_checked(chunk, sealed)[0]
+
+
+def digest_rows(path: Path, digest: RowsDigest) -> Chunk:
+    """Feed the rows of a chunk to `digest`, after they were held to the digest in the file.
+
+    Raises:
+        RecordError: the file is torn, foreign, or not what its name says.
+    """
+    chunk, sealed = _open(path)
+    frame, streams = _read_checked(chunk, sealed)
+    digest.update(streams, frame.height)
+    return chunk
+
+
+def _open(path: Path) -> tuple[Chunk, bytes]:
+    with reading(path):
+        sealed = path.read_bytes()
+    try:
+        check_seal(sealed)
+    except BrokenSeal as error:
+        raise RecordError(f"{path} {error}. {_AGAIN}") from None
+    with _decoding(path):
+        metadata = pl.read_parquet_metadata(io.BytesIO(sealed))
+    chunk = _from_metadata(path, metadata)
+    name = ChunkName.parse(path.name)
+    if name is None or name != ChunkName(chunk.condition, chunk.first, chunk.last):
+        raise RecordError(
+            f"{path} holds replicates {chunk.first} to {chunk.last} of condition {chunk.condition!r}, "
+            f"which is not what its name says. Was it renamed? {_AGAIN}"
+        )
+    return chunk, sealed
+
+
+def _decode(chunk: Chunk, sealed: bytes, columns: Sequence[str] | None) -> pl.DataFrame:
+    with _decoding(chunk.path):
+        schema = pl.read_parquet_schema(io.BytesIO(sealed))
+    if schema != SCHEMA:
+        names = [name for name in {**SCHEMA, **schema} if SCHEMA.get(name) != schema.get(name)]
+        problem = f"{chunk.path} differs from this version's columns in {', '.join(names) or 'their order'}."
+        if chunk.results_version != RESULTS_VERSION:
+            raise RecordVersionError(
+                f"{problem} It was written for results version {chunk.results_version}; "
+                "read it with the realitygap that wrote it."
+            )
+        raise RecordError(f"{problem} {_AGAIN}")
+    with _decoding(chunk.path):
+        return pl.read_parquet(io.BytesIO(sealed), columns=None if columns is None else list(columns))
+
+
+@contextlib.contextmanager
+def _decoding(path: Path) -> Iterator[None]:
+    """What the decoder says against an intact file: it can only be about versions."""
+    try:
+        yield
+    except pl.exceptions.PolarsError as error:
+        raise RecordError(
+            f"{path} is intact, but polars {pl.__version__} cannot read it ({error}). "
+            "Was it written with a newer polars? Install that one."
+        ) from error
+
+
+def _read_checked(chunk: Chunk, sealed: bytes) -> tuple[pl.DataFrame, list[Stream]]:
+    frame = _decode(chunk, sealed, None)
+    streams = list(row_streams(frame))
+    digest = RowsDigest()
+    digest.update(streams, frame.height)
+    other_rows = frame.height != chunk.n_rows or digest.hexdigest() != chunk.rows_digest
+    if other_rows or (frame["condition"] != chunk.condition).any():
+        raise RecordError(
+            f"{chunk.path} reads as other values than were written, though its bytes are intact. "
+            "Does the same command give this again? Then please report it, with the version of polars."
+        )
+    return frame, streams
+
+
+def _to_metadata(chunk: Chunk) -> dict[str, str]:
+    return {
+        "realitygap.format": _FORMAT,
+        "realitygap.condition": chunk.condition,
+        "realitygap.first": str(chunk.first),
+        "realitygap.last": str(chunk.last),
+        "realitygap.condition_hash": chunk.condition_hash,
+        "realitygap.results_version": str(chunk.results_version),
+        "realitygap.n_rows": str(chunk.n_rows),
+        "realitygap.rows_digest": chunk.rows_digest,
+    }
+
+
+def _from_metadata(path: Path, metadata: Mapping[str, str]) -> Chunk:
+    if metadata.get("realitygap.format") != _FORMAT:
+        raise RecordError(
+            f"{path} is of format {metadata.get('realitygap.format')!r}, expected {_FORMAT!r}. {_AGAIN}"
+        )
+    try:
+        return Chunk(
+            path,
+            metadata["realitygap.condition"],
+            int(metadata["realitygap.first"]),
+            int(metadata["realitygap.last"]),
+            metadata["realitygap.condition_hash"],
+            int(metadata["realitygap.results_version"]),
+            int(metadata["realitygap.n_rows"]),
+            metadata["realitygap.rows_digest"],
+        )
+    except (KeyError, ValueError) as error:
+        raise RecordError(f"{path} lacks a part of its description ({error}). {_AGAIN}") from error

@@ -1,0 +1,95 @@
+"""Writing files so that a crash leaves the old file or the new one, and at worst a temporary file beside."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from realitygap.errors import RecordError
+
+_FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
+_FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
+_NO_FOLDER_SYNC = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EBADF}
+"""What file systems answer that cannot sync a folder; a rename is then as safe as they make it."""
+
+
+def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
+    """Write `data` beside `path`, sync it, rename it into place and sync the folder.
+
+    Args:
+        path: the file to make; its folder must exist.
+        data: all of its bytes.
+        replace: whether a file that is there already gives way.
+
+    Raises:
+        RecordError: the file is there and shall not be replaced, or the system refused; nothing stays.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with writing(path):
+            with temporary.open("xb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            if not replace and path.exists():
+                raise RecordError(f"{path} is published already; what is published is never overwritten.")
+            temporary.replace(path)
+            sync_folder(path.parent)
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames and removals in a folder survive a loss of power; on Windows, nothing to call."""
+    if sys.platform == "win32":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_FOLDER_SYNC:
+            raise
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what the system says against writing `path` into advice.
+
+    Raises:
+        RecordError: in place of an `OSError`.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno in _FULL:
+            advice = "Make room there (the disk, a quota or a limit on file sizes is full), then"
+        elif error.errno in _FORBIDDEN:
+            advice = "Make the folder writable for this account, then"
+        else:
+            advice = "When that is put right,"
+        raise RecordError(
+            f"Could not write {path}: {error.strerror or error}. Everything published before is safe. "
+            f"{advice} run the same command again: it goes on with what is missing."
+        ) from error
+
+
+@contextlib.contextmanager
+def reading(path: Path) -> Iterator[None]:
+    """Turn what the system says against reading `path` into one message.
+
+    Raises:
+        RecordError: in place of an `OSError`.
+    """
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise RecordError(f"{path} is gone; was it removed by another process just now?") from error
+    except OSError as error:
+        raise RecordError(f"Could not read {path}: {error.strerror or error}.") from error

@@ -1,0 +1,515 @@
+"""A folder with the results of one simulated study."""
+
+from __future__ import annotations
+
+import contextlib
+import copy
+import itertools
+import threading
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from realitygap.errors import RecordError, RecordVersionError, did_you_mean
+from realitygap.records._chunk import (
+    Chunk,
+    ChunkName,
+    check_condition,
+    digest_rows,
+    encode_chunk,
+    load_chunk,
+    read_rows,
+)
+from realitygap.records._columns import SCHEMA
+from realitygap.records._description import DESCRIPTION_NAME, Description
+from realitygap.records._digest import RowsDigest, study_digest
+from realitygap.records._files import reading, sync_folder, write_durably, writing
+from realitygap.records._listing import TRIALS_NAME, is_temporary, is_trace, list_chunks, listed
+from realitygap.records._lock import LOCK_NAME, FolderLock
+from realitygap.records._log import LOG_NAME, append_line, read_lines
+from realitygap.records._version import RESULTS_VERSION, RecordWarning
+
+LEDGER_NAME = "ledger.sqlite"
+
+
+class ResultsFolder:
+    """The results of one simulated study: `study.json`, `trials/*.parquet` and `log.jsonl`.
+
+    Make one with `create` or `open`. Any number of processes may read while one writes; whatever is read was
+    published as a whole. Writing takes the lock by itself; `locked` keeps others out for longer.
+    """
+
+    def __init__(self, path: Path, description: Description) -> None:
+        self._path = path
+        self._trials = path / TRIALS_NAME
+        self._description = description
+        self._lock = FolderLock(path)
+        self._publishing = threading.Lock()
+        self._checked: dict[str, tuple[tuple[int, ...], Chunk]] = {}
+
+    # making and opening
+
+    @classmethod
+    def create(cls, path: str | Path, description: Mapping[str, Any]) -> ResultsFolder:
+        """Begin a study in a folder that is new or empty.
+
+        Args:
+            path: the folder; it and those above it are made.
+            description: the study as resolved: JSON values, with `conditions` a list of names, or of tables
+                that have a `name`.
+
+        Raises:
+            RecordError: the folder holds something, cannot be made, or another process writes to it.
+            TypeError: a value of the description is not JSON's.
+            ValueError: the description has no valid list of conditions.
+        """
+        folder = cls(Path(path), Description.of(description, RESULTS_VERSION))
+        if not folder._path.is_dir():
+            with writing(folder._path):
+                folder._path.mkdir(parents=True, exist_ok=True)
+                sync_folder(folder._path.parent)
+        folder._refuse_unless_empty()
+        with folder._hold(reload=False):
+            folder._refuse_unless_empty()
+            folder._begin()
+        return folder
+
+    @classmethod
+    def open(cls, path: str | Path) -> ResultsFolder:
+        """The study in a folder.
+
+        Raises:
+            RecordError: there is no such folder, it holds no results, or its `study.json` is torn or foreign.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            what = "is a file, not a folder of results" if path.exists() else "does not exist"
+            raise RecordError(
+                f"{path} {what}. Check the path, or run a study with it as the folder for results."
+            )
+        if not (path / DESCRIPTION_NAME).exists():
+            with reading(path):
+                found = sorted(entry.name for entry in path.iterdir())
+            raise RecordError(
+                f"{path} holds no results: there is no {DESCRIPTION_NAME}. Found {listed(found)}. "
+                "Check the path; if the file was lost, restore it from a copy."
+            )
+        return cls(path, Description.read(path / DESCRIPTION_NAME))
+
+    # what it is
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self._path
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """A copy of the study as resolved."""
+        return copy.deepcopy(self._description.study)
+
+    @property
+    def conditions(self) -> list[str]:
+        """Names of the conditions, in the description's order."""
+        return self._description.conditions
+
+    @property
+    def results_version(self) -> int:
+        """The version of what computed the numbers in this folder; see `RESULTS_VERSION`."""
+        return self._description.results_version
+
+    @property
+    def version_note(self) -> str | None:
+        """A sentence for reports when another version computed the numbers; None when it was this one."""
+        if self.results_version == RESULTS_VERSION:
+            return None
+        return (
+            f"The results in {self._path} were computed by results version {self.results_version}; "
+            f"this realitygap computes version {RESULTS_VERSION}, whose numbers may differ."
+        )
+
+    def update_description(self, description: Mapping[str, Any]) -> None:
+        """Replace the description, when a study gets more replicates or conditions.
+
+        Raises:
+            RecordError: a condition with published chunks would be missing from it, or the file cannot be
+                written.
+            RecordVersionError: another version computed the results.
+            TypeError: a value of the description is not JSON's.
+            ValueError: the description has no valid list of conditions.
+        """
+        new = Description.of(description, RESULTS_VERSION)
+        with self._hold():
+            self._refuse_other_version()
+            lost = sorted({name.condition for name in list_chunks(self._trials)} - set(new.conditions))
+            if lost:
+                raise RecordError(
+                    f"{self._path} holds trials of {listed(lost)}, which the new description does not list. "
+                    "List them, or start anew (--fresh, or another folder)."
+                )
+            new.write(self._path / DESCRIPTION_NAME)
+            self._description = new
+
+    # chunks
+
+    def chunks(self, condition: str | None = None) -> list[Chunk]:
+        """All published chunks, or those of one condition, in key order; every byte of them was checked.
+
+        A file that was checked before and has not changed since is not read again.
+
+        Raises:
+            RecordError: a file in `trials/` is torn, foreign or in the wrong place, or chunks overlap or
+                disagree.
+            RecordVersionError: a chunk is of another version than the folder.
+        """
+        chunks = [self._load(name) for name in self._names(condition)]
+        self._check_together(chunks)
+        return chunks
+
+    def missing(self, condition: str, n_replicates: int) -> list[range]:
+        """The replicates of 0 to `n_replicates` - 1 that are not published, as ranges in order.
+
+        Raises:
+            RecordError: as `chunks`.
+            ValueError: the condition cannot name a file.
+        """
+        check_condition(condition)
+        gaps: list[range] = []
+        begin = 0
+        for chunk in self.chunks(condition):
+            gaps.append(range(begin, min(chunk.first, n_replicates)))
+            begin = chunk.last + 1
+        gaps.append(range(begin, n_replicates))
+        return [gap for gap in gaps if gap]
+
+    def publish(self, condition: str, first: int, frame: pl.DataFrame, condition_hash: str) -> Chunk:
+        """Add the rows of one or more whole replicates; once this returns, they survive a crash.
+
+        Args:
+            condition: one of `conditions`.
+            first: the first replicate in `frame`.
+            frame: columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
+            condition_hash: hash of the condition as resolved; the same for all chunks of a condition.
+
+        Raises:
+            RecordError: replicates are published already, the condition's hash is another, the disk is full,
+                the folder cannot be written, or another process writes to it. What was published stays.
+            RecordVersionError: another version computed what is in the folder.
+            TypeError: `frame` is not a polars frame.
+            ValueError: the condition is not in the description, or the rows are not fit to be published.
+        """
+        self._check_known(condition)
+        chunk, data = encode_chunk(self._trials, condition, first, frame, condition_hash)
+        with self._hold(), self._publishing:
+            self._refuse_other_version()
+            self._refuse_overlap(chunk)
+            with writing(self._trials):
+                self._trials.mkdir(exist_ok=True)
+            write_durably(chunk.path, data, replace=False)
+        return chunk
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Be the only writer for a while; may be nested, and used by several threads of the holder.
+
+        The operating system gives the lock back when the process dies. Temporary files that killed writers
+        left are removed on the way in.
+
+        Raises:
+            RecordError: another writer is in the folder, or it cannot be written.
+        """
+        with self._hold():
+            yield
+
+    # rows
+
+    def scan(self) -> pl.LazyFrame:
+        """All rows, lazily, in key order; warns when another version computed them.
+
+        Raises:
+            RecordError: as `chunks`.
+        """
+        self._warn_of_version()
+        paths = [chunk.path for chunk in self.chunks()]
+        if not paths:
+            return pl.LazyFrame(schema=SCHEMA)
+        return pl.scan_parquet(paths, glob=False, hive_partitioning=False)
+
+    def frames(
+        self, condition: str | None = None, columns: Sequence[str] | None = None
+    ) -> Iterator[pl.DataFrame]:
+        """The rows chunk by chunk, in key order, so that memory holds one chunk at a time.
+
+        Args:
+            condition: only this one; without it, all, in the description's order.
+            columns: only these.
+
+        Raises:
+            RecordError: as `chunks`.
+            ValueError: no such condition or column.
+        """
+        self._check_selection(condition, columns)
+        self._warn_of_version()
+        return self._frames(self._names(condition), columns)
+
+    def read(
+        self,
+        condition: str | None = None,
+        replicates: Iterable[int] | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> pl.DataFrame:
+        """Rows in key order: conditions as in the description, then replicate, generation and individual.
+
+        Args:
+            condition: only this one.
+            replicates: only these; those that are not there are left out.
+            columns: only these, in this order.
+
+        Raises:
+            RecordError: as `chunks`.
+            ValueError: no such condition or column.
+        """
+        self._check_selection(condition, columns)
+        self._warn_of_version()
+        names = self._names(condition)
+        if replicates is None:
+            parts = list(self._frames(names, columns))
+        else:
+            wanted = pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+            names = [name for name in names if wanted.is_between(name.first, name.last).any()]
+            needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
+            chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
+            parts = [frame.filter(chosen) for frame in self._frames(names, needed)]
+        frame = pl.concat(parts) if parts else pl.DataFrame(schema=SCHEMA)
+        return frame if columns is None else frame.select(columns)
+
+    def digest(self) -> str:
+        """Sha256 of all rows, as 64 hexadecimal digits.
+
+        It depends on the values, the conditions' names and hashes, and the results version: not on the order
+        of the conditions, on how replicates were split into chunks, nor on when, where and with how many
+        threads they were computed.
+
+        Raises:
+            RecordError: as `chunks`.
+        """
+        self._warn_of_version()
+        rows: dict[str, RowsDigest] = {}
+        chunks: list[Chunk] = []
+        for name in self._names():
+            digest = rows.setdefault(name.condition, RowsDigest())
+            chunks.append(digest_rows(self._trials / str(name), digest))
+        self._check_together(chunks)
+        hashes = {chunk.condition: chunk.condition_hash for chunk in chunks}
+        return study_digest(
+            self.results_version, {name: (hashes[name], rows[name].hexdigest()) for name in hashes}
+        )
+
+    # log
+
+    def append_log(self, event: Mapping[str, Any]) -> bool:
+        """Append an event to the log, with its `time` (UTC) and `host`; whether it was written.
+
+        A failure never stops a run, since no result depends on the log; it is told by a `RecordWarning`.
+        """
+        return append_line(self._path / LOG_NAME, event)
+
+    def read_log(self) -> list[dict[str, Any]]:
+        """The events in the log, oldest first; warns of lines that a crash has torn."""
+        return read_lines(self._path / LOG_NAME)
+
+    # starting anew
+
+    def clear(self, *, also: Iterable[str] = ()) -> None:
+        """Delete the results: chunks, log, the files named by the caller, and last `study.json`.
+
+        Everything else in the folder stays. A folder with a ledger of physical trials is never cleared.
+
+        Args:
+            also: names of further files in this folder that belong to the results, such as a report; those
+                that are not there are passed over.
+
+        Raises:
+            RecordError: there is a ledger, a foreign file in `trials/`, or another process writes to the
+                folder.
+            ValueError: a name in `also` is not that of a file in this folder.
+        """
+        with self._hold(reload=False):
+            self._delete_results(also)
+            with writing(self._path):
+                (self._path / DESCRIPTION_NAME).unlink(missing_ok=True)
+                sync_folder(self._path)
+            with contextlib.suppress(OSError):
+                self._trials.rmdir()
+
+    def restart(self, description: Mapping[str, Any], *, also: Iterable[str] = ()) -> None:
+        """Delete the results as `clear` does and begin another study in the same folder (`--fresh`).
+
+        Unlike `clear` and `create`, it leaves no moment at which the folder is nobody's, and other people's
+        files may stay in it.
+
+        Raises:
+            RecordError: as `clear`.
+            TypeError: a value of the description is not JSON's.
+            ValueError: as `clear` and `create`.
+        """
+        new = Description.of(description, RESULTS_VERSION)
+        with self._hold(reload=False):
+            self._delete_results(also)
+            self._description = new
+            self._begin()
+
+    # inside
+
+    @contextlib.contextmanager
+    def _hold(self, *, reload: bool = True) -> Iterator[None]:
+        self._lock.acquire(self._settle if reload else self._sweep)
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+    def _settle(self) -> None:
+        """On taking the lock: another process may have written since this object was made."""
+        self._description = Description.read(self._path / DESCRIPTION_NAME)
+        self._sweep()
+
+    def _sweep(self) -> None:
+        """Remove what killed writers left; the lock says that nobody is writing."""
+        with writing(self._path):
+            for folder in (self._path, self._trials):
+                for entry in folder.iterdir() if folder.is_dir() else ():
+                    if is_temporary(entry.name):
+                        entry.unlink(missing_ok=True)
+
+    def _begin(self) -> None:
+        with writing(self._trials):
+            self._trials.mkdir(exist_ok=True)
+        self._description.write(self._path / DESCRIPTION_NAME)
+
+    def _refuse_unless_empty(self) -> None:
+        if (self._path / DESCRIPTION_NAME).exists():
+            raise RecordError(
+                f"{self._path} holds the results of a study already. Go on with it, start anew (--fresh), "
+                "or name another folder."
+            )
+        with reading(self._path):
+            found = sorted(entry.name for entry in self._path.iterdir() if not is_trace(entry))
+        if found:
+            raise RecordError(
+                f"{self._path} is not empty and holds no results. Found {listed(found)}. Name another folder."
+            )
+
+    def _refuse_other_version(self) -> None:
+        if self.version_note is not None:
+            raise RecordVersionError(
+                f"{self.version_note} They are not extended, so that versions do not mix. "
+                "Start anew with --fresh, or name another folder."
+            )
+
+    def _refuse_overlap(self, chunk: Chunk) -> None:
+        others = [name for name in self._names() if name.condition == chunk.condition]
+        for other in others:
+            if other.first <= chunk.last and chunk.first <= other.last:
+                raise RecordError(
+                    f"Replicates {chunk.first} to {chunk.last} of {chunk.condition!r} overlap with "
+                    f"{self._trials / str(other)}; what is published is never overwritten."
+                )
+        if others and self._load(others[0]).condition_hash != chunk.condition_hash:
+            raise RecordError(
+                f"{self._path} holds trials of condition {chunk.condition!r} with other settings. "
+                "Start anew (--fresh), name another folder, or give the condition another name."
+            )
+
+    def _names(self, condition: str | None = None) -> list[ChunkName]:
+        """What is published, by name and in key order, after all that names can tell was checked."""
+        names = list_chunks(self._trials)
+        if not {name.condition for name in names} <= set(self.conditions):
+            # another process may have extended the study since it was read here
+            self._description = Description.read(self._path / DESCRIPTION_NAME)
+        order = {name: index for index, name in enumerate(self.conditions)}
+        for name in names:
+            if name.condition not in order:
+                raise RecordError(
+                    f"{self._trials / str(name)} belongs to condition {name.condition!r}, which "
+                    f"{DESCRIPTION_NAME} does not list. Move it elsewhere or delete it."
+                )
+        names.sort(key=lambda name: (order[name.condition], name.first, name.last))
+        for before, name in itertools.pairwise(names):
+            if before.condition == name.condition and name.first <= before.last:
+                raise RecordError(
+                    f"{self._trials / str(before)} and {name} overlap. "
+                    "Move one of them elsewhere or delete it."
+                )
+        return [name for name in names if condition in (None, name.condition)]
+
+    def _frames(self, names: Iterable[ChunkName], columns: Sequence[str] | None) -> Iterator[pl.DataFrame]:
+        before: list[Chunk] = []
+        for name in names:
+            chunk, frame = read_rows(self._trials / str(name), columns)
+            self._check_together([*before, chunk])
+            before = [chunk]
+            yield frame
+
+    def _load(self, name: ChunkName) -> Chunk:
+        path = self._trials / str(name)
+        with reading(path):
+            status = path.stat()
+        identity = (status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
+        known = self._checked.get(path.name)
+        chunk = known[1] if known is not None and known[0] == identity else load_chunk(path)
+        self._checked[path.name] = (identity, chunk)
+        return chunk
+
+    def _check_together(self, chunks: Sequence[Chunk]) -> None:
+        """All chunks must be of the folder's version, and those of a condition of the same settings."""
+        first_of: dict[str, Chunk] = {}
+        for chunk in chunks:
+            if chunk.results_version != self.results_version:
+                raise RecordVersionError(
+                    f"{chunk.path} was computed by results version {chunk.results_version}, "
+                    f"{DESCRIPTION_NAME} says {self.results_version}. "
+                    "Move it elsewhere or delete it, or start anew (--fresh)."
+                )
+            first = first_of.setdefault(chunk.condition, chunk)
+            if chunk.condition_hash != first.condition_hash:
+                raise RecordError(
+                    f"{chunk.path} and {first.path.name} come from two different settings of condition "
+                    f"{chunk.condition!r}. Move one of them elsewhere, or start anew (--fresh)."
+                )
+
+    def _check_known(self, condition: str) -> None:
+        if condition not in self.conditions:
+            raise ValueError(f"Unknown condition {condition!r}. {did_you_mean(condition, self.conditions)}")
+
+    def _check_selection(self, condition: str | None, columns: Sequence[str] | None) -> None:
+        if condition is not None:
+            self._check_known(condition)
+        for column in columns or ():
+            if column not in SCHEMA:
+                raise ValueError(f"Unknown column {column!r}. {did_you_mean(column, SCHEMA)}")
+
+    def _warn_of_version(self) -> None:
+        if self.version_note is not None:
+            warnings.warn(self.version_note, RecordWarning, stacklevel=3)
+
+    def _delete_results(self, also: Iterable[str]) -> None:
+        if (self._path / LEDGER_NAME).exists():
+            raise RecordError(
+                f"{self._path} holds a ledger of physical trials ({LEDGER_NAME}), which is never deleted. "
+                "Name another folder."
+            )
+        extra = [self._path / name for name in also]
+        for path in extra:
+            reserved = path.name in (DESCRIPTION_NAME, LOCK_NAME)
+            if path.parent != self._path or reserved or path.is_dir():
+                raise ValueError(f"{path} in `also` is not a further file in {self._path}.")
+        chunks = list_chunks(self._trials)
+        with writing(self._path):
+            for path in [*(self._trials / str(name) for name in chunks), *extra, self._path / LOG_NAME]:
+                path.unlink(missing_ok=True)
+            sync_folder(self._path)
+        self._checked.clear()

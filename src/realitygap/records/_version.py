@@ -1,0 +1,10 @@
+"""The version of what computes the numbers in a record."""
+
+from __future__ import annotations
+
+RESULTS_VERSION = 1
+"""Raised whenever the same study would give other numbers; results of another version are never extended."""
+
+
+class RecordWarning(UserWarning):
+    """Something about a folder of results that a reader should know and that stops nobody."""

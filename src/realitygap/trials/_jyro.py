@@ -1,0 +1,217 @@
+"""Trials on the platform `jyro`: many networks tried in one call, or one trial kept step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.evolution import Genome
+from realitygap.kernels._math import sin_cos
+from realitygap.kernels._network import decode, make_networks
+from realitygap.kernels._trial import Scene, TrialRules, make_trace, make_workspace, run_trials
+from realitygap.robots import STEP_S, JyroPlatform
+from realitygap.world import Arena
+
+
+def jyro_scene(platform: JyroPlatform, arena: Arena) -> Scene:
+    """Arena, body and sensors in the form that kernels read.
+
+    Raises:
+        ValueError: More than 256 cells: a cell is kept as one byte.
+    """
+    if arena.grid.n_cells > 256:
+        raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
+    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
+    along = walls[:, 2:] - walls[:, :2]
+    length = np.sqrt((along * along).sum(axis=1))
+    normals = np.stack([-along[:, 1] / length, along[:, 0] / length], axis=1)
+    offsets = (normals * walls[:, :2]).sum(axis=1)
+    mounts = platform.sensors.mounts
+    sensors = np.empty((len(mounts), 4))
+    radius = 0.0
+    for k, (forward, left, direction) in enumerate(mounts):
+        sine, cosine = sin_cos(direction)
+        sensors[k] = forward, left, cosine, sine
+        radius = max(radius, math.hypot(forward, left) + platform.sensors.max_range)
+    grid = arena.grid
+    return Scene(
+        walls=walls,
+        normals=np.column_stack([normals, offsets]),
+        body=np.array(platform.body.corners, np.float64),
+        body_radius=platform.body_radius,
+        sensors=sensors,
+        sensor_radius=radius,
+        sensor_range=float(platform.sensor_range),
+        start=np.array(arena.start, np.float64),
+        grid=np.array([grid.x, grid.y, grid.cell], np.float64),
+        columns=grid.columns,
+        rows=grid.rows,
+    )
+
+
+def jyro_rules(platform: JyroPlatform, *, noise: float, bias_input: bool, bias_value: float) -> TrialRules:
+    """How a trial on `jyro` is run, in the form that kernels read."""
+    return TrialRules(
+        n_steps=platform.steps,
+        step_s=STEP_S,
+        speed=platform.speed,
+        turn_rate=platform.turn_rate,
+        noise=float(noise),
+        clip=platform.noisy_reading == "clip",
+        bias_input=bias_input,
+        bias_value=float(bias_value),
+    )
+
+
+@dataclass(frozen=True)
+class TrialOutcome:
+    """What came of one trial.
+
+    Attributes:
+        cells: Cells along the line in order of first visit, columns * row + column.
+        n_end_cells: Cells in which steps ended; the start counts.
+        coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
+        n_stalls: Blocked steps.
+    """
+
+    cells: tuple[int, ...]
+    n_end_cells: int
+    coverage_line: float
+    coverage_ends: float
+    n_stalls: int
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A trial step by step; row 0 is the start.
+
+    Attributes:
+        step_s: How long a step lasts [s].
+        poses: (t + 1, 3) x [m], y [m], heading [rad, counter-clockwise from +x].
+        readings: (t + 1, s) distance each sensor measures [m], without noise.
+        inputs: (t, i) what the network saw: largest noisy reading, stall, time and, where it has one, the
+            constant.
+        commands: (t, 2) what it answered: move and turn.
+        stalled: (t + 1,) whether the step was blocked.
+        outcome: What came of it.
+    """
+
+    step_s: float
+    poses: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    stalled: NDArray[np.bool_]
+    outcome: TrialOutcome
+
+
+@dataclass(frozen=True)
+class NoiseKey:
+    """Which random numbers a trial draws: those of one individual of one run."""
+
+    key: int
+    replicate: int = 0
+    generation: int = 0
+    individual: int = 0
+    repeat: int = 0
+
+
+def _run(
+    platform: JyroPlatform,
+    arena: Arena,
+    genomes: Sequence[Genome],
+    noise: float,
+    noise_key: NoiseKey,
+    kept_steps: int,
+) -> tuple[list[TrialOutcome], Trajectory]:
+    rules = genomes[0].rules
+    scene = jyro_scene(platform, arena)
+    bias_input = rules.bias_input >= 0
+    trial = jyro_rules(platform, noise=noise, bias_input=bias_input, bias_value=genomes[0].bias_value)
+    room = max(len(genome.connections) for genome in genomes)
+    hidden_room = max(genome.n_hidden for genome in genomes)
+    networks = make_networks(len(genomes), rules, room, hidden_room)
+    for k, genome in enumerate(genomes):
+        decode(genome._genomes, genome._row, rules, networks, k)
+    work = make_workspace(scene, rules.n_inputs + rules.n_outputs + hidden_room)
+    trace = make_trace(scene, rules.n_inputs, kept_steps)
+    order = np.zeros((len(genomes), arena.grid.n_cells), np.uint8)
+    counts = np.zeros((len(genomes), 3), np.int32)
+    run_trials(
+        scene,
+        trial,
+        networks,
+        rules,
+        np.uint64(noise_key.key),
+        noise_key.replicate,
+        noise_key.generation,
+        noise_key.individual,
+        noise_key.repeat,
+        work,
+        order,
+        counts,
+        trace,
+    )
+    n_cells = arena.grid.n_cells
+    outcomes = [
+        TrialOutcome(
+            tuple(int(cell) for cell in order[k, : counts[k, 0]]),
+            int(counts[k, 1]),
+            counts[k, 0] / n_cells,
+            counts[k, 1] / n_cells,
+            int(counts[k, 2]),
+        )
+        for k in range(len(genomes))
+    ]
+    trajectory = Trajectory(
+        STEP_S, trace.poses, trace.readings, trace.inputs, trace.commands, trace.stalled, outcomes[-1]
+    )
+    return outcomes, trajectory
+
+
+def try_genomes(
+    platform: JyroPlatform,
+    arena: Arena,
+    genomes: Sequence[Genome],
+    *,
+    noise: float,
+    noise_key: NoiseKey,
+) -> list[TrialOutcome]:
+    """Try each of n genomes of one population once.
+
+    Args:
+        platform: The robot as simulated.
+        arena: Where.
+        genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs.
+        noise: Level a: each reading is moved by a * U(-1, 1).
+        noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
+
+    Raises:
+        ValueError: No genome, or one with other inputs or outputs.
+    """
+    _check_sizes(genomes)
+    return _run(platform, arena, genomes, noise, noise_key, -1)[0]
+
+
+def trace_genome(
+    platform: JyroPlatform, arena: Arena, genome: Genome, *, noise: float, noise_key: NoiseKey
+) -> Trajectory:
+    """Try one genome once and keep every step; arguments as in `try_genomes`."""
+    _check_sizes([genome])
+    return _run(platform, arena, [genome], noise, noise_key, platform.steps)[1]
+
+
+def _check_sizes(genomes: Sequence[Genome]) -> None:
+    if not genomes:
+        raise ValueError("No genome to try, expected at least one.")
+    for genome in genomes:
+        given = genome.rules.n_inputs - (genome.rules.bias_input >= 0)
+        if given != 3 or genome.rules.n_outputs != 2:
+            raise ValueError(
+                f"A genome has {given} inputs and {genome.rules.n_outputs} outputs, expected 3 inputs (largest "
+                "reading, stall, time; a constant one is extra) and 2 outputs (move, turn)."
+            )

@@ -1,0 +1,192 @@
+"""Run a case of the platform `jyro`: the scene it describes, step by step."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CaseError
+from ..kernels import _scene as kernel
+from ..world._case import Case, CaseDevice, CaseRobot
+
+_LIGHTS = {
+    "linear": kernel.SENSOR_LIGHT_LINEAR,
+    "ambient": kernel.SENSOR_LIGHT_AMBIENT,
+    "direct": kernel.SENSOR_LIGHT_DIRECT,
+}
+_INPUTS = {
+    "max_inverted": kernel.INPUT_MAX_INVERTED,
+    "all_inverted": kernel.INPUT_ALL_INVERTED,
+    "stall": kernel.INPUT_STALL,
+    "time": kernel.INPUT_TIME,
+}
+_COLUMNS = ["step", "robot", "time", "x", "y", "heading", "stall", "cmd_v", "cmd_w", "energy"]
+
+
+@dataclass(frozen=True)
+class SceneTrack:
+    """What happened in a scene; row 0 is the start. Letters: t steps, r robots, s sensors of one robot.
+
+    Attributes:
+        times: (t + 1,) [s].
+        poses: (t + 1, r, 3) x, y [m], heading [rad, 0 faces +y, counter-clockwise]; in [0, 2 pi) once the
+            robot has moved, and as given until then.
+        stalls: (t + 1, r) 1 where the step was blocked.
+        commands: (t + 1, r, 2) speed [m/s], turn rate [rad/s] used in the step; 0 in row 0.
+        energies: (t + 1, r) Jyro's counter: 10000, less one for each step with a command other than 0.
+        readings: For each robot (t + 1, s), all devices in order: distance [m], bumper 0 or 1, light.
+    """
+
+    times: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    stalls: NDArray[np.int64]
+    commands: NDArray[np.float64]
+    energies: NDArray[np.float64]
+    readings: list[NDArray[np.float64]]
+
+    def write_csv(self, path: Path) -> None:
+        """Write one row per step and robot, numbers in full; an existing file changes only when all is written.
+
+        Columns: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy, s0, s1, ... A robot with fewer
+        sensors than another leaves its last columns empty.
+
+        Raises:
+            CaseError: The file cannot be written.
+        """
+        _write_whole(path, (line + "\n" for line in self._lines()))
+
+    def _lines(self) -> Iterator[str]:
+        n_sensors = [readings.shape[1] for readings in self.readings]
+        most = max(n_sensors)
+        yield ",".join(_COLUMNS + [f"s{i}" for i in range(most)])
+        times, poses, stalls = self.times.tolist(), self.poses.tolist(), self.stalls.tolist()
+        commands, energies = self.commands.tolist(), self.energies.tolist()
+        readings = [robot.tolist() for robot in self.readings]
+        for step, time in enumerate(times):
+            for robot, n in enumerate(n_sensors):
+                values = [time, *poses[step][robot], stalls[step][robot], *commands[step][robot]]
+                values += [energies[step][robot], *readings[robot][step]]
+                yield ",".join([str(step), str(robot), *map(repr, values)] + [""] * (most - n))
+
+
+def simulate_case(case: Case) -> SceneTrack:
+    """What the robots of a case do, as in Jyro 0.3.2.
+
+    Args:
+        case: A case, from `Case.read` or `Case.from_dict`.
+
+    Returns:
+        The track of all robots over all steps.
+
+    Source: Jyro 0.3.2. Differs: sensors are read at the start when all robots are in place, and not
+    while they are being added.
+    """
+    scene = _as_arrays(case)
+    times, poses, stalls, commands, energies, readings = kernel.run_scene(scene, case.dt, case.steps)
+    parts = [
+        readings[:, first:last]
+        for first, last in zip(scene.sensor_rows[:-1], scene.sensor_rows[1:], strict=True)
+    ]
+    return SceneTrack(times, poses, stalls, commands, energies, parts)
+
+
+def simulate_file(case: Path, out: Path) -> tuple[Case, SceneTrack]:
+    """Run the case in the JSON file `case` and write its track to `out`, a CSV file.
+
+    Raises:
+        CaseError: The case cannot be carried out as written, or `out` cannot be written.
+    """
+    if case.exists() and out.exists() and case.samefile(out):
+        raise CaseError(f"{out}: would overwrite the case itself. Name another file for the result.")
+    described = Case.read(case)
+    track = simulate_case(described)
+    track.write_csv(out)
+    return described, track
+
+
+def _as_arrays(case: Case) -> kernel.Scene:
+    """The case as the kernel takes it."""
+    robots = case.robots
+    devices = [_all_sensors(robot.devices) for robot in robots]
+    sensors = [sensor for robot in devices for sensor in robot]
+    networks = [robot.controller for robot in robots]
+    layers = [layer for network in networks if network for layer in network.layers]
+    names = [robot.name for robot in robots]
+    bodies = [robot.bounding_box for robot in robots]
+    commands = np.zeros((case.steps, len(robots), 2))
+    scales = np.ones((len(robots), 3))
+    for i, robot in enumerate(robots):
+        if robot.controller:
+            scales[i] = [*robot.controller.output_scale, robot.controller.sensor_max_range]
+        elif case.steps:
+            commands[:, i] = robot.commands[: case.steps]
+    return kernel.Scene(
+        walls=_table(case.world.lines(), 4),
+        lights=_table(case.world.lights, 3),
+        starts=_table([[robot.start.x, robot.start.y, robot.start.heading] for robot in robots], 3),
+        names=np.array([names.index(name) for name in names], np.int64),
+        corners=_table([corner for body in bodies for corner in zip(body.x, body.y, strict=True)], 2),
+        corner_rows=_row_starts(len(body.x) for body in bodies),
+        mounts=_table([mount for mount, _, _ in sensors], 3),
+        sensors=np.array([kind for _, kind, _ in sensors], np.int64),
+        reaches=np.array([reach for _, _, reach in sensors], np.float64),
+        sensor_rows=_row_starts(len(robot) for robot in devices),
+        commands=commands,
+        layers=np.array(
+            [(len(layer.weights), len(layer.weights[0])) for layer in layers], np.int64
+        ).reshape(-1, 2),
+        layer_rows=_row_starts(len(network.layers) if network else 0 for network in networks),
+        weights=np.array([w for layer in layers for w in [*sum(layer.weights, []), *layer.bias]], np.float64),
+        inputs=np.array([_INPUTS[name] for network in networks if network for name in network.inputs], np.int64),
+        input_rows=_row_starts(len(network.inputs) if network else 0 for network in networks),
+        scales=scales,
+    )
+
+
+def _all_sensors(devices: list[CaseDevice]) -> list[tuple[list[float], int, float]]:
+    """Mount, kind for the kernel and maximum range [m] of each sensor of a robot, in order."""
+    return [(mount, _sensor_kind(device), device.max_range) for device in devices for mount in device.geometry]
+
+
+def _sensor_kind(device: CaseDevice) -> int:
+    if device.reads_light:
+        return _LIGHTS[device.mode]
+    return kernel.SENSOR_BUMPER if device.type == "bumper" else kernel.SENSOR_RANGE
+
+
+def _table(rows: Iterable[Iterable[float]], n_columns: int) -> NDArray[np.float64]:
+    return np.array([tuple(row) for row in rows], np.float64).reshape(-1, n_columns)
+
+
+def _row_starts(counts: Iterable[int]) -> NDArray[np.int64]:
+    """(r + 1,) where the rows of each robot begin, from how many rows each has."""
+    return np.cumsum([0, *counts]).astype(np.int64)
+
+
+def _write_whole(path: Path, lines: Iterable[str]) -> None:
+    """Write a file beside its place and rename it, so that the place holds the old file or the new one."""
+    is_special = path.exists() and not path.is_file()  # a terminal, a pipe: nothing to be renamed
+    place = path.resolve()
+    beside = path if is_special else place.with_name(f".{place.name}.{os.getpid()}.tmp")
+    try:
+        with beside.open("w", encoding="utf-8", newline="") as file:
+            file.writelines(lines)
+            if not is_special:
+                file.flush()
+                os.fsync(file.fileno())
+        if not is_special:
+            beside.replace(place)
+    except OSError as error:
+        raise CaseError(
+            f"{path}: cannot be written ({error.strerror}). Name a file in a folder that exists and can be written."
+        ) from None
+    finally:
+        if not is_special:
+            with contextlib.suppress(OSError):
+                beside.unlink(missing_ok=True)

@@ -1,0 +1,117 @@
+"""The arena: what does not move."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+INCH = 0.0254  # [m]
+
+
+class Pose(NamedTuple):
+    """Where a robot is: x [m], y [m], heading [rad, counter-clockwise from +x]."""
+
+    x: float
+    y: float
+    heading: float
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The reachable cells, whose visited share is coverage.
+
+    Cell (column, row) is numbered `columns * row + column`, (0, 0) at the lower left. A cell holds its left
+    and lower border, not its right and upper one.
+
+    Attributes:
+        x, y: Lower left corner [m].
+        cell: Size of a cell [m].
+        columns, rows: How many; at most 256 cells.
+    """
+
+    x: float
+    y: float
+    cell: float
+    columns: int
+    rows: int
+
+    @property
+    def n_cells(self) -> int:
+        """How many cells there are."""
+        return self.columns * self.rows
+
+
+@dataclass(frozen=True)
+class Arena:
+    """Straight walls, a grid of reachable cells and a start.
+
+    Attributes:
+        name: What to call it.
+        walls: (w, 4) x1, y1, x2, y2 of each wall [m].
+        grid: The reachable cells.
+        start: Where every trial begins.
+    """
+
+    name: str
+    walls: tuple[tuple[float, float, float, float], ...]
+    grid: Grid
+    start: Pose
+
+    def to_dict(self) -> dict[str, Any]:
+        """The arena as plain values."""
+        return asdict(self) | {"start": tuple(self.start)}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Arena:
+        """The arena that `to_dict` described."""
+        return cls(
+            values["name"],
+            tuple(tuple(wall) for wall in values["walls"]),
+            Grid(**values["grid"]),
+            Pose(*values["start"]),
+        )
+
+
+def paper_arena(start: Pose | None = None) -> Arena:
+    """The paper's arena: 42 x 24 in inside wooden blocks, cells of 3 in, the inner 12 x 6 reachable.
+
+    Args:
+        start: Where trials begin; the paper does not say. Default: (0.1905, 0.1905) m, the center of cell
+            (1, 1), facing +x.
+
+    Source: Rosenzweig & Remy, section 2.1 and Figure 2. Differs: exact inches, where the paper prints
+    .609 x 1.07 m.
+    """
+    width, depth = 42 * INCH, 24 * INCH
+    corners = [(0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth)]
+    walls = tuple((*corners[k], *corners[(k + 1) % 4]) for k in range(4))
+    grid = Grid(x=3 * INCH, y=3 * INCH, cell=3 * INCH, columns=12, rows=6)
+    return Arena("paper", walls, grid, start or Pose(7.5 * INCH, 7.5 * INCH, 0.0))
+
+
+NAMED_STARTS = {
+    "corner": Pose(7.5 * INCH, 7.5 * INCH, 0.0),  # the center of cell (1, 1)
+    "center": Pose(21 * INCH, 12 * INCH, 0.0),  # on a junction of cells: belongs to the upper right one
+    "left": Pose(7.5 * INCH, 12 * INCH, 0.0),  # on a border of cells: belongs to the upper one
+}
+
+
+def is_inside(arena: Arena, x: float, y: float) -> bool:
+    """Whether a point lies inside the arena's walls (an odd number of walls to its right)."""
+    crossings = 0
+    for x1, y1, x2, y2 in arena.walls:
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            crossings += 1
+    return crossings % 2 == 1
+
+
+def distance_to_walls(arena: Arena, x: float, y: float) -> float:
+    """Distance from a point to the nearest wall [m]."""
+    nearest = math.inf
+    for x1, y1, x2, y2 in arena.walls:
+        dx, dy = x2 - x1, y2 - y1
+        along = ((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy)
+        along = min(max(along, 0.0), 1.0)
+        nearest = min(nearest, math.hypot(x - x1 - along * dx, y - y1 - along * dy))
+    return nearest

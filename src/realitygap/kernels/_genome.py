@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import kernel
-from ._philox import PURPOSE_GENOME, make_stream, uniform
+from ._philox import FIRST, PURPOSE_GENOME, make_stream, uniform
 
 
 class Genomes(NamedTuple):
@@ -121,7 +121,7 @@ def first_genomes(genomes, rules, key, replicate, generation):
     cursor = np.zeros(1, np.int64)
     n = genomes.n_connections.size
     for row in range(n):
-        stream = make_stream(key, replicate, generation, row, 0, PURPOSE_GENOME)
+        stream = make_stream(key, replicate, generation, row, FIRST, PURPOSE_GENOME)
         cursor[0] = 0
         gene = 0
         for output in range(rules.n_outputs):
@@ -198,6 +198,9 @@ def closes_cycle(genomes, row, source, target, reached):
                 reached[n_reached] = onward
                 n_reached += 1
     return False
+
+
+ENABLED = np.bool_(True)
 
 
 @kernel

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ._compile import kernel
 from ._genome import (
+    ENABLED,
     closes_cycle,
     has_link,
     insert_gene,
@@ -129,8 +130,8 @@ def add_node(genomes, row, rules, innovations, stream, cursor):
     weight = genomes.weight[row, split]
     genomes.enabled[row, split] = False
     insert_hidden(genomes, row, node, 0.0)
-    insert_gene(genomes, row, number, source, node, 1.0, True)
-    insert_gene(genomes, row, number + 1, node, target, weight, True)
+    insert_gene(genomes, row, number, source, node, 1.0, ENABLED)
+    insert_gene(genomes, row, np.int32(number + 1), node, target, weight, ENABLED)
     return True
 
 
@@ -163,7 +164,7 @@ def add_link(genomes, row, rules, innovations, stream, cursor, reached):
             continue
         number = number_of_link(innovations, source, target)
         weight = next_signed(stream, cursor, rules.initial_weight)
-        insert_gene(genomes, row, number, source, target, weight, True)
+        insert_gene(genomes, row, number, source, target, weight, ENABLED)
         return True
     return False
 

@@ -151,16 +151,23 @@ def nearest_novelty(distance, k, novelty):
         k: Neighbors to average over; all of them while there are fewer.
         novelty: (n,) written; 0 where there is nothing to compare with.
     """
+    nearest = np.empty(min(k, distance.shape[1]))
     for row in range(novelty.size):
-        ranked = np.sort(distance[row])
-        first = 0
-        while first < ranked.size and ranked[first] < 0.0:
-            first += 1
-        last = min(first + k, ranked.size)
+        n = 0
+        for other in range(distance.shape[1]):
+            value = distance[row, other]
+            if value < 0.0 or (n == nearest.size and value >= nearest[n - 1]):
+                continue
+            place = n if n < nearest.size else n - 1
+            while place > 0 and nearest[place - 1] > value:
+                nearest[place] = nearest[place - 1]
+                place -= 1
+            nearest[place] = value
+            n = min(n + 1, nearest.size)
         total = 0.0
-        for i in range(first, last):
-            total += ranked[i]
-        novelty[row] = total / (last - first) if last > first else 0.0
+        for i in range(n):
+            total += nearest[i]
+        novelty[row] = total / n if n > 0 else 0.0
 
 
 @kernel

@@ -17,10 +17,12 @@ import numpy as np
 
 from ._compile import kernel
 
-PURPOSE_NOISE = 1  # sensor noise of a trial
-PURPOSE_GENOME = 2  # the first genomes
-PURPOSE_CHILD = 3  # making one child: parents, crossover, mutation
-PURPOSE_SPECIES = 4  # representatives of species
+PURPOSE_NOISE = np.int64(1)  # sensor noise of a trial
+PURPOSE_GENOME = np.int64(2)  # the first genomes
+PURPOSE_CHILD = np.int64(3)  # making one child: parents, crossover, mutation
+PURPOSE_SPECIES = np.int64(4)  # representatives of species
+
+FIRST = np.int64(0)  # the first repeat, generation or row: a literal 0 would have every kernel compiled twice
 
 MAX_INDIVIDUALS = 1 << 24
 MAX_GENERATIONS = 1 << 20

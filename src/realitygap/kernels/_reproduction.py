@@ -10,7 +10,7 @@ from ._compile import kernel
 from ._crossover import crossover
 from ._genome import copy_genome, next_below, next_uniform
 from ._mutation import mutate, start_generation
-from ._philox import PURPOSE_CHILD, make_stream
+from ._philox import FIRST, PURPOSE_CHILD, make_stream
 from ._species import BEST_EVER, N_SPECIES
 
 
@@ -185,7 +185,7 @@ def reproduce(old, fitness, species_of, species, rules, innovations, key, replic
     members = np.empty(n, np.int64)
     reached = np.empty(new.hidden.shape[1] + rules.n_outputs + 2, np.int32)
     cursor = np.zeros(1, np.int64)
-    child = 0
+    child = FIRST
     for k in range(n_species):
         if offspring[k] == 0:
             continue
@@ -199,7 +199,7 @@ def reproduce(old, fitness, species_of, species, rules, innovations, key, replic
                 parents[child, 1] = -1
                 child += 1
                 continue
-            stream = make_stream(key, replicate, generation + 1, child, 0, PURPOSE_CHILD)
+            stream = make_stream(key, replicate, generation + 1, child, FIRST, PURPOSE_CHILD)
             cursor[0] = 0
             first = members[next_below(stream, cursor, n_parents)]
             second = -1

@@ -14,7 +14,7 @@ from ._genome import first_genomes, make_genomes
 from ._mutation import make_innovations
 from ._network import decode, make_networks
 from ._novelty import nearest_archive_step, paper_archive_step, sort_cells
-from ._philox import PURPOSE_NOISE, make_stream
+from ._philox import FIRST, PURPOSE_NOISE, make_stream
 from ._species import make_species, speciate
 from ._trial import make_trace, make_workspace, run_trial
 
@@ -63,19 +63,22 @@ class RunRows(NamedTuple):
 @kernel
 def _keep_genomes(genomes, rows, run, generation):
     """Copy a generation's genomes into the rows."""
-    rows.n_connections[run, generation] = genomes.n_connections
-    rows.n_hidden[run, generation] = genomes.n_hidden
+    outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
     for row in range(genomes.n_connections.size):
         n = genomes.n_connections[row]
         h = genomes.n_hidden[row]
-        outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
-        rows.innovation[run, generation, row, :n] = genomes.innovation[row, :n]
-        rows.source[run, generation, row, :n] = genomes.source[row, :n]
-        rows.target[run, generation, row, :n] = genomes.target[row, :n]
-        rows.weight[run, generation, row, :n] = genomes.weight[row, :n]
-        rows.enabled[run, generation, row, :n] = genomes.enabled[row, :n]
-        rows.hidden[run, generation, row, :h] = genomes.hidden[row, :h]
-        rows.bias[run, generation, row, : outputs + h] = genomes.bias[row, : outputs + h]
+        rows.n_connections[run, generation, row] = n
+        rows.n_hidden[run, generation, row] = h
+        for gene in range(n):
+            rows.innovation[run, generation, row, gene] = genomes.innovation[row, gene]
+            rows.source[run, generation, row, gene] = genomes.source[row, gene]
+            rows.target[run, generation, row, gene] = genomes.target[row, gene]
+            rows.weight[run, generation, row, gene] = genomes.weight[row, gene]
+            rows.enabled[run, generation, row, gene] = genomes.enabled[row, gene]
+        for node in range(h):
+            rows.hidden[run, generation, row, node] = genomes.hidden[row, node]
+        for node in range(outputs + h):
+            rows.bias[run, generation, row, node] = genomes.bias[row, node]
 
 
 @kernel
@@ -124,13 +127,13 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
         archive_threshold[0] = rules.archive_threshold
         species_of[:] = 0
         parents[:] = -1
-        first_genomes(genomes, neat, key, replicate, 0)
+        first_genomes(genomes, neat, key, replicate, FIRST)
         if rules.selection != RANDOM:
-            speciate(genomes, genomes, fitness, species_of, species, neat, key, replicate, 0)
+            speciate(genomes, genomes, fitness, species_of, species, neat, key, replicate, FIRST)
         for generation in range(rules.n_generations):
             for row in range(n):
                 decode(genomes, row, neat, networks, row)
-                stream = make_stream(key, replicate, generation, row, 0, PURPOSE_NOISE)
+                stream = make_stream(key, replicate, generation, row, FIRST, PURPOSE_NOISE)
                 n_line, n_ends, n_stalls = run_trial(
                     scene, trial, networks, row, neat, stream, work, rows.cells[run, generation, row], trace
                 )
@@ -147,7 +150,6 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
                 paper_archive_step(
                     points, n_points, rules.padding, archive, n_archive, archive_state, rules.above_all, novelty
                 )
-                fitness[:] = novelty
             elif rules.selection == NEAREST_NOVELTY:
                 nearest_archive_step(
                     points,
@@ -162,11 +164,14 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
                     archive_threshold,
                     novelty,
                 )
-                fitness[:] = novelty
-            rows.fitness[run, generation] = fitness
-            rows.novelty[run, generation] = novelty
-            rows.species[run, generation] = species_of
-            rows.parents[run, generation] = parents
+            for row in range(n):
+                if is_novelty:
+                    fitness[row] = novelty[row]
+                rows.fitness[run, generation, row] = fitness[row]
+                rows.novelty[run, generation, row] = novelty[row]
+                rows.species[run, generation, row] = species_of[row]
+                rows.parents[run, generation, row, 0] = parents[row, 0]
+                rows.parents[run, generation, row, 1] = parents[row, 1]
             _keep_genomes(genomes, rows, run, generation)
             if generation + 1 == rules.n_generations:
                 break

@@ -91,12 +91,12 @@ class Scene(NamedTuple):
     scales: FLOATS
 
 
-# --- lines ----------------------------------------------------------------------------------------------------
+# --- lines -------------------------------------------------------------------------------------------------
 
 
 @kernel
-def round7(value):  # noqa: ANN001, ANN201
-    """`value` to seven decimals, exactly as Python's `round(value, 7)`: halves of the true value go to even."""
+def round7(value):
+    """`value` to seven decimals, as Python's `round(value, 7)`: true halves go to even."""
     if not abs(value) < _NO_DECIMALS_ABOVE:
         return value
     scaled = value * _DECIMALS
@@ -114,7 +114,7 @@ def round7(value):  # noqa: ANN001, ANN201
 
 
 @kernel
-def set_line(line, ax, ay, bx, by):  # noqa: ANN001, ANN201
+def set_line(line, ax, ay, bx, by):
     """Make `line` (6,) the line from A to B [m]."""
     line[0] = round7(ax)
     line[1] = round7(ay)
@@ -129,15 +129,15 @@ def set_line(line, ax, ay, bx, by):  # noqa: ANN001, ANN201
 
 
 @kernel
-def spans(line, x, y):  # noqa: ANN001, ANN201
+def spans(line, x, y):
     """Whether a point, rounded already, lies in the rectangle around a line's ends; the border counts."""
     inside_x = line[0] <= x <= line[2] or line[2] <= x <= line[0]
     return inside_x and (line[1] <= y <= line[3] or line[3] <= y <= line[1])
 
 
 @kernel
-def crossing(one, other):  # noqa: ANN001, ANN201
-    """Whether two lines cross, and where: (crossed, x, y). Parallel ones never do, not even on top of each other."""
+def crossing(one, other):
+    """Whether two lines cross, and where: (crossed, x, y). Parallel ones never do."""
     if one[4] == other[4]:
         return False, 0.0, 0.0
     if one[4] == math.inf:
@@ -155,7 +155,7 @@ def crossing(one, other):  # noqa: ANN001, ANN201
 
 
 @kernel
-def length7(ax, ay, bx, by):  # noqa: ANN001, ANN201
+def length7(ax, ay, bx, by):
     """Distance between two points rounded to seven decimals [m]."""
     dx = round7(ax) - round7(bx)
     dy = round7(ay) - round7(by)
@@ -163,7 +163,7 @@ def length7(ax, ay, bx, by):  # noqa: ANN001, ANN201
 
 
 @kernel
-def nearest_hit(lines, ray, px, py, reach):  # noqa: ANN001, ANN201
+def nearest_hit(lines, ray, px, py, reach):
     """Distance from P to the nearest of `lines` (n, 6) that `ray` (6,) crosses within `reach` [m], or inf."""
     nearest = math.inf
     for i in range(len(lines)):
@@ -176,7 +176,7 @@ def nearest_hit(lines, ray, px, py, reach):  # noqa: ANN001, ANN201
 
 
 @kernel
-def any_crossing(some, others):  # noqa: ANN001, ANN201
+def any_crossing(some, others):
     """Whether a line of `some` (n, 6) crosses a line of `others` (m, 6)."""
     for i in range(len(some)):
         for j in range(len(others)):
@@ -185,11 +185,11 @@ def any_crossing(some, others):  # noqa: ANN001, ANN201
     return False
 
 
-# --- bodies ---------------------------------------------------------------------------------------------------
+# --- bodies ------------------------------------------------------------------------------------------------
 
 
 @kernel
-def place_body(corners, x, y, heading, edges):  # noqa: ANN001, ANN201
+def place_body(corners, x, y, heading, edges):
     """Fill `edges` (c, 6) with the closed polygon of `corners` (c, 2) at a pose."""
     turned = heading + _HALF_PI
     cos = math.cos(turned)
@@ -207,19 +207,19 @@ def place_body(corners, x, y, heading, edges):  # noqa: ANN001, ANN201
 
 
 @kernel
-def blocked(scene, walls, bodies, robot, edges):  # noqa: ANN001, ANN201
+def blocked(scene, walls, bodies, robot, edges):
     """Whether a robot's body, as `edges` (c, 6), crosses a wall or the body of a robot of another name."""
     if any_crossing(edges, walls):
         return True
     for other in range(len(scene.names)):
-        if scene.names[other] != scene.names[robot]:
-            if any_crossing(edges, bodies[scene.corner_rows[other] : scene.corner_rows[other + 1]]):
-                return True
+        body = bodies[scene.corner_rows[other] : scene.corner_rows[other + 1]]
+        if scene.names[other] != scene.names[robot] and any_crossing(edges, body):
+            return True
     return False
 
 
 @kernel
-def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):  # noqa: ANN001, ANN201
+def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):
     """Move one robot by one step, or leave it entirely where it is: (stall, energy spent).
 
     `pose` (3,) and the robot's rows of `bodies` change in place. The translation uses the old heading.
@@ -242,11 +242,11 @@ def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):  # noqa: ANN0
     return 0, cost
 
 
-# --- sensors --------------------------------------------------------------------------------------------------
+# --- sensors -----------------------------------------------------------------------------------------------
 
 
 @kernel
-def cast_ray(scene, walls, bodies, robot, px, py, angle, reach):  # noqa: ANN001, ANN201
+def cast_ray(scene, walls, bodies, robot, px, py, angle, reach):
     """Distance from P to the nearest wall or robot of another name [m]; inf when nothing is within `reach`.
 
     `angle` is clockwise from +y [rad]. A negative reach points backward and meets nothing.
@@ -262,7 +262,7 @@ def cast_ray(scene, walls, bodies, robot, px, py, angle, reach):  # noqa: ANN001
 
 
 @kernel
-def light_falloff(sensor, distance, reach):  # noqa: ANN001, ANN201
+def light_falloff(sensor, distance, reach):
     """How much of a light's brightness arrives over a distance [m], by the sensor's mode: 0..1."""
     if sensor == SENSOR_LIGHT_LINEAR:
         return 1.0 - min(distance, reach) / reach
@@ -274,7 +274,7 @@ def light_falloff(sensor, distance, reach):  # noqa: ANN001, ANN201
 
 
 @kernel
-def read_light(scene, walls, bodies, robot, sensor, px, py, reach):  # noqa: ANN001, ANN201
+def read_light(scene, walls, bodies, robot, sensor, px, py, reach):
     """Light that arrives at P from all lights; half of it from those in a shadow."""
     total = 0.0
     for i in range(len(scene.lights)):
@@ -289,7 +289,7 @@ def read_light(scene, walls, bodies, robot, sensor, px, py, reach):  # noqa: ANN
 
 
 @kernel
-def sense(scene, walls, bodies, robot, pose, readings):  # noqa: ANN001, ANN201
+def sense(scene, walls, bodies, robot, pose, readings):
     """Fill the robot's part of `readings` (s,): distances [m], 0 or 1 from bumpers, light intensities."""
     turned = pose[2] + _HALF_PI
     cos = math.cos(turned)
@@ -297,7 +297,7 @@ def sense(scene, walls, bodies, robot, pose, readings):  # noqa: ANN001, ANN201
     for i in range(scene.sensor_rows[robot], scene.sensor_rows[robot + 1]):
         forward, left, angle = scene.mounts[i, 0], scene.mounts[i, 1], scene.mounts[i, 2]
         sensor, reach = scene.sensors[i], scene.reaches[i]
-        if sensor == SENSOR_RANGE or sensor == SENSOR_BUMPER:
+        if sensor in (SENSOR_RANGE, SENSOR_BUMPER):
             px = pose[0] + (forward * cos - left * sin)
             py = pose[1] + (forward * sin + left * cos)
             away = min(cast_ray(scene, walls, bodies, robot, px, py, -(pose[2] + angle), reach), reach)
@@ -311,11 +311,11 @@ def sense(scene, walls, bodies, robot, pose, readings):  # noqa: ANN001, ANN201
             readings[i] = read_light(scene, walls, bodies, robot, sensor, px, py, reach)
 
 
-# --- controllers ----------------------------------------------------------------------------------------------
+# --- controllers -------------------------------------------------------------------------------------------
 
 
 @kernel
-def observe(scene, robot, readings, stall, part_of_time):  # noqa: ANN001, ANN201
+def observe(scene, robot, readings, stall, part_of_time):
     """The inputs of the robot's network, in its order, as a new array."""
     own = readings[scene.sensor_rows[robot] : scene.sensor_rows[robot + 1]]
     reach = scene.scales[robot, 2]
@@ -337,7 +337,7 @@ def observe(scene, robot, readings, stall, part_of_time):  # noqa: ANN001, ANN20
 
 
 @kernel
-def think(scene, robot, weight_start, values):  # noqa: ANN001, ANN201
+def think(scene, robot, weight_start, values):
     """The robot's command (speed, turn rate) from the inputs of its network: layers of tanh(W x + b)."""
     w = weight_start
     for k in range(scene.layer_rows[robot], scene.layer_rows[robot + 1]):
@@ -355,7 +355,7 @@ def think(scene, robot, weight_start, values):  # noqa: ANN001, ANN201
 
 
 @kernel
-def first_weights(scene):  # noqa: ANN001, ANN201
+def first_weights(scene):
     """(r,) where the weights of each robot's network begin in `scene.weights`."""
     starts = np.zeros(len(scene.names), np.int64)
     total = 0
@@ -366,18 +366,18 @@ def first_weights(scene):  # noqa: ANN001, ANN201
     return starts
 
 
-# --- the scene ------------------------------------------------------------------------------------------------
+# --- the scene ---------------------------------------------------------------------------------------------
 
 
 @kernel
-def run_scene(scene, dt, n_steps):  # noqa: ANN001, ANN201
+def run_scene(scene: Scene, dt: float, n_steps: int) -> tuple[FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS]:
     """What happens in a scene, step by step; row 0 is the start.
 
     All robots decide on the readings after the step before; they move one after the other, later ones
     meeting the earlier ones at their new poses; then all sensors are read.
 
     Args:
-        scene: A `Scene`.
+        scene: What stands, who is there and what drives them.
         dt: Length of a step [s].
         n_steps: Steps to take, t.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._compile import kernel
 from ._genome import has_node, next_below, node_bias_of
-from ._philox import PURPOSE_SPECIES, make_stream
+from ._philox import FIRST, PURPOSE_SPECIES, make_stream
 
 
 class SpeciesTable(NamedTuple):
@@ -83,11 +83,11 @@ def genome_distance(one, a, other, b, rules):
         return math.inf
     excess = (n_a - i) + (n_b - j)
     if rules.node_bias:
-        for node in range(rules.n_outputs):
+        for k in range(rules.n_outputs):
             matching += 1
-            difference += abs(one.bias[a, node] - other.bias[b, node])
+            difference += abs(one.bias[a, k] - other.bias[b, k])
         for k in range(one.n_hidden[a]):
-            node = one.hidden[a, k]
+            node = np.int64(one.hidden[a, k])
             if has_node(other, b, rules, node):
                 matching += 1
                 difference += abs(one.bias[a, rules.n_outputs + k] - node_bias_of(other, b, rules, node))
@@ -143,11 +143,12 @@ def speciate(new, old, fitness, species_of, species, rules, key, replicate, gene
     representative = np.empty(n_known + n, np.int32)
     cursor = np.zeros(1, np.int64)
     for k in range(n_known):
-        stream = make_stream(key, replicate, generation, k, 0, PURPOSE_SPECIES)
+        stream = make_stream(key, replicate, generation, k, FIRST, PURPOSE_SPECIES)
         cursor[0] = 0
         representative[k] = _representative(species_of, fitness, species.identity[k], rules, stream, cursor)
     identity = np.empty(n_known + n, np.int32)
-    identity[:n_known] = species.identity[:n_known]
+    for k in range(n_known):
+        identity[k] = species.identity[k]
     size = np.zeros(n_known + n, np.int32)
     n_all = n_known
     for row in range(n):

@@ -18,7 +18,7 @@ from ._coverage import to_grid, visit, visit_line
 from ._geometry import ray_fraction, segments_touch
 from ._math import sin_cos, wrap_heading
 from ._network import activate
-from ._philox import PURPOSE_NOISE, draw_words, make_stream, unit
+from ._philox import FIRST, PURPOSE_NOISE, draw_words, make_stream, unit
 
 # Two lines may differ from their distance as computed by rounding; beyond this margin [m] they cannot touch.
 REACH_MARGIN = 1e-9
@@ -218,8 +218,8 @@ def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
     v = to_grid(y, scene.grid[1], scene.grid[2])
     column = int(math.floor(u))
     line = int(math.floor(v))
-    n_line = visit(column, line, scene.columns, scene.rows, work.visited, order, 0)
-    n_ends = visit(column, line, scene.columns, scene.rows, work.visited_ends, work.order_ends, 0)
+    n_line = visit(column, line, scene.columns, scene.rows, work.visited, order, FIRST)
+    n_ends = visit(column, line, scene.columns, scene.rows, work.visited_ends, work.order_ends, FIRST)
     sense(scene, x, y, cosine, sine, work.readings)
     stalled = False
     n_stalls = 0

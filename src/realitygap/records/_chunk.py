@@ -24,7 +24,9 @@ _MAX_CONDITION = 150
 """Longest name of a condition; file systems allow 255 bytes, and a chunk's temporary file adds some 50."""
 
 _CONDITION = re.compile(rf"[A-Za-z0-9_-][A-Za-z0-9._-]{{0,{_MAX_CONDITION - 1}}}")
-_NAME = re.compile(rf"(?P<condition>{_CONDITION.pattern})\.(?P<first>\d{{9}})-(?P<last>\d{{9}})\.parquet")
+_NAME = re.compile(
+    rf"(?P<condition>{_CONDITION.pattern})\.(?P<first>[0-9]{{9}})-(?P<last>[0-9]{{9}})\.parquet"
+)
 
 _AGAIN = (
     "Move it elsewhere or delete it, then run the same command again: only its replicates are computed anew."

@@ -14,7 +14,7 @@ from realitygap.records._lock import LOCK_NAME
 
 TRIALS_NAME = "trials"
 
-_TEMPORARY = re.compile(r"\.(?P<target>.+)\.\d+\.tmp")
+_TEMPORARY = re.compile(r"\.(?P<target>.+)\.[0-9]+\.tmp")
 """What `write_durably` names a file before it is renamed to its target."""
 
 _SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")

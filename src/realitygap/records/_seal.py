@@ -1,10 +1,10 @@
 """A seal inside a Parquet file, by which every damaged byte is found before the file is decoded.
 
-A Parquet decoder cannot be trusted with damaged input: one flipped bit in the footer can ask for so much
-memory that the process is aborted, and one in the column statistics makes a filtered scan skip rows without a
-word. So 16 bytes of mark and 32 bytes of sha256 over all other bytes are put between the data pages and the
-footer. That spot belongs to nobody: the footer is found from the file's end and everything else by its
-distance from the file's start, so any Parquet reader opens a sealed file.
+A Parquet decoder cannot be trusted with damaged input: seen in polars, one flipped bit in a data page aborted
+the whole process, and one in the column statistics made a filtered scan leave out rows without a word. So
+16 bytes of mark and 32 bytes of sha256 over all other bytes are put between the data pages and the footer.
+That spot belongs to nobody: the footer is found from the file's end and everything else by its distance from
+the file's start, so any Parquet reader opens a sealed file.
 """
 
 from __future__ import annotations

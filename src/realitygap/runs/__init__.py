@@ -1,1 +1,16 @@
-"""runs."""
+"""One evolution from one seed, and many of them at once."""
+
+from ._condition import NAME_PATTERN, Condition, Selection
+from ._replay import genome_of, replay
+from ._runs import frame_of, run_replicates, run_rows
+
+__all__ = [
+    "NAME_PATTERN",
+    "Condition",
+    "Selection",
+    "frame_of",
+    "genome_of",
+    "replay",
+    "run_replicates",
+    "run_rows",
+]

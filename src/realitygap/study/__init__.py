@@ -1,1 +1,22 @@
-"""study."""
+"""Studies: conditions x replicates, read from a file, carried out, taken up again."""
+
+from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
+from ._run import Progress, StudyResult, machine_facts, run_study, usable_processors
+from ._study import ConditionNotes, ReportSection, Study, StudySection
+
+__all__ = [
+    "DEFAULT_NEAT",
+    "SECTIONS",
+    "ConditionNotes",
+    "Progress",
+    "ReportSection",
+    "Study",
+    "StudyResult",
+    "StudySection",
+    "load_study",
+    "machine_facts",
+    "named_studies",
+    "parse_study",
+    "run_study",
+    "usable_processors",
+]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import CaseError
 from ..kernels import _scene as kernel
-from ..world._case import Case, CaseDevice, CaseRobot
+from ..world._case import Case, CaseDevice
 
 _LIGHTS = {
     "linear": kernel.SENSOR_LIGHT_LINEAR,
@@ -51,7 +51,7 @@ class SceneTrack:
     readings: list[NDArray[np.float64]]
 
     def write_csv(self, path: Path) -> None:
-        """Write one row per step and robot, numbers in full; an existing file changes only when all is written.
+        """Write one row per step and robot, numbers in full; an existing file gives way when all is written.
 
         Columns: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy, s0, s1, ... A robot with fewer
         sensors than another leaves its last columns empty.
@@ -138,12 +138,16 @@ def _as_arrays(case: Case) -> kernel.Scene:
         reaches=np.array([reach for _, _, reach in sensors], np.float64),
         sensor_rows=_row_starts(len(robot) for robot in devices),
         commands=commands,
-        layers=np.array(
-            [(len(layer.weights), len(layer.weights[0])) for layer in layers], np.int64
-        ).reshape(-1, 2),
+        layers=np.array([(len(layer.weights), len(layer.weights[0])) for layer in layers], np.int64).reshape(
+            -1, 2
+        ),
         layer_rows=_row_starts(len(network.layers) if network else 0 for network in networks),
-        weights=np.array([w for layer in layers for w in [*sum(layer.weights, []), *layer.bias]], np.float64),
-        inputs=np.array([_INPUTS[name] for network in networks if network for name in network.inputs], np.int64),
+        weights=np.array(
+            [w for layer in layers for row in [*layer.weights, layer.bias] for w in row], np.float64
+        ),
+        inputs=np.array(
+            [_INPUTS[name] for network in networks if network for name in network.inputs], np.int64
+        ),
         input_rows=_row_starts(len(network.inputs) if network else 0 for network in networks),
         scales=scales,
     )
@@ -151,7 +155,9 @@ def _as_arrays(case: Case) -> kernel.Scene:
 
 def _all_sensors(devices: list[CaseDevice]) -> list[tuple[list[float], int, float]]:
     """Mount, kind for the kernel and maximum range [m] of each sensor of a robot, in order."""
-    return [(mount, _sensor_kind(device), device.max_range) for device in devices for mount in device.geometry]
+    return [
+        (mount, _sensor_kind(device), device.max_range) for device in devices for mount in device.geometry
+    ]
 
 
 def _sensor_kind(device: CaseDevice) -> int:
@@ -184,7 +190,8 @@ def _write_whole(path: Path, lines: Iterable[str]) -> None:
             beside.replace(place)
     except OSError as error:
         raise CaseError(
-            f"{path}: cannot be written ({error.strerror}). Name a file in a folder that exists and can be written."
+            f"{path}: cannot be written ({error.strerror}). "
+            "Name a file in a folder that exists and can be written."
         ) from None
     finally:
         if not is_special:

@@ -11,12 +11,14 @@ from ._arena import (
     paper_arena,
 )
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
+from ._settings import ArenaSettings
 
 __all__ = [
     "INCH",
     "JYRO_SCRIBBLER",
     "NAMED_STARTS",
     "Arena",
+    "ArenaSettings",
     "Body",
     "Grid",
     "Pose",

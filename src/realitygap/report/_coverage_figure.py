@@ -1,0 +1,333 @@
+"""Figure 4: best coverage by generation, one panel per condition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    Ink,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._statistics import SMALLEST_N, median_interval, quartiles
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Points = Literal["best-of-generation", "best-so-far"]
+
+_MOST_SEGMENTS = 4000
+"""Distinct pieces of lines in one panel; more would make the page heavy and the panel black."""
+
+_SHADES = 12
+"""How many opacities tell how many runs share a piece of line."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """What one panel shows.
+
+    Attributes:
+        title: the condition's name.
+        note: label and number of runs.
+        values: (n, g) coverage of each run by generation [0..1], NaN after a run's last generation.
+        n_drawn: of how many runs, from the first, lines are drawn.
+        run_bests: (n,) best coverage of each run [0..1].
+        published: published best coverages, one per run of their own [0..1].
+    """
+
+    title: str
+    note: str
+    values: npt.NDArray[np.float64]
+    n_drawn: int
+    run_bests: npt.NDArray[np.float64]
+    published: tuple[float, ...]
+
+
+def draw_coverage(
+    folder: ResultsFolder | str | Path, *, points: Points | None = None, width: float = WIDE
+) -> Drawing:
+    """Best coverage by generation, as the paper's Figure 4, with every condition and every run.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        points: what a run's line shows at each generation: the best of that generation, or the best so far;
+            the study's own choice when not given.
+        width: of the figure [in]; it decides how many panels stand side by side.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    return draw_tally_coverage(read_tally(folder), points=points, width=width)
+
+
+def draw_tally_coverage(
+    tally: Tally, *, points: Points | None = None, width: float = WIDE, name: str = "coverage"
+) -> Drawing:
+    """As `draw_coverage`, of what was read already; `name` is what the ids in the drawing begin with."""
+    points = points or _points_of(tally.description)
+    panels = [_panel(tally, condition, points) for condition in tally.conditions]
+    caption = _caption(tally, panels, points)
+    alt = (
+        f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the median "
+        f"with its interval, and the best of the runs. Their numbers are in the table of results."
+    )
+    with house_style():
+        figure = _draw(panels, width)
+        return Drawing(to_svg(figure, name, alt), caption, alt)
+
+
+def _points_of(description: Mapping[str, Any]) -> Points:
+    points = (description.get("report") or {}).get("points")
+    return "best-so-far" if points == "best-so-far" else "best-of-generation"
+
+
+def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> _Panel:
+    name = condition["name"]
+    values = tally.generation_bests(name, tally.measure)
+    if points == "best-so-far":
+        values = np.where(np.isnan(values), np.nan, np.fmax.accumulate(values, axis=1)) if values.size else values
+    return _Panel(
+        title=name,
+        note=f"{label_of(condition)}, n = {len(values)}",
+        values=values,
+        n_drawn=_count_drawable(values),
+        run_bests=tally.run_bests(name, tally.measure),
+        published=tuple(condition.get("published") or ()),
+    )
+
+
+def _count_drawable(values: npt.NDArray[np.float64]) -> int:
+    """Of how many runs, from the first, the distinct pieces of lines are few enough."""
+    n_drawn = len(values)
+    while n_drawn > 1 and sum(len(counts) for _, counts in _segments(values[:n_drawn])) > _MOST_SEGMENTS:
+        n_drawn = max(1, n_drawn // 2)
+    return n_drawn
+
+
+def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]]:
+    """For each generation but the last: distinct (m, 2) values there and in the next, and (m,) how many runs."""
+    found = []
+    for left in range(values.shape[1] - 1):
+        pairs = values[:, left : left + 2]
+        pairs = pairs[np.isfinite(pairs).all(axis=1)]
+        distinct, counts = np.unique(np.round(pairs, 9), axis=0, return_counts=True)
+        found.append((distinct, counts))
+    return found
+
+
+# --- drawing --------------------------------------------------------------------------------------------------
+
+
+def _draw(panels: list[_Panel], width: float) -> Figure:
+    n_columns = _columns(len(panels), width)
+    n_rows = math.ceil(len(panels) / n_columns)
+    left, right, gap = 0.56, 0.06, 0.22
+    panel_width = (width - left - right - gap * (n_columns - 1)) / n_columns
+    panel_height = min(1.75, max(1.15, 0.55 * panel_width))
+    title_height, tick_height, legend_height = 0.34, 0.24, 0.62 if width >= 6 else 0.98
+    height = n_rows * (title_height + panel_height + tick_height) + legend_height
+    figure = new_figure(width, height)
+    top = _top_of(panels)
+    for index, panel in enumerate(panels):
+        row, column = divmod(index, n_columns)
+        x = left + column * (panel_width + gap)
+        y = row * (title_height + panel_height + tick_height) + title_height
+        axes = place_axes(figure, x, y, panel_width, panel_height)
+        _draw_panel(axes, panel, top, first_column=column == 0, letters=int(panel_width / 0.075))
+        if column == 0:
+            axes.set_ylabel("coverage", labelpad=4)
+        if index + n_columns >= len(panels):
+            axes.set_xlabel("generation", labelpad=2)
+    _draw_legend(figure, panels, left, height - legend_height + 0.3, width)
+    return figure
+
+
+def _columns(n_panels: int, width: float) -> int:
+    if width < 6:
+        return min(n_panels, 1 if n_panels <= 9 else 2)
+    return min(n_panels, 3 if n_panels <= 9 else 4)
+
+
+def _top_of(panels: list[_Panel]) -> float:
+    """Upper end of the common vertical axis: the next tenth above everything shown."""
+    highest = max([0.1, *(float(p.run_bests.max()) for p in panels if len(p.run_bests))])
+    highest = max([highest, *(value for panel in panels for value in panel.published)])
+    return min(1.0, math.ceil(highest * 10 + 0.2) / 10)
+
+
+def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool, letters: int) -> None:
+    n_generations = max(1, panel.values.shape[1])
+    side = n_generations - 1 + _side_offset(n_generations)
+    step = _side_offset(n_generations)
+    axes.set_xlim(-0.25 * step, side + 0.6 * step)
+    axes.set_ylim(0.0, top)
+    axes.set_yticks(np.arange(0.0, top + 1e-9, 0.1 if top <= 0.6 else 0.2))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.1f}")
+    axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
+    axes.tick_params(axis="y", length=0, labelleft=first_column)
+    axes.spines["left"].set_visible(False)
+    ticks = _generation_ticks(n_generations)
+    axes.set_xticks([*ticks, side], [*map(str, ticks), "run"])
+    note_letters = len(panel.note) + 2
+    axes.set_title(shorten(panel.title, max(8, letters - note_letters)), loc="left", fontsize=8.5, weight="bold", pad=5)
+    axes.set_title(panel.note, loc="right", fontsize=7.5, color=Ink.MUTED, pad=5)
+    axes.axvspan(side - 0.55 * step, side + 0.6 * step, color=Ink.RULE, alpha=0.35, linewidth=0)
+    if len(panel.values):
+        _draw_runs(axes, panel.values[: panel.n_drawn])
+        _draw_median(axes, panel.values)
+        _draw_best_of_runs(axes, panel.run_bests, side - 0.3 * step)
+    else:
+        axes.text(0.45, 0.5, "no runs yet", transform=axes.transAxes, ha="center", color=Ink.MUTED)
+    if panel.published:
+        # side by side in the order of the paper's runs, since two of them may be equal
+        x = np.linspace(side, side + 0.42 * step, len(panel.published))
+        axes.plot(
+            x, panel.published, "D", markersize=4.0, color=Ink.PUBLISHED, markerfacecolor=Ink.GROUND,
+            markeredgewidth=1.1, clip_on=False,
+        )  # fmt: skip
+
+
+def _side_offset(n_generations: int) -> float:
+    """Where, right of the last generation, the best of the whole run stands [generations]."""
+    return max(1.0, 0.2 * n_generations)
+
+
+def _generation_ticks(n_generations: int) -> list[int]:
+    step = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10**9) if n_generations <= 8 * step)
+    return list(range(0, n_generations, step))
+
+
+def _draw_runs(axes: Axes, values: npt.NDArray[np.float64]) -> None:
+    """A faint line for each run: a piece that k runs share is as dark as k translucent lines on each other."""
+    single = min(0.45, max(0.035, 9.0 / len(values)))
+    if values.shape[1] == 1:
+        distinct, counts = np.unique(np.round(values[:, 0], 9), return_counts=True)
+        for value, count in zip(distinct, counts, strict=True):
+            axes.plot([0], [value], "_", markersize=14, color=Ink.RUN, alpha=_opacity(single, count))
+        return
+    shades: dict[float, list[npt.NDArray[np.float64]]] = {}
+    for left, (distinct, counts) in enumerate(_segments(values)):
+        for pair, count in zip(distinct, counts, strict=True):
+            piece = np.array([[left, pair[0]], [left + 1, pair[1]]])
+            shades.setdefault(_opacity(single, count), []).append(piece)
+    for opacity, pieces in sorted(shades.items()):
+        # one path for all pieces of a shade, with gaps between them
+        gap = np.full((1, 2), np.nan)
+        line = np.concatenate([part for piece in pieces for part in (piece, gap)])
+        axes.plot(line[:, 0], line[:, 1], color=Ink.RUN, alpha=opacity, linewidth=0.8, solid_capstyle="round")
+
+
+def _opacity(single: float, count: int) -> float:
+    """What `count` lines of opacity `single` make together, in a few steps."""
+    opacity = 1.0 - (1.0 - single) ** int(count)
+    return math.ceil(opacity * _SHADES) / _SHADES
+
+
+def _draw_median(axes: Axes, values: npt.NDArray[np.float64]) -> None:
+    generations, medians, bands = [], [], []
+    for generation in range(values.shape[1]):
+        there = values[:, generation][np.isfinite(values[:, generation])]
+        generations.append(generation)
+        medians.append(float(np.median(there)))
+        interval = median_interval(there)
+        bands.append((np.nan, np.nan) if interval is None else (interval.low, interval.high))
+    low, high = np.array(bands).T
+    if len(generations) == 1:
+        axes.plot([0, 0], [low[0], high[0]], color=Ink.BAND, linewidth=7, solid_capstyle="butt", alpha=0.75)
+        axes.plot(generations, medians, "o", color=Ink.OURS, markersize=4.5)
+        return
+    if np.isfinite(low).any():
+        axes.fill_between(generations, low, high, color=Ink.BAND, alpha=0.75, linewidth=0)
+    many = len(generations) > 30
+    axes.plot(generations, medians, color=Ink.OURS, linewidth=1.7, marker="" if many else "o", markersize=3.4)
+
+
+def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> None:
+    """Quartiles as a thin bar, the median's interval as a thick one, the median as a dot."""
+    middle = quartiles(bests)
+    interval = median_interval(bests)
+    if len(bests) > 1:
+        axes.plot([x, x], [middle.q25, middle.q75], color=Ink.OURS, linewidth=1.0, solid_capstyle="butt")
+    if interval is not None:
+        axes.plot([x, x], [interval.low, interval.high], color=Ink.BAND, linewidth=6, solid_capstyle="butt")
+    axes.plot([x], [middle.median], "o", color=Ink.OURS, markersize=4.2)
+
+
+def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, width: float) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = [
+        Line2D([], [], color=Ink.RUN, linewidth=0.8, alpha=0.7, label="one run"),
+        Line2D([], [], color=Ink.OURS, linewidth=1.7, marker="o", markersize=3.4, label="median"),
+    ]
+    if any(len(panel.values) >= SMALLEST_N for panel in panels):
+        handles.append(Patch(facecolor=Ink.BAND, label="95 % interval of the median"))
+    if any(len(panel.values) > 1 for panel in panels):
+        handles.append(Line2D([], [], color=Ink.OURS, linewidth=1.0, label="quartiles, best of run"))
+    if any(panel.published for panel in panels):
+        handles.append(
+            Line2D([], [], linestyle="", marker="D", markersize=4.2, color=Ink.PUBLISHED,
+                   markerfacecolor=Ink.GROUND, markeredgewidth=1.1, label="the paper’s runs, best of run")
+        )  # fmt: skip
+    height = float(figure.get_size_inches()[1])
+    figure.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(left / width, 1.0 - top / height),
+        ncols=len(handles) if width >= 6 else 2, frameon=False, fontsize=8.0, borderaxespad=0.0, borderpad=0.0,
+        handlelength=1.6, columnspacing=1.4,
+    )  # fmt: skip
+
+
+# --- words ----------------------------------------------------------------------------------------------------
+
+
+def _caption(tally: Tally, panels: list[_Panel], points: Points) -> str:
+    labels = sorted({label_of(condition) for condition in tally.conditions})
+    each = "Best coverage of each generation" if points == "best-of-generation" else "Best coverage so far"
+    counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
+    parts = [
+        f"{each}, counted {counted}, by generation (from 0). {' and '.join(labels)}.",
+        _say_runs(panels),
+        f"Blue: the median over the runs{_say_interval(panels)}.",
+        "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"
+        + (", beside the values that the paper prints." if any(panel.published for panel in panels) else "."),
+    ]
+    cells = {settings_of(condition).get("task", {}).get("cells") for condition in tally.conditions}
+    if len(cells - {None}) > 1:
+        parts.append("All panels count cells in this one way, also where selection counts them in the other.")
+    return " ".join(parts)
+
+
+def _say_runs(panels: list[_Panel]) -> str:
+    cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
+    if cut:
+        drawn = ", ".join(f"{panel.n_drawn} of {len(panel.values)} in {panel.title}" for panel in cut)
+        return (
+            f"Gray: one line a run; only the first runs are drawn where all would be too many ({drawn}); medians and "
+            "intervals are of all runs."
+        )
+    return "Gray: every run; a piece of line that several runs share is darker."
+
+
+def _say_interval(panels: list[_Panel]) -> str:
+    counts = [len(panel.values) for panel in panels]
+    if max(counts) < SMALLEST_N:
+        return f" (no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %)"
+    missing = f", not drawn below {SMALLEST_N} runs" if min(counts) < SMALLEST_N else ""
+    return f" with its exact 95 % interval from order statistics{missing}"

@@ -1,0 +1,231 @@
+"""From a matplotlib figure to SVG: text as text, the same bytes every time, fit to stand beside others on a page.
+
+A figure is drawn in the colors of `Ink`. On a page each of them becomes a CSS variable, so that one drawing serves
+light and dark; a drawing by itself keeps the light colors, which every program understands.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import textwrap
+import warnings
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SVG = "http://www.w3.org/2000/svg"
+_XLINK = "http://www.w3.org/1999/xlink"
+_HREF = f"{{{_XLINK}}}href"
+
+WIDE = 9.6
+NARROW = 3.7
+"""Widths of a figure [in] on a desktop's page and on a phone's."""
+
+FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
+_METRIC_FONT = "DejaVu Sans"
+"""Comes with matplotlib, so that the layout is the same everywhere; wider than those in `FONT`."""
+
+
+class Ink:
+    """The colors of all figures: apart in lightness, and for color-blind eyes (after Okabe & Ito, 2008)."""
+
+    TEXT = "#1c1f24"
+    MUTED = "#5a626d"
+    RULE = "#d3d8de"
+    GROUND = "#fefefe"
+    OURS = "#0a4f8f"
+    BAND = "#a9c9e8"
+    RUN = "#6d7580"
+    PUBLISHED = "#b8480a"
+    REACH = "#c2182b"
+    VISITED = "#dfe9f3"
+    BODY = "#8d949e"
+
+    @classmethod
+    def names(cls) -> dict[str, str]:
+        """Color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
+        return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}
+
+
+_STYLE: Mapping[str, Any] = {
+    "axes.axisbelow": True,
+    "axes.edgecolor": Ink.MUTED,
+    "axes.facecolor": "none",
+    "axes.grid": False,
+    "axes.labelcolor": Ink.TEXT,
+    "axes.labelsize": 8.0,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.dpi": 72,
+    "figure.facecolor": "none",
+    "font.family": [_METRIC_FONT],
+    "font.size": 8.0,
+    "path.simplify": False,
+    "savefig.edgecolor": "none",
+    "savefig.facecolor": "none",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "realitygap",
+    "text.color": Ink.TEXT,
+    "text.parse_math": False,
+    "xtick.color": Ink.MUTED,
+    "xtick.labelcolor": Ink.TEXT,
+    "xtick.labelsize": 7.5,
+    "xtick.major.size": 2.5,
+    "xtick.major.width": 0.6,
+    "ytick.color": Ink.MUTED,
+    "ytick.labelcolor": Ink.TEXT,
+    "ytick.labelsize": 7.5,
+    "ytick.major.size": 2.5,
+    "ytick.major.width": 0.6,
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with what has to be said of it.
+
+    Attributes:
+        svg: the picture as one `svg` element; nothing in it is fetched from elsewhere.
+        caption: what is drawn, of how many runs, with which interval.
+        alt: the same for those who cannot see it, in a sentence; it is in `svg` as well.
+    """
+
+    svg: str
+    caption: str
+    alt: str
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw with our settings, whatever the user's are; they are back as they were afterwards.
+
+    matplotlib keeps its settings for the whole process, so draw from one thread at a time.
+    """
+    import matplotlib as mpl
+
+    with mpl.rc_context(), warnings.catch_warnings():
+        # letters that our measuring font lacks are there in the reader's
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [in]; call under `house_style`."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height))
+
+
+def place_axes(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
+    """Axes by the distances of their box from the figure's left and upper edge, and its size [in]."""
+    total_width, total_height = figure.get_size_inches()
+    box = (left / total_width, 1.0 - (top + height) / total_height, width / total_width, height / total_height)
+    return figure.add_axes(box)
+
+
+def shorten(text: str, n_letters: int) -> str:
+    """Text of a user's file on one line, printable, at most so long."""
+    plain = "".join(letter if letter.isprintable() else " " for letter in text)
+    return textwrap.shorten(plain, n_letters, placeholder="…") if " " in plain else _cut(plain, n_letters)
+
+
+def wrap(text: str, n_letters: int, n_lines: int = 3) -> str:
+    """Text of a user's file on a few lines, printable, none much longer than asked."""
+    plain = "".join(letter if letter.isprintable() else " " for letter in text)
+    return "\n".join(textwrap.wrap(plain, n_letters, max_lines=n_lines, placeholder="…"))
+
+
+def _cut(text: str, n_letters: int) -> str:
+    return text if len(text) <= n_letters else text[: n_letters - 1] + "…"
+
+
+def to_svg(figure: Figure, name: str, alt: str) -> str:
+    """The figure as one `svg` element; call under `house_style`.
+
+    Args:
+        figure: drawn in the colors of `Ink`.
+        name: what the ids inside begin with; it must differ from that of every other drawing on a page.
+        alt: what `aria-label` says.
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    root = ET.fromstring(buffer.getvalue())
+    _drop_baggage(root)
+    _rename_ids(root, name)
+    for element in root.iter():
+        _tidy(element)
+    root.attrib.pop("version", None)
+    root.set("role", "img")
+    root.set("aria-label", alt)
+    root.set("style", "stroke-linejoin: round; stroke-linecap: butt")
+    ET.register_namespace("", _SVG)
+    return ET.tostring(root, encoding="unicode")
+
+
+def inline(svg: str) -> str:
+    """A drawing as part of an HTML page: no namespaces, no size of its own, colors as CSS variables."""
+    start, rest = svg.split(">", 1)
+    start = re.sub(r' (?:xmlns(?::\w+)?|width|height)="[^"]*"', "", start)
+    colors = {color: f"var(--ink-{name})" for name, color in Ink.names().items()}
+    pattern = re.compile(r"(?<=[:] )(?:" + "|".join(colors) + r")(?=[;\"])")
+    return f"{start}>{pattern.sub(lambda match: colors[match[0]], rest)}"
+
+
+def _drop_baggage(root: ET.Element) -> None:
+    """Remove metadata, and the style sheet, which would apply to the whole page."""
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"):
+                parent.remove(child)
+            elif child.tag == f"{{{_SVG}}}defs" and all(inner.tag == f"{{{_SVG}}}style" for inner in child):
+                parent.remove(child)
+
+
+def _rename_ids(root: ET.Element, name: str) -> None:
+    """Give ids that are referred to names of our own, and remove all others."""
+    used: dict[str, str] = {}
+    for element in root.iter():
+        target = element.attrib.pop(_HREF, None)
+        if target is not None:
+            element.set("href", "#" + used.setdefault(target[1:], f"{name}-{len(used)}"))
+        clip = element.get("clip-path")
+        if clip is not None:
+            element.set("clip-path", f"url(#{used.setdefault(clip[5:-1], f'{name}-{len(used)}')})")
+    for element in root.iter():
+        own = element.attrib.pop("id", None)
+        if own in used:
+            element.set("id", used[own])
+
+
+def _tidy(element: ET.Element) -> None:
+    """Hundredths of a point are enough; the reader's fonts in place of the measuring one."""
+    if "d" in element.attrib:
+        element.set("d", _round(" ".join(element.attrib["d"].split())))
+    for key in ("x", "y", "transform"):
+        if key in element.attrib:
+            element.set(key, _round(element.attrib[key]))
+    if element.get("transform", "").startswith("rotate(-0 "):
+        del element.attrib["transform"]
+    if element.tag == f"{{{_SVG}}}text":
+        style = re.sub(r"font-family: [^;]*", f"font-family: {FONT}", element.get("style", ""))
+        element.set("style", re.sub(r"(font: [^;]*?px )[^;]*", rf"\g<1>{FONT}", style))
+    if element.text is not None and not element.text.strip():
+        element.text = None
+    element.tail = None
+
+
+def _round(text: str) -> str:
+    return re.sub(r"-?\d+\.\d{3,}", lambda match: f"{float(match[0]):.2f}".rstrip("0").rstrip("."), text)

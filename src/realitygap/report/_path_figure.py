@@ -1,0 +1,311 @@
+"""Figure 6: the best path of each generation of one run, on the arena."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.errors import RealityGapError
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    Ink,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.runs import Condition, replay
+from realitygap.world import Arena, Body, Pose
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_PANELS = 11
+"""Generations shown at most, evenly spread; with the legend they fill rows of two and of three nearly evenly."""
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The best trial of a generation.
+
+    Attributes:
+        generation: which.
+        coverage: its coverage [0..1], by the tally's measure.
+        cells: cells along its line, columns * row + column.
+        poses: (t + 1, 3) x, y [m], heading [rad]; None where the trial cannot be recomputed.
+        stalled: (t + 1,) whether each step was blocked; None likewise.
+    """
+
+    generation: int
+    coverage: float
+    cells: tuple[int, ...]
+    poses: npt.NDArray[np.float64] | None
+    stalled: npt.NDArray[np.bool_] | None
+
+
+def draw_paths(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    width: float = WIDE,
+) -> Drawing:
+    """The best path of each generation of one run, as the paper's Figure 6.
+
+    Args:
+        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        condition: of which; the first one when not given.
+        replicate: which run; when not given the typical one, whose best coverage is the median of its condition
+            (the lower of the two middle ones, and the first of several alike).
+        width: of the figure [in]; it decides how many panels stand side by side.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition or run.
+    """
+    tally = read_tally(folder)
+    return draw_tally_paths(tally, condition or tally.runs["condition"][0], replicate, width=width)
+
+
+def draw_tally_paths(
+    tally: Tally, condition: str, replicate: int | None = None, *, width: float = WIDE, name: str = "paths"
+) -> Drawing:
+    """As `draw_paths`, of what was read already; `name` is what the ids in the drawing begin with.
+
+    Raises:
+        ValueError: there is no such condition or run.
+        pydantic.ValidationError: the condition's settings are not those of this version (a `ValueError`).
+    """
+    described = tally.condition(condition)
+    resolved = Condition.from_settings(condition, dict(settings_of(described)))
+    typical = replicate is None
+    replicate = typical_replicate(tally, condition) if replicate is None else replicate
+    paths, problem = _best_paths(tally, resolved, replicate)
+    caption = _caption(tally, described, replicate, paths, typical=typical, problem=problem)
+    alt = (
+        f"Best path of each generation of run {replicate} of {condition}, in {len(paths)} panels. Coverage: "
+        + ", ".join(f"generation {path.generation} {path.coverage:.3f}" for path in paths)
+        + "."
+    )
+    with house_style():
+        figure = _draw(paths, resolved.arena.arena(), resolved.jyro.body, label_of(described), width)
+        return Drawing(to_svg(figure, name, alt), caption, alt)
+
+
+def typical_replicate(tally: Tally, condition: str) -> int:
+    """The run whose best coverage is the median of its condition: the lower middle one, the first of several alike.
+
+    Raises:
+        ValueError: the condition has no runs.
+    """
+    bests = tally.run_bests(condition, tally.measure)
+    if len(bests) == 0:
+        raise ValueError(f"Condition {condition!r} has no runs yet.")
+    middle = np.sort(bests)[(len(bests) - 1) // 2]
+    return int(tally.replicates(condition)[np.argmax(bests == middle)])
+
+
+def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[_Path], str]:
+    """The best trial of each generation shown, and why trials could not be recomputed (empty when they could)."""
+    column = f"coverage_{tally.measure}"
+    rows = tally.folder.read(condition.name, [replicate])
+    if rows.is_empty():
+        raise ValueError(f"Condition {condition.name!r} has no run {replicate} in {tally.folder.path}.")
+    best = rows.filter(pl.col(column) == pl.col(column).max().over("generation")).unique(
+        "generation", keep="first", maintain_order=True
+    )
+    n_generations = best.height
+    shown = np.unique(np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int))
+    paths, problem = [], ""
+    for row in best[shown].iter_rows(named=True):
+        poses = stalled = None
+        try:
+            trajectory = replay(condition, row)
+            poses, stalled = trajectory.poses, trajectory.stalled
+        except RealityGapError as error:
+            problem = str(error)
+        paths.append(_Path(row["generation"], row[column], tuple(row["cells"]), poses, stalled))
+    return paths, problem
+
+
+# --- drawing --------------------------------------------------------------------------------------------------
+
+
+def _draw(paths: list[_Path], arena: Arena, body: Body, label: str, width: float) -> Figure:
+    n_columns = 3 if width >= 6 else 2
+    n_rows = math.ceil((len(paths) + 1) / n_columns)
+    x_range, y_range = _extent(arena)
+    gap, text_height = 0.2, 0.36
+    panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
+    panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
+    figure = new_figure(width, n_rows * (panel_height + text_height))
+    for index in range(len(paths) + 1):
+        row, column = divmod(index, n_columns)
+        x = 0.02 + column * (panel_width + gap)
+        axes = place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
+        if index < len(paths):
+            _draw_arena(axes, arena, x_range, y_range)
+            _draw_path(axes, paths[index], arena, body)
+            _write_below(axes, paths[index], arena, label)
+        else:
+            _draw_legend(axes, paths, small=width < 6)
+    return figure
+
+
+def _extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
+    walls = np.array(arena.walls)
+    margin = 0.012
+    xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
+    return (xs.min() - margin, xs.max() + margin), (ys.min() - margin, ys.max() + margin)
+
+
+def _draw_arena(
+    axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: tuple[float, float]
+) -> None:
+    axes.set_axis_off()
+    axes.set_xlim(*x_range)
+    axes.set_ylim(*y_range)
+    grid = arena.grid
+    right, top = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
+    lines: list[float] = []
+    ends: list[float] = []
+    for column in range(1, grid.columns):
+        x = grid.x + column * grid.cell
+        lines += [x, x, math.nan]
+        ends += [grid.y, top, math.nan]
+    for row in range(1, grid.rows):
+        y = grid.y + row * grid.cell
+        lines += [grid.x, right, math.nan]
+        ends += [y, y, math.nan]
+    axes.plot(lines, ends, color=Ink.RULE, linewidth=0.4, zorder=1)
+    axes.plot(
+        [grid.x, right, right, grid.x, grid.x], [grid.y, grid.y, top, top, grid.y],
+        color=Ink.REACH, linewidth=0.9, zorder=2,
+    )  # fmt: skip
+    for x1, y1, x2, y2 in arena.walls:
+        axes.plot([x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3)
+
+
+def _draw_path(axes: Axes, path: _Path, arena: Arena, body: Body) -> None:
+    from matplotlib.patches import Rectangle
+
+    grid = arena.grid
+    for cell in path.cells:
+        row, column = divmod(cell, grid.columns)
+        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
+        axes.add_patch(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+    outline = _outline(body, arena.start)
+    axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
+    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
+    if path.poses is None or path.stalled is None:
+        return
+    axes.plot(path.poses[:, 0], path.poses[:, 1], color=Ink.OURS, linewidth=1.3, solid_joinstyle="round", zorder=5)
+    blocked = np.unique(np.round(path.poses[path.stalled, :2], 6), axis=0)
+    if len(blocked):
+        axes.plot(blocked[:, 0], blocked[:, 1], "x", color=Ink.REACH, markersize=4.0, markeredgewidth=1.1, zorder=6)
+    axes.plot(
+        path.poses[-1:, 0], path.poses[-1:, 1], "o", color=Ink.OURS, markerfacecolor=Ink.GROUND, markersize=4.4,
+        markeredgewidth=1.2, zorder=6,
+    )  # fmt: skip
+
+
+def _outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
+    """(b + 1, 2) the body's corners at a pose [m], closed."""
+    corners = np.array([*body.corners, body.corners[0]])
+    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
+    turn = np.array([[cosine, sine], [-sine, cosine]])
+    return np.array([pose.x, pose.y]) + corners @ turn
+
+
+def _write_below(axes: Axes, path: _Path, arena: Arena, label: str) -> None:
+    n_cells = arena.grid.n_cells
+    figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
+    axes.annotate(
+        f"generation {path.generation}", (0, 0), (1, -4), xycoords="axes fraction", textcoords="offset points",
+        ha="left", va="top", fontsize=8.0, weight="bold",
+    )  # fmt: skip
+    width = float(axes.get_position().width * axes.figure.get_figure(root=True).get_size_inches()[0])
+    if width > 2.5:
+        figure_text = f"{shorten(label, 12)}, coverage {figure_text}"
+    else:
+        figure_text = f"{path.coverage:.3f} {shorten(label, 12)}"
+    axes.annotate(
+        figure_text, (1, 0), (-1, -4), xycoords="axes fraction", textcoords="offset points",
+        ha="right", va="top", fontsize=8.0, color=Ink.MUTED,
+    )  # fmt: skip
+
+
+def _draw_legend(axes: Axes, paths: list[_Path], *, small: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    axes.set_axis_off()
+    handles: list[Any] = [
+        Line2D([], [], color=Ink.BODY, marker="s", markerfacecolor="none", linestyle="", markersize=7, label="robot at the start"),
+        Line2D([], [], color=Ink.TEXT, marker="o", linestyle="", markersize=3.4, label="start"),
+    ]
+    if any(path.poses is not None for path in paths):
+        handles += [
+            Line2D([], [], color=Ink.OURS, linewidth=1.3, label="path of its center"),
+            Line2D([], [], color=Ink.OURS, marker="o", markerfacecolor=Ink.GROUND, linestyle="", markersize=4.4,
+                   markeredgewidth=1.2, label="end"),
+            Line2D([], [], color=Ink.REACH, marker="x", linestyle="", markersize=4.0, markeredgewidth=1.1,
+                   label="blocked here"),
+        ]  # fmt: skip
+    handles += [
+        Patch(facecolor=Ink.VISITED, label="cell visited"),
+        Line2D([], [], color=Ink.REACH, linewidth=0.9, label="reachable cells"),
+        Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="wall"),
+    ]
+    axes.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1 if small else 2, frameon=False,
+        fontsize=7.0 if small else 8.0, handlelength=1.4, borderaxespad=0.0, labelspacing=0.25 if small else 0.8,
+    )  # fmt: skip
+
+
+# --- words ----------------------------------------------------------------------------------------------------
+
+
+def _caption(
+    tally: Tally,
+    condition: Mapping[str, Any],
+    replicate: int,
+    paths: list[_Path],
+    *,
+    typical: bool,
+    problem: str,
+) -> str:
+    name = condition["name"]
+    bests = tally.run_bests(name, tally.measure)
+    best = bests[list(tally.replicates(name)).index(replicate)]
+    counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
+    n_generations = tally.generation_bests(name, tally.measure).shape[1]
+    which = "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
+    why = (
+        f"It is the typical run and not a picked one: its best coverage, {best:.3f}, is the median of the "
+        f"{len(bests)} runs (the lower middle one, the first of several alike)."
+        if typical
+        else f"The run was chosen by number; its best coverage is {best:.3f}."
+    )
+    parts = [
+        f"Condition {name}, run {replicate}: the individual of highest coverage in {which}, coverage counted {counted}. "
+        f"{label_of(condition)}, n = 1 run, no interval.",
+        why if len(bests) > 1 else "It is the only run.",
+    ]
+    if problem:
+        parts.append(f"Some paths are missing: the trials could not be recomputed. {problem}")
+    else:
+        parts.append("The paths were recomputed from the records and visit the cells recorded.")
+    return " ".join(parts)

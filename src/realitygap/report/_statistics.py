@@ -1,0 +1,136 @@
+"""Quartiles, and the median with an interval that holds for any distribution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+CONFIDENCE = 0.95
+"""The least that an interval of ours covers, unless it says otherwise."""
+
+SMALLEST_N = 6
+"""Fewer values cannot give an interval of 95 %: the range of five covers the median with 1 - 2 / 2^5 = 93.75 %."""
+
+
+@dataclass(frozen=True)
+class IntervalRanks:
+    """Which of n ordered values bound the interval of the median.
+
+    Attributes:
+        lower: rank of the lower bound, counted from 1.
+        upper: rank of the upper bound, n + 1 - lower.
+        coverage: how often such an interval contains the median of a continuous distribution [0..1]; of a
+            discrete one, at least that often.
+    """
+
+    lower: int
+    upper: int
+    coverage: float
+
+
+@dataclass(frozen=True)
+class MedianInterval:
+    """Two observed values between which the median of the population lies.
+
+    Attributes:
+        low: lower bound, included, in the unit of the values.
+        high: upper bound, included.
+        coverage: as in `IntervalRanks`; never less than was asked for.
+    """
+
+    low: float
+    high: float
+    coverage: float
+
+
+@dataclass(frozen=True)
+class Quartiles:
+    """What splits ordered values into four equal parts, in the unit of the values."""
+
+    q25: float
+    median: float
+    q75: float
+
+
+def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | None:
+    """The innermost pair of symmetric ranks whose interval covers the median with at least `confidence`.
+
+    The number of n independent values below the median is Binomial(n, 1/2), so the interval between the
+    values of rank r and n + 1 - r misses it with probability 2 P(X <= r - 1), exactly.
+
+    Args:
+        n: how many values, >= 0.
+        confidence: between 0 and 1.
+
+    Returns:
+        The ranks, or None where n is too small: not even the range covers the median so often.
+
+    Raises:
+        ValueError: n is negative, or `confidence` not between 0 and 1.
+
+    Source: David & Nagaraja (2003), Order Statistics, 3rd edition, section 7.1; for discrete distributions
+    Scheffé & Tukey (1945), Annals of Mathematical Statistics 16(2).
+    """
+    if n < 0:
+        raise ValueError(f"n is {n}, expected 0 or more.")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence is {confidence}, expected a number between 0 and 1.")
+    if n == 0:
+        return None
+    # the smallest k with P(X <= k) >= half of what may be missed: the largest rank that may be the bound
+    lower = int(stats.binom.ppf((1.0 - confidence) / 2.0, n, 0.5))
+    if lower < 1:
+        return None
+    return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(stats.binom.cdf(lower - 1, n, 0.5)))
+
+
+def median_interval(
+    values: npt.NDArray[np.float64], confidence: float = CONFIDENCE
+) -> MedianInterval | None:
+    """The order-statistic interval of the median: no distribution is assumed and nothing is resampled.
+
+    Args:
+        values: (n,) independent observations in any order and unit, all finite.
+        confidence: what the interval shall cover at least, between 0 and 1.
+
+    Returns:
+        The interval with what it covers in truth, or None where n is too small (below 6 for 95 %).
+
+    Raises:
+        ValueError: `values` is not one row of finite numbers, or `confidence` is not between 0 and 1.
+
+    Source: as `interval_ranks`.
+    """
+    ordered = np.sort(_checked(values))
+    ranks = interval_ranks(len(ordered), confidence)
+    if ranks is None:
+        return None
+    return MedianInterval(float(ordered[ranks.lower - 1]), float(ordered[ranks.upper - 1]), ranks.coverage)
+
+
+def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:
+    """Lower quartile, median and upper quartile, with straight lines between ordered values.
+
+    Args:
+        values: (n,) in any order and unit, n >= 1, all finite.
+
+    Raises:
+        ValueError: `values` is empty, not one row, or not finite.
+
+    Source: Hyndman & Fan (1996), The American Statistician 50(4), definition 7.
+    """
+    if len(_checked(values)) == 0:
+        raise ValueError("values is empty, expected at least one.")
+    q25, median, q75 = np.quantile(values, [0.25, 0.5, 0.75])
+    return Quartiles(float(q25), float(median), float(q75))
+
+
+def _checked(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    if values.ndim != 1:
+        raise ValueError(f"values has shape {values.shape}, expected (n,).")
+    if not np.isfinite(values).all():
+        raise ValueError("values holds a number that is not finite.")
+    return values

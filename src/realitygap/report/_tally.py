@@ -1,0 +1,130 @@
+"""What tables and figures need of all rows, taken in one pass over the chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.errors import RecordError, did_you_mean
+from realitygap.records import ResultsFolder
+
+Measure = Literal["line", "ends"]
+"""How cells are counted: those that the line driven crosses, or those in which steps end."""
+
+_COLUMNS = ["condition", "replicate", "generation", "coverage_line", "coverage_ends"]
+_BEST = {
+    "condition": pl.String(),
+    "replicate": pl.UInt32(),
+    "generation": pl.UInt32(),
+    "trials": pl.UInt32(),
+    "line": pl.Float64(),
+    "ends": pl.Float64(),
+}
+
+
+@dataclass(frozen=True)
+class Tally:
+    """A study's description and the best of each of its generations.
+
+    Attributes:
+        folder: where it was read.
+        description: the study as resolved.
+        best: one row per condition, replicate and generation, in key order: `trials`, how many individuals;
+            `line` and `ends`, the highest coverage among them [0..1].
+    """
+
+    folder: ResultsFolder
+    description: Mapping[str, Any]
+    best: pl.DataFrame
+
+    @property
+    def conditions(self) -> list[Mapping[str, Any]]:
+        """The conditions as the description has them."""
+        return list(self.description["conditions"])
+
+    def condition(self, name: str) -> Mapping[str, Any]:
+        """One condition by name.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        names = [condition["name"] for condition in self.conditions]
+        if name not in names:
+            raise ValueError(f"Unknown condition {name!r}. {did_you_mean(name, names)}")
+        return self.conditions[names.index(name)]
+
+    @cached_property
+    def runs(self) -> pl.DataFrame:
+        """One row per condition and replicate, in key order: `line` and `ends`, the best of the whole run."""
+        return self.best.group_by("condition", "replicate", maintain_order=True).agg(
+            pl.col("line", "ends").max()
+        )
+
+    @cached_property
+    def measure(self) -> Measure:
+        """What figures show: coverage by step ends where every condition selects by it, else along the line."""
+        cells = [settings_of(condition).get("task", {}).get("cells") for condition in self.conditions]
+        return "ends" if set(cells) == {"ends"} else "line"
+
+    def run_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
+        """(n,) best coverage of each run of a condition, in the order of replicates [0..1]."""
+        return self.runs.filter(pl.col("condition") == condition)[measure].to_numpy()
+
+    def replicates(self, condition: str) -> npt.NDArray[np.uint32]:
+        """(n,) which replicates of a condition there are, in order."""
+        return self.runs.filter(pl.col("condition") == condition)["replicate"].to_numpy()
+
+    def generation_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
+        """(n, g) best coverage in each generation of each run [0..1]; NaN after a run's last generation."""
+        rows = self.best.filter(pl.col("condition") == condition)
+        if rows.is_empty():
+            return np.empty((0, 0))
+        run = rows["replicate"].rle_id().to_numpy()
+        generation = rows["generation"].to_numpy()
+        values = np.full((run[-1] + 1, generation.max() + 1), np.nan)
+        values[run, generation] = rows[measure].to_numpy()
+        return values
+
+    def n_trials(self, condition: str | None = None) -> int:
+        """How many individuals were tried, in one condition or in all."""
+        rows = self.best if condition is None else self.best.filter(pl.col("condition") == condition)
+        return int(rows["trials"].sum())
+
+
+def read_tally(folder: ResultsFolder | str | Path) -> Tally:
+    """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    parts = [
+        frame.group_by("condition", "replicate", "generation", maintain_order=True).agg(
+            pl.len().alias("trials"),
+            pl.col("coverage_line").max().alias("line"),
+            pl.col("coverage_ends").max().alias("ends"),
+        )
+        for frame in folder.frames(columns=_COLUMNS)
+    ]
+    best = pl.concat(parts) if parts else pl.DataFrame(schema=_BEST)
+    if best.is_empty():
+        raise RecordError(f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.")
+    return Tally(folder, folder.description, best)
+
+
+def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The resolved settings of a condition; empty where the description has none."""
+    settings = condition.get("settings")
+    return settings if isinstance(settings, dict) else {}
+
+
+def label_of(condition: Mapping[str, Any]) -> str:
+    """What stands on every figure for where the numbers come from: SIM, TWIN, EMULATED or REAL."""
+    return str(condition.get("label") or "unlabeled")

@@ -1,0 +1,106 @@
+"""One condition of a study, as resolved: everything that decides what a run of it does."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from realitygap.evolution import NeatSettings, NoveltySettings, random_key
+from realitygap.kernels._genome import NeatRules
+from realitygap.robots import JyroPlatform
+from realitygap.tasks import CoverageTask
+from realitygap.world import ArenaSettings, is_inside
+
+# A condition's name is part of file names.
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+
+Selection = Literal["coverage", "novelty", "random"]
+
+
+class Condition(BaseModel):
+    """One cell of a study's design.
+
+    Its runs are a function of these values and the number of the replicate alone.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    name: str = Field(
+        pattern=NAME_PATTERN, max_length=80, description="Letters, digits, dot, dash and underscore."
+    )
+    selection: Selection = Field(
+        "coverage",
+        description="What decides who has children: coverage (the paper's objective NEAT), novelty, or nothing: "
+        "random tries as many unrelated networks, the control that the paper lacks.",
+    )
+    platform: Literal["jyro"] = Field("jyro", description="What the networks are tried on.")
+    noise: float = Field(
+        0.1, ge=0, le=10, description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
+        "(section 2.3: 0.1, 0.5, 0.8)."
+    )
+    seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
+    pair: bool = Field(
+        True, description="Whether the conditions of a study draw the same random numbers, which narrows the "
+        "difference between them."
+    )
+    arena: ArenaSettings = ArenaSettings()
+    task: CoverageTask = CoverageTask()
+    neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
+    novelty: NoveltySettings = NoveltySettings()
+    jyro: JyroPlatform = JyroPlatform()
+
+    @model_validator(mode="after")
+    def _robot_fits_at_start(self) -> Self:
+        pose, arena = self.arena.pose(), self.arena.arena()
+        sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
+        for forward, left in self.jyro.body.corners:
+            x = pose.x + forward * cosine - left * sine
+            y = pose.y + forward * sine + left * cosine
+            if not is_inside(arena, x, y):
+                raise ValueError(
+                    f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
+                    f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
+                )
+        return self
+
+    @property
+    def label(self) -> str:
+        """What every figure of this condition says: SIM."""
+        return self.jyro.label
+
+    @property
+    def key(self) -> int:
+        """The key of its random numbers."""
+        return random_key(self.seed, None if self.pair else self.name)
+
+    @property
+    def has_bias_input(self) -> bool:
+        """Whether its networks have the constant input."""
+        return self.task.has_bias_input(self.selection)
+
+    @property
+    def neat_rules(self) -> NeatRules:
+        """Its NEAT in the form that kernels read: inputs largest reading, stall, time and, where it has one, 1."""
+        bias = self.has_bias_input
+        return self.neat.rules(3 + bias, 2, bias_input=3 if bias else -1)
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
+        return self.model_dump(mode="json", exclude={"name"})
+
+    def hash(self) -> str:
+        """A hash of `settings` and, where random numbers depend on it, the name."""
+        counted: dict[str, Any] = self.settings()
+        if not self.pair:
+            counted["name"] = self.name
+        text = json.dumps(counted, sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @classmethod
+    def from_settings(cls, name: str, settings: dict[str, Any]) -> Condition:
+        """The condition that `settings` described."""
+        return cls.model_validate({"name": name, **settings})

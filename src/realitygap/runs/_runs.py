@@ -1,0 +1,166 @@
+"""Many runs of one condition, in one call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from realitygap.evolution import largest_cell_distance
+from realitygap.kernels import _run
+from realitygap.kernels._run import RunRows, RunRules
+from realitygap.records import SCHEMA, list_column
+from realitygap.trials import jyro_rules, jyro_scene
+
+from ._condition import Condition
+
+# Room for genes beyond the first ones; doubled and run again where it was not enough.
+FIRST_ROOM = 16
+FIRST_HIDDEN_ROOM = 4
+
+
+def run_rules(condition: Condition) -> RunRules:
+    """What its runs select for, in the form that kernels read."""
+    arena = condition.arena.arena()
+    novelty = condition.novelty
+    selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[condition.selection]
+    if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
+        selection = _run.NEAREST_NOVELTY
+    return RunRules(
+        n_generations=condition.neat.generations,
+        population=condition.neat.population,
+        selection=selection,
+        count_ends=condition.task.cells == "ends",
+        archive_size=novelty.archive_size,
+        above_all=novelty.enter == "above-all",
+        by_column=novelty.sort == "x-then-y",
+        padding=largest_cell_distance(arena.grid.columns, arena.grid.rows),
+        neighbors=novelty.neighbors,
+        archive_threshold=float(novelty.threshold),
+        archive_patience=novelty.patience,
+    )
+
+
+def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidden_room: int) -> RunRows:
+    shape = (n_runs, condition.neat.generations, condition.neat.population)
+
+    def zeros(dtype: Any, *more: int) -> NDArray[Any]:
+        return np.zeros((*shape, *more), dtype)
+
+    return RunRows(
+        fitness=zeros(np.float64),
+        novelty=zeros(np.float64),
+        counts=zeros(np.int32, 3),
+        cells=zeros(np.uint8, n_cells),
+        species=zeros(np.int32),
+        parents=zeros(np.int32, 2),
+        n_connections=zeros(np.int32),
+        n_hidden=zeros(np.int32),
+        innovation=zeros(np.int32, room),
+        source=zeros(np.int32, room),
+        target=zeros(np.int32, room),
+        weight=zeros(np.float64, room),
+        enabled=zeros(np.bool_, room),
+        hidden=zeros(np.int32, hidden_room),
+        bias=zeros(np.float64, 2 + hidden_room),
+    )
+
+
+def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows:
+    """Carry out `n_runs` runs of a condition; see `run_replicates` for them as a frame.
+
+    Args:
+        condition: As resolved.
+        first_replicate: Number of the first run.
+        n_runs: How many.
+
+    Returns:
+        Arrays (n_runs, generations, individuals, ...).
+    """
+    arena = condition.arena.arena()
+    scene = jyro_scene(condition.jyro, arena)
+    neat = condition.neat_rules
+    trial = jyro_rules(
+        condition.jyro,
+        noise=condition.noise,
+        bias_input=condition.has_bias_input,
+        bias_value=condition.neat.bias_value,
+    )
+    rules = run_rules(condition)
+    room = neat.n_inputs * neat.n_outputs + FIRST_ROOM
+    hidden_room = FIRST_HIDDEN_ROOM
+    while True:
+        rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
+        if _run.run_replicates(scene, trial, neat, rules, np.uint64(condition.key), first_replicate, rows):
+            return rows
+        room, hidden_room = 2 * room, 2 * hidden_room
+
+
+def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
+    """Carry out `n_runs` runs of a condition.
+
+    Args:
+        condition: As resolved.
+        first_replicate: Number of the first run.
+        n_runs: How many, >= 1.
+
+    Returns:
+        One row an individual tried, with the columns of the records, sorted by replicate, generation and
+        individual. The rows of a replicate do not depend on which others are asked for.
+    """
+    return frame_of(condition, first_replicate, run_rows(condition, first_replicate, n_runs))
+
+
+def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.DataFrame:
+    """The rows of runs as a frame with the columns of the records."""
+    n_runs, n_generations, n = rows.fitness.shape
+    total = n_runs * n_generations * n
+    n_cells = condition.arena.arena().grid.n_cells
+
+    def flat(array: NDArray[Any]) -> NDArray[Any]:
+        return array.reshape(total, *array.shape[3:])
+
+    counts = flat(rows.counts)
+    n_connections = flat(rows.n_connections)
+    n_hidden = flat(rows.n_hidden)
+    enabled = flat(rows.enabled)
+    parents = flat(rows.parents)
+    run, generation, individual = np.unravel_index(np.arange(total), (n_runs, n_generations, n))
+    used = np.arange(enabled.shape[1]) < n_connections[:, None]
+    rules = condition.neat_rules
+    n_biases = rules.n_outputs + n_hidden if rules.node_bias else np.zeros_like(n_hidden)
+    genome = pl.DataFrame(
+        {
+            "hidden": list_column(flat(rows.hidden), n_hidden),
+            "biases": list_column(flat(rows.bias), n_biases),
+            "innovation": list_column(flat(rows.innovation), n_connections),
+            "source": list_column(flat(rows.source), n_connections),
+            "target": list_column(flat(rows.target), n_connections),
+            "weight": list_column(flat(rows.weight), n_connections),
+            "enabled": list_column(enabled, n_connections),
+        }
+    ).to_struct("genome")
+    novelty = pl.Series("novelty", flat(rows.novelty)).fill_nan(None)
+    return pl.DataFrame(
+        {
+            "condition": pl.repeat(condition.name, total, dtype=pl.String, eager=True),
+            "replicate": (first_replicate + run).astype(np.uint32),
+            "generation": generation.astype(np.uint32),
+            "individual": individual.astype(np.uint32),
+            "species": flat(rows.species).astype(np.uint32),
+            "parents": list_column(parents.clip(min=0).astype(np.uint32), (parents >= 0).sum(axis=1)),
+            "fitness": flat(rows.fitness),
+            "novelty": novelty,
+            "coverage_line": counts[:, 0] / n_cells,
+            "coverage_ends": counts[:, 1] / n_cells,
+            "cells": list_column(flat(rows.cells), counts[:, 0]),
+            "stalls": counts[:, 2].astype(np.uint32),
+            "nodes": (rules.n_inputs + rules.n_outputs + n_hidden).astype(np.uint32),
+            "connections": (enabled & used).sum(axis=1).astype(np.uint32),
+            "genome": genome,
+            "key": pl.repeat(condition.key, total, dtype=pl.UInt64, eager=True),
+        },
+        schema=SCHEMA,
+    )

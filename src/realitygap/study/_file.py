@@ -1,0 +1,201 @@
+"""Reading a study file (TOML)."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from realitygap.errors import StudyError, did_you_mean
+from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.robots import JyroPlatform
+from realitygap.runs import Condition
+from realitygap.tasks import CoverageTask
+from realitygap.world import ArenaSettings
+
+from ._problems import Problems
+from ._study import ConditionNotes, ReportSection, Study, StudySection
+
+DEFAULT_NEAT = "rosenzweig-remy"
+PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform}
+SECTIONS: dict[str, type[BaseModel]] = {
+    "arena": ArenaSettings,
+    "task": CoverageTask,
+    "neat": NeatSettings,
+    "novelty": NoveltySettings,
+    **PLATFORMS,
+}
+_OWN_KEYS = ("name", "selection", "platform", "noise")
+
+
+def named_studies() -> list[str]:
+    """Names of the studies that come with realitygap."""
+    folder = resources.files(__package__) / "studies"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_study(
+    study: str | Path, *, seed: int | None = None, replicates: int | None = None
+) -> Study:
+    """Read a study by name or from a file, and resolve every setting.
+
+    Args:
+        study: A name of `named_studies`, or a path of a TOML file.
+        seed: In place of the file's.
+        replicates: In place of the file's.
+
+    Raises:
+        StudyError: No such study, a file that cannot be read, or mistakes in it: all of them, each with its
+            place.
+    """
+    name = str(study)
+    if name in named_studies():
+        text = (resources.files(__package__) / "studies" / f"{name}.toml").read_text("utf-8")
+        return parse_study(text, name, seed=seed, replicates=replicates)
+    path = Path(study)
+    if not path.exists():
+        if path.suffix == ".toml" or len(path.parts) > 1:
+            raise StudyError(f"There is no file {path}. `realitygap new-study {path}` writes one to start from.")
+        raise StudyError(
+            f"Unknown study {name!r}. {did_you_mean(name, named_studies())} A file of your own ends in .toml; "
+            "`realitygap new-study` writes one."
+        )
+    try:
+        text = path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} cannot be read as a text file: {error}.") from error
+    return parse_study(text, str(path), seed=seed, replicates=replicates)
+
+
+def parse_study(
+    text: str, origin: str, *, seed: int | None = None, replicates: int | None = None
+) -> Study:
+    """Resolve a study from the text of its file; arguments and errors as in `load_study`.
+
+    Args:
+        text: TOML.
+        origin: What to call the file in messages.
+        seed, replicates: In place of the file's.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise StudyError(f"{origin} is not TOML: {error}.") from error
+    problems = Problems()
+    study = _resolve(data, problems, {"seed": seed, "replicates": replicates})
+    if problems.lines or study is None:
+        count = len(problems.lines)
+        head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
+        raise StudyError("\n  ".join([head, *problems.lines]))
+    return study
+
+
+def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) -> Study | None:
+    known = {"study", "report", "platform", "condition", "arena", "task", "neat", "novelty"}
+    for key in data:
+        if key not in known:
+            problems.add(key, f"unknown section. {did_you_mean(key, known)}")
+    if "study" not in data:
+        problems.add("study", "missing. Expected a section [study] with at least a name.")
+    about_values = problems.table("study", data.get("study", {}))
+    about_values |= {key: value for key, value in changes.items() if value is not None}
+    about = problems.check(StudySection, about_values, "study") if "study" in data else None
+    report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")
+    base = {section: problems.table(section, data.get(section, {})) for section in SECTIONS if section not in PLATFORMS}
+    platforms = problems.table("platform", data.get("platform", {}))
+    for key, value in platforms.items():
+        if key in PLATFORMS:
+            base[key] = problems.table(f"platform.{key}", value)
+        else:
+            problems.add(f"platform.{key}", f"unknown platform. {did_you_mean(key, PLATFORMS)}")
+    for section, values in base.items():
+        _check_section(section, values, _place(section), problems)
+    listed = data.get("condition", [])
+    if not isinstance(listed, list) or not listed:
+        problems.add("condition", "expected at least one [[condition]] (two brackets), with a name.")
+        listed = []
+    conditions: list[Condition] = []
+    notes: list[ConditionNotes] = []
+    names: list[str] = []
+    for index, value in enumerate(listed):
+        values = problems.table(f"condition[{index + 1}]", value)
+        name = values.get("name")
+        place = f"condition[{index + 1}]" + (f" {name!r}" if isinstance(name, str) else "")
+        if name in names:
+            problems.add(place, "this name is taken by an earlier condition; each needs its own.")
+        names.append(name if isinstance(name, str) else "")
+        condition, note = _condition(values, base, about, place, problems)
+        if condition is not None and note is not None:
+            conditions.append(condition)
+            notes.append(note)
+    for index, note in enumerate(notes):
+        if note.baseline is not None and note.baseline not in names:
+            place = f"condition {conditions[index].name!r}.baseline"
+            problems.add(place, f"there is no condition {note.baseline!r}. {did_you_mean(note.baseline, names)}")
+    if problems.lines or about is None or report is None:
+        return None
+    return Study(about=about, report=report, conditions=tuple(conditions), notes=tuple(notes))
+
+
+def _place(section: str) -> str:
+    return f"platform.{section}" if section in PLATFORMS else section
+
+
+def _neat_values(values: dict[str, Any], name: Any) -> dict[str, Any]:
+    """Settings of NEAT on top of the named set; an unknown name is left for the caller to find."""
+    if isinstance(name, str) and name in NAMED_SETTINGS:
+        return {**NAMED_SETTINGS[name], **values, "settings": name}
+    return {**NAMED_SETTINGS[DEFAULT_NEAT], **values}
+
+
+def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:
+    """Note the mistakes of one section alone, so that each is said where it was made."""
+    if section == "neat":
+        name = values.get("settings", DEFAULT_NEAT)
+        if name not in NAMED_SETTINGS:
+            problems.add(f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}")
+            values = {key: value for key, value in values.items() if key != "settings"}
+        values = _neat_values(values, name)
+    problems.check(SECTIONS[section], values, place)
+
+
+def _condition(
+    values: dict[str, Any],
+    base: dict[str, dict[str, Any]],
+    about: StudySection | None,
+    place: str,
+    problems: Problems,
+) -> tuple[Condition | None, ConditionNotes | None]:
+    before = len(problems.lines)
+    known = [*_OWN_KEYS, *ConditionNotes.model_fields, *SECTIONS]
+    for key in values:
+        if key not in known:
+            problems.add(f"{place}.{key}", f"unknown setting. {did_you_mean(key, known)}")
+    own = {key: values[key] for key in _OWN_KEYS if key in values}
+    if "name" not in own:
+        problems.add(f"{place}.name", "missing, and it has no default.")
+    note_values = {key: values[key] for key in ConditionNotes.model_fields if key in values}
+    notes = problems.check(ConditionNotes, note_values, place)
+    merged: dict[str, Any] = {}
+    for section in SECTIONS:
+        changed = problems.table(f"{place}.{section}", values.get(section, {}))
+        if changed:
+            _check_section(section, changed, f"{place}.{section}", problems)
+        both = {**base.get(section, {}), **changed}
+        merged[section] = _neat_values(both, both.get("settings", DEFAULT_NEAT)) if section == "neat" else both
+    if "name" in own:
+        problems.check(Condition, own, place)
+    if len(problems.lines) > before or about is None:
+        return None, notes
+    try:
+        condition = Condition.model_validate({**own, "seed": about.seed, "pair": about.pair, **merged})
+    except ValidationError as error:
+        if not problems.lines:  # else a section that is wrong for all conditions was noted already
+            for problem in error.errors():
+                problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
+        return None, notes
+    return condition, notes
+

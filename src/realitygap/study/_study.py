@@ -1,0 +1,91 @@
+"""A study: conditions x replicates, every choice by name."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from realitygap._version import __version__
+from realitygap.runs import NAME_PATTERN, Condition
+
+
+class StudySection(BaseModel):
+    """What the whole study shares."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: str = Field(
+        pattern=NAME_PATTERN, max_length=80, description="Letters, digits, dot, dash, underscore; names the folder."
+    )
+    title: str = Field("", max_length=200, description="What the report is headed with; the name when empty.")
+    seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
+    replicates: int = Field(
+        100, ge=1, le=4_000_000_000, description="Runs of each condition. More extend what is there."
+    )
+    pair: bool = Field(
+        True,
+        description="Conditions draw the same random numbers where that makes sense, which narrows the difference "
+        "between them; false draws them apart.",
+    )
+
+
+class ReportSection(BaseModel):
+    """How the report shows it; changes no result."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    points: Literal["best-of-generation", "best-so-far"] = Field(
+        "best-of-generation", description="What Figure 4 shows at each generation. The paper does not say."
+    )
+
+
+class ConditionNotes(BaseModel):
+    """What is said of a condition beside its settings; changes no result."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    published: list[Annotated[float, Field(ge=0, le=1)]] | None = Field(
+        None, description="Published values of the best coverage of a run, shown beside ours."
+    )
+    published_source: str | None = Field(None, max_length=200, description="Where they were published.")
+    baseline: str | None = Field(None, description="The condition that this one is compared with.")
+    change: str | None = Field(None, max_length=200, description="How it differs from that, in a few words.")
+
+
+class Study(BaseModel):
+    """A study as resolved: nothing is left to a default."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    about: StudySection
+    report: ReportSection
+    conditions: tuple[Condition, ...]
+    notes: tuple[ConditionNotes, ...]
+
+    @property
+    def n_runs(self) -> int:
+        """Runs in all."""
+        return len(self.conditions) * self.about.replicates
+
+    def description(self) -> dict[str, Any]:
+        """The study as the folder of results keeps it (`study.json`)."""
+        return {
+            "name": self.about.name,
+            "title": self.about.title or self.about.name,
+            "software": __version__,
+            "seed": self.about.seed,
+            "pair": self.about.pair,
+            "replicates": self.about.replicates,
+            "report": self.report.model_dump(mode="json"),
+            "conditions": [
+                {
+                    "name": condition.name,
+                    "label": condition.label,
+                    "hash": condition.hash(),
+                    **notes.model_dump(mode="json"),
+                    "settings": condition.settings(),
+                }
+                for condition, notes in zip(self.conditions, self.notes, strict=True)
+            ],
+        }

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+import pytest
+
+from realitygap.records import COLUMNS, SCHEMA, column_table, list_column
+from realitygap.records._columns import check_rows
+from tests.records.rows import make_rows
+
+
+def test_table_describes_every_column_and_every_field_of_the_genome():
+    table = column_table()
+    names = [name for name, _, _ in table]
+    fields = [f"{column.name}.{field.name}" for column in COLUMNS for field in column.fields]
+    assert [name for name in names if "." not in name] == list(SCHEMA)
+    assert [name for name in names if "." in name] == fields
+    assert len(set(names)) == len(names)
+    assert all(description.endswith(".") for _, _, description in table)
+    assert {name: kind for name, kind, _ in table}["genome.weight"] == "List(Float64)"
+
+
+def test_list_column_cuts_padded_rows_to_their_lengths():
+    column = list_column(np.array([[1, 2], [3, 4], [5, 6]], dtype=np.uint8), np.array([2, 0, 1]))
+    assert column.dtype == pl.List(pl.UInt8)
+    assert column.to_list() == [[1, 2], [], [5]]
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (3, 0), (0, 0)])
+def test_list_column_keeps_the_type_when_there_are_no_values(shape):
+    column = list_column(np.zeros(shape, dtype=bool), np.zeros(shape[0], dtype=int))
+    assert column.dtype == pl.List(pl.Boolean)
+    assert column.to_list() == [[]] * shape[0]
+
+
+@pytest.mark.parametrize("lengths", [[3, 0], [-1, 0], [1]])
+def test_list_column_refuses_lengths_that_do_not_fit(lengths):
+    with pytest.raises(ValueError, match="length"):
+        list_column(np.zeros((2, 2)), np.array(lengths))
+
+
+def test_rows_that_fit_give_the_last_replicate():
+    assert check_rows(make_rows(first=4, n=3), "coverage", 4) == 6
+
+
+def test_replicates_may_differ_in_their_numbers_of_generations():
+    rows = pl.concat([make_rows(n=1, generations=3), make_rows(first=1, n=1, generations=1)])
+    assert check_rows(rows, "coverage", 0) == 1
+
+
+def test_columns_in_another_order_are_fit():
+    assert check_rows(make_rows().select(reversed(SCHEMA)), "coverage", 0) == 2
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda rows: rows.drop("key"), "no column 'key'"),
+        (lambda rows: rows.with_columns(extra=1), "unknown column 'extra'"),
+        (
+            lambda rows: rows.with_columns(pl.col("stalls").cast(pl.Int64)),
+            "'stalls' is Int64, expected UInt32",
+        ),
+        (lambda rows: rows.head(0), "no rows"),
+        (lambda rows: rows.with_columns(fitness=pl.lit(None, pl.Float64)), "'fitness' holds nulls"),
+        (
+            lambda rows: rows.with_columns(cells=pl.lit([1, None], pl.List(pl.UInt8))),
+            "'cells' holds nulls",
+        ),
+        (
+            lambda rows: rows.with_columns(
+                pl.col("genome").struct.with_fields(weight=pl.lit([None], pl.List(pl.Float64)))
+            ),
+            "'genome.weight' holds nulls",
+        ),
+        (lambda rows: rows.with_columns(condition=pl.lit("novelty")), "must be 'coverage', found"),
+        (lambda rows: rows.tail(-1), "expected .0, 0, 0."),
+        (lambda rows: rows.filter(pl.col("replicate") != 1), "no gap"),
+        (lambda rows: rows[[*range(5), *range(6, rows.height)]], "no gap"),
+        (lambda rows: rows[[1, 0, *range(2, rows.height)]], "expected .0, 0, 0."),
+        (lambda rows: rows.reverse(), "expected .0, 0, 0."),
+        (lambda rows: pl.concat([rows, rows]), "each number once"),
+        (lambda rows: rows.sort("individual", maintain_order=True), "sorted"),
+    ],
+)
+def test_rows_that_do_not_fit_are_refused(spoil, message):
+    with pytest.raises(ValueError, match=message):
+        check_rows(spoil(make_rows()), "coverage", 0)
+
+
+def test_what_is_not_a_frame_is_refused():
+    with pytest.raises(TypeError, match="dict"):
+        check_rows({}, "coverage", 0)

@@ -1,1 +1,72 @@
-"""Evolve robot controllers, measure the reality gap, shrink it."""
+"""Evolve robot controllers in simulation and on a real robot, measure the gap, shrink it.
+
+The names here are those that most people need; each is loaded when it is first used.
+
+    import realitygap
+
+    result = realitygap.run_study("paper", replicates=20)
+    print(realitygap.summarize(result.folder))
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ._version import __version__
+
+if TYPE_CHECKING:
+    from .evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
+    from .records import ResultsFolder
+    from .report import summarize, write_report
+    from .runs import Condition, replay
+    from .study import Study, load_study, run_study
+    from .trials import simulate_case
+    from .world import Case
+
+_HOME = {
+    "Case": "world",
+    "Condition": "runs",
+    "Genome": "evolution",
+    "NearestArchive": "evolution",
+    "NeatSettings": "evolution",
+    "PaperArchive": "evolution",
+    "Population": "evolution",
+    "ResultsFolder": "records",
+    "Study": "study",
+    "load_study": "study",
+    "replay": "runs",
+    "run_study": "study",
+    "simulate_case": "trials",
+    "summarize": "report",
+    "write_report": "report",
+}
+
+__all__ = [
+    "Case",
+    "Condition",
+    "Genome",
+    "NearestArchive",
+    "NeatSettings",
+    "PaperArchive",
+    "Population",
+    "ResultsFolder",
+    "Study",
+    "__version__",
+    "load_study",
+    "replay",
+    "run_study",
+    "simulate_case",
+    "summarize",
+    "write_report",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,6 +1,6 @@
 """NEAT and novelty search: settings, genomes, populations to ask and tell, archives."""
 
-from ._genome import ConnectionGene, Genome, Network, NodeGene, genome_from_record
+from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -24,6 +24,7 @@ __all__ = [
     "NoveltySettings",
     "PaperArchive",
     "Population",
+    "decode_all",
     "euclidean",
     "genome_from_record",
     "largest_cell_distance",

@@ -137,10 +137,7 @@ class Genome:
 
     def network(self) -> Network:
         """The network that this genome decodes to."""
-        genomes = self._genomes
-        networks = make_networks(1, self.rules, genomes.innovation.shape[1], genomes.hidden.shape[1])
-        decode(genomes, self._row, self.rules, networks, 0)
-        return Network(networks, 0, self.rules, self.bias_value)
+        return Network(decode_all([self]), 0, self.rules, self.bias_value)
 
     def to_dict(self) -> dict[str, Any]:
         """The genes as plain values: `nodes` and `connections`."""
@@ -158,6 +155,16 @@ class Genome:
 
     def __repr__(self) -> str:
         return f"Genome({len(self.nodes)} nodes, {self.n_enabled} of {len(self.connections)} connections enabled)"
+
+
+def decode_all(genomes: Sequence[Genome]) -> Networks:
+    """The networks of n genomes with the same inputs and outputs, as the kernels read them."""
+    room = max(genome._genomes.innovation.shape[1] for genome in genomes)
+    hidden_room = max(genome._genomes.hidden.shape[1] for genome in genomes)
+    networks: Networks = make_networks(len(genomes), genomes[0].rules, room, hidden_room)
+    for k, genome in enumerate(genomes):
+        decode(genome._genomes, genome._row, genome.rules, networks, k)
+    return networks
 
 
 def genome_from_record(

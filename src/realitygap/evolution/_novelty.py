@@ -32,7 +32,10 @@ class NoveltySettings(BaseModel):
         "(11,5), pairs that Python sorts by x first.",
     )
     archive_size: int = Field(
-        8, ge=1, le=100_000, description="paper: behaviors in the archive, which is filled first. Not printed."
+        8,
+        ge=1,
+        le=100_000,
+        description="paper: behaviors in the archive, which is filled first. Not printed.",
     )
     enter: Literal["above-all", "above-least"] = Field(
         "above-all",
@@ -40,9 +43,13 @@ class NoveltySettings(BaseModel):
         "the other behaviors in the archive'), or than the least novel.",
     )
     neighbors: int = Field(15, ge=1, le=100_000, description="lehman-stanley: k (2011: 15).")
-    threshold: float = Field(6.0, ge=0, description="lehman-stanley: novelty from which on a behavior enters at first.")
+    threshold: float = Field(
+        6.0, ge=0, description="lehman-stanley: novelty from which on a behavior enters at first."
+    )
     patience: int = Field(
-        2500, ge=1, description="lehman-stanley: evaluations without an entry after which the threshold falls by 5 %."
+        2500,
+        ge=1,
+        description="lehman-stanley: evaluations without an entry after which the threshold falls by 5 %.",
     )
 
 

@@ -57,7 +57,9 @@ class Population:
             ValueError: A count below 1.
         """
         if n_inputs < 1 or n_outputs < 1:
-            raise ValueError(f"n_inputs is {n_inputs} and n_outputs {n_outputs}, expected at least 1 of each.")
+            raise ValueError(
+                f"n_inputs is {n_inputs} and n_outputs {n_outputs}, expected at least 1 of each."
+            )
         self.settings = settings or NeatSettings.named("default")
         self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
         self._key = np.uint64(random_key(seed) if key is None else key)
@@ -118,7 +120,9 @@ class Population:
         told = np.ascontiguousarray(fitness, np.float64)
         n = len(self)
         if told.shape != (n,):
-            raise ValueError(f"fitness has shape {told.shape}, expected ({n},): one number for each genome asked.")
+            raise ValueError(
+                f"fitness has shape {told.shape}, expected ({n},): one number for each genome asked."
+            )
         if not np.isfinite(told).all():
             row = int(np.flatnonzero(~np.isfinite(told))[0])
             raise ValueError(f"fitness[{row}] is {told[row]}, expected a finite number.")
@@ -126,8 +130,8 @@ class Population:
         hidden_room = self._genomes.hidden.shape[1]
         while True:
             children = make_genomes(n, self._rules.n_outputs, room, hidden_room)
-            innovations = Innovations(*(array.copy() for array in self._innovations))
-            species = SpeciesTable(*(array.copy() for array in self._species))
+            innovations = Innovations._make(array.copy() for array in self._innovations)
+            species = SpeciesTable._make(array.copy() for array in self._species)
             species_of = self._species_of.copy()
             parents = self._parents.copy()
             next_generation(

@@ -37,7 +37,9 @@ class NeatSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     settings: str = Field("default", description="The named set that these settings began from.")
-    population: int = Field(150, ge=2, le=1_000_000, description="Individuals in each generation (EC02 4.1: 150).")
+    population: int = Field(
+        150, ge=2, le=1_000_000, description="Individuals in each generation (EC02 4.1: 150)."
+    )
     generations: int = Field(100, ge=1, le=1_000_000, description="Generations, the first one counted.")
 
     recurrent: bool = Field(
@@ -57,30 +59,44 @@ class NeatSettings(BaseModel):
         "neat-python. EC02 has a constant input instead.",
     )
     bias_value: float = Field(
-        1.0, description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5)."
+        1.0,
+        description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5).",
     )
 
     initial_weight: float = Field(
-        1.0, ge=0, le=100, description="First weights, and those of new links, are uniform within +- this (C++: 1)."
+        1.0,
+        ge=0,
+        le=100,
+        description="First weights, and those of new links, are uniform within +- this (C++: 1).",
     )
     mutate_weights: float = Field(
         0.8, ge=0, le=1, description="Share of children whose weights are mutated (EC02 4.1: 0.8)."
     )
     replace_weight: float = Field(
-        0.1, ge=0, le=1, description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others "
-        "are moved."
+        0.1,
+        ge=0,
+        le=1,
+        description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
     )
     weight_step: float = Field(
         2.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        2.5, ge=0, le=100, description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step)."
+        2.5,
+        ge=0,
+        le=100,
+        description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
     )
     weight_limit: float = Field(8.0, gt=0, le=1e6, description="Weights stay within +- this (C++: 8).")
 
-    add_node: float = Field(0.03, ge=0, le=1, description="Share of children that split a link (EC02 4.1: 0.03).")
+    add_node: float = Field(
+        0.03, ge=0, le=1, description="Share of children that split a link (EC02 4.1: 0.03)."
+    )
     add_link: float = Field(
-        0.05, ge=0, le=1, description="Share of children that add a link (EC02 4.1: 0.05; 0.3 in large populations)."
+        0.05,
+        ge=0,
+        le=1,
+        description="Share of children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
     )
     add_link_tries: int = Field(
         20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
@@ -90,20 +106,28 @@ class NeatSettings(BaseModel):
         description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, "
         "link and weights are drawn apart, as in neat-python.",
     )
-    split_bias_links: bool = Field(False, description="Whether links out of the constant input may be split (C++: no).")
+    split_bias_links: bool = Field(
+        False, description="Whether links out of the constant input may be split (C++: no)."
+    )
     reenable: float = Field(
         0.0, ge=0, le=1, description="Share of children whose oldest disabled gene is switched on (C++: 0)."
     )
 
     crossover: float = Field(
-        0.75, ge=0, le=1, description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone)."
+        0.75,
+        ge=0,
+        le=1,
+        description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone).",
     )
     crossover_only: float = Field(
         0.2, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
     )
     average_weights: float = Field(
-        0.0, ge=0, le=1, description="Share of crossovers in which matching weights are averaged, in place of one "
-        "being chosen (EC02: 0; C++ and JAIR04: 0.4)."
+        0.0,
+        ge=0,
+        le=1,
+        description="Share of crossovers in which matching weights are averaged, in place of one "
+        "being chosen (EC02: 0; C++ and JAIR04: 0.4).",
     )
     interspecies: float = Field(
         0.001, ge=0, le=1, description="Share of crossovers with another species (EC02 4.1: 0.001)."
@@ -114,7 +138,10 @@ class NeatSettings(BaseModel):
         "of the smaller genome (C++). A gene that would close a cycle is left out.",
     )
     stay_disabled: float = Field(
-        0.75, ge=0, le=1, description="Chance that a gene disabled in either parent is so in the child (EC02 4.1: 0.75)."
+        0.75,
+        ge=0,
+        le=1,
+        description="Chance that a gene disabled in either parent is so in the child (EC02 4.1: 0.75).",
     )
     disabled_rule: Literal["coin", "inherit"] = Field(
         "coin",
@@ -130,9 +157,12 @@ class NeatSettings(BaseModel):
         description="Whether excess and disjoint genes are divided by the larger genome's size: never (C++, JAIR04), "
         "from 20 genes on (EC02 3.3 allows 1 below), or always.",
     )
-    threshold: float = Field(3.0, gt=0, le=1e6, description="Distance below which genomes are compatible (EC02 4.1: 3).")
+    threshold: float = Field(
+        3.0, gt=0, le=1e6, description="Distance below which genomes are compatible (EC02 4.1: 3)."
+    )
     assign: Literal["first", "nearest"] = Field(
-        "first", description="A genome joins the first compatible species (EC02 3.3), or the nearest (neat-python)."
+        "first",
+        description="A genome joins the first compatible species (EC02 3.3), or the nearest (neat-python).",
     )
     representative: Literal["random", "champion"] = Field(
         "random",
@@ -140,36 +170,54 @@ class NeatSettings(BaseModel):
         "(C++).",
     )
     target_species: int = Field(
-        0, ge=0, le=1_000_000, description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10."
+        0,
+        ge=0,
+        le=1_000_000,
+        description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10.",
     )
     threshold_step: float = Field(
         0.3, ge=0, le=1e6, description="How far the threshold moves in a generation, never below 0.3 (C++)."
     )
 
     survival: float = Field(
-        0.2, ge=0, le=1, description="Share of a species that may become parents, floor(share * size + 1) of them "
-        "(EC02: not given; C++: 0.2)."
+        0.2,
+        ge=0,
+        le=1,
+        description="Share of a species that may become parents, floor(share * size + 1) of them "
+        "(EC02: not given; C++: 0.2).",
     )
     champion_from: int = Field(
-        6, ge=1, le=1_000_000, description="The champion is copied unchanged in species of this many (EC02 4.1: more "
-        "than five)."
+        6,
+        ge=1,
+        le=1_000_000,
+        description="The champion is copied unchanged in species of this many (EC02 4.1: more than five).",
     )
     champion_counts: Literal["members", "offspring"] = Field(
         "members", description="Many members (EC02), or many children to come (C++)."
     )
     stagnation: int = Field(
-        15, ge=1, le=1_000_000, description="Generations without a better best fitness after which a species is "
-        "stagnant (EC02 4.1: 15)."
+        15,
+        ge=1,
+        le=1_000_000,
+        description="Generations without a better best fitness after which a species is "
+        "stagnant (EC02 4.1: 15).",
     )
     stagnation_factor: float = Field(
-        0.01, ge=0, le=1, description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01)."
+        0.01,
+        ge=0,
+        le=1,
+        description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01).",
     )
     best_species_spared: bool = Field(
-        False, description="Whether the species with the fittest individual is never called stagnant (EC02: no)."
+        False,
+        description="Whether the species with the fittest individual is never called stagnant (EC02: no).",
     )
     population_stagnation: int = Field(
-        20, ge=1, le=2**31 - 1, description="After more generations than this without a better best fitness only the "
-        "two best species have children (EC02 3.3: 20)."
+        20,
+        ge=1,
+        le=2**31 - 1,
+        description="After more generations than this without a better best fitness only the "
+        "two best species have children (EC02 3.3: 20).",
     )
     negative_fitness: Literal["shift", "clip"] = Field(
         "shift",

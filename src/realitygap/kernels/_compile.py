@@ -16,7 +16,8 @@ from numba.core import caching
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-OPTIONS = {"nogil": True, "error_model": "numpy"}  # no fastmath: results must not depend on the machine
+# No fastmath: results must not depend on the machine. Nobody calls kernels from C.
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def _sources_hash() -> str:
@@ -71,13 +72,13 @@ class _ForgivingCache(caching.FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)
-        except Exception: # unpickling a torn file can raise anything
+        except Exception:  # unpickling a torn file can raise anything
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
             super().save_overload(sig, data)
-        except Exception: # a torn index is met here too; the kernel itself works
+        except Exception:  # a torn index is met here too; the kernel itself works
             self.flush()
 
 

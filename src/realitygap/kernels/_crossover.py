@@ -113,9 +113,9 @@ def crossover(old, a, b, fitness, rules, new, row, stream, cursor, reached):
             insert_hidden(new, row, target, 0.0)
     for node in range(rules.n_outputs + new.n_hidden[row]):
         if rules.node_bias:
-            identity = np.int64(rules.n_inputs + node)
+            identity = np.int32(rules.n_inputs + node)
             if node >= rules.n_outputs:
-                identity = np.int64(new.hidden[row, node - rules.n_outputs])
+                identity = new.hidden[row, node - rules.n_outputs]
             new.bias[row, node] = _mixed_bias(old, a, b, rules, identity, average, stream, cursor)
         else:
             new.bias[row, node] = 0.0

@@ -58,7 +58,7 @@ def sin_cos(angle: float) -> tuple[float, float]:
 
 @kernel
 def exp(x: float) -> float:
-    """e to the power x, |x| < 700, within 2 units in the last place."""
+    """E to the power x, |x| < 700, within 2 units in the last place."""
     k = math.floor(x * ONE_OVER_LN2 + 0.5)
     r = (x - k * LN2_HIGH) - k * LN2_LOW
     p = 1.0 / 479001600.0 + r / 6227020800.0

@@ -153,7 +153,9 @@ def add_link(genomes, row, rules, innovations, stream, cursor, reached):
         else:
             source = np.int32(k - n_hidden)
         k = next_below(stream, cursor, n_targets)
-        target = np.int32(rules.n_inputs + k) if k < rules.n_outputs else genomes.hidden[row, k - rules.n_outputs]
+        target = (
+            np.int32(rules.n_inputs + k) if k < rules.n_outputs else genomes.hidden[row, k - rules.n_outputs]
+        )
         if has_link(genomes, row, source, target):
             continue
         if (

@@ -73,7 +73,8 @@ def decode(genomes, row, rules, networks, to_row):
         source[gene] = _index_of(genomes, row, rules, genomes.source[row, gene])
         target[gene] = _index_of(genomes, row, rules, genomes.target[row, gene])
     placed = np.zeros(first_hidden + n_hidden, np.bool_)
-    placed[:rules.n_inputs] = True
+    for node in range(rules.n_inputs):
+        placed[node] = True
     n_placed = 0
     while n_placed < n_hidden:
         before = n_placed

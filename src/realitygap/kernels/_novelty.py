@@ -107,8 +107,9 @@ def paper_archive_step(points, n_points, padding, archive, n_archive, state, abo
     """
     size = n_archive.size
     n = novelty.size
-    place_of = np.full(n, -1, np.int64)
+    place_of = np.empty(n, np.int64)
     for row in range(n):
+        place_of[row] = -1
         if state[0] < size:
             _cells_to_archive(points, n_points, row, archive, n_archive, state[0])
             place_of[row] = state[0]
@@ -133,10 +134,14 @@ def paper_archive_step(points, n_points, padding, archive, n_archive, state, abo
         for i in range(size):
             among[i, i] = -1.0
             for j in range(i):
-                among[i, j] = sorted_cells_distance(archive[i], n_archive[i], archive[j], n_archive[j], padding)
+                among[i, j] = sorted_cells_distance(
+                    archive[i], n_archive[i], archive[j], n_archive[j], padding
+                )
                 among[j, i] = among[i, j]
         archive_novelty(among, size, archived)
-        bar = np.max(archived) if above_all else np.min(archived)
+        bar = archived[0]
+        for i in range(1, size):
+            bar = max(bar, archived[i]) if above_all else min(bar, archived[i])
         if novelty[row] > bar:
             _cells_to_archive(points, n_points, row, archive, n_archive, state[1])
             state[1] = (state[1] + 1) % size
@@ -199,7 +204,9 @@ def admit(novelty, counters, threshold, patience, entered):
 
 
 @kernel
-def nearest_archive_step(points, n_points, padding, k, patience, archive, n_archive, state, counters, threshold, novelty):
+def nearest_archive_step(
+    points, n_points, padding, k, patience, archive, n_archive, state, counters, threshold, novelty
+):
     """Novelty of one generation by nearest neighbors in population and archive, which then takes entries.
 
     Args:

@@ -25,7 +25,9 @@ def note_improvement(fitness, species_of, species, generation):
         if best > species.best[k]:
             species.best[k] = best
             species.improved[k] = generation
-    best = np.max(fitness)
+    best = -math.inf
+    for row in range(fitness.size):
+        best = max(best, fitness[row])
     if best > species.floats[BEST_EVER]:
         species.floats[BEST_EVER] = best
         species.improved_at[0] = generation
@@ -38,7 +40,9 @@ LOWEST_FITNESS = 0.0001
 @kernel
 def not_negative(fitness, rules, shared):
     """Write to `shared` the fitness that sharing can use: lifted by the lowest, or cut off below."""
-    lowest = min(np.min(fitness), 0.0)
+    lowest = 0.0
+    for row in range(fitness.size):
+        lowest = min(lowest, fitness[row])
     for row in range(fitness.size):
         if rules.clip_negative:
             shared[row] = fitness[row] if fitness[row] >= 0.0 else LOWEST_FITNESS
@@ -94,8 +98,9 @@ def share_offspring(fitness, species_of, species, rules, generation, offspring):
     n = fitness.size
     n_species = species.counts[N_SPECIES]
     share = np.zeros(n_species)
-    best_now = np.full(n_species, -math.inf)
+    best_now = np.empty(n_species)
     for k in range(n_species):
+        best_now[k] = -math.inf
         for row in range(n):
             if species_of[row] == species.identity[k]:
                 share[k] += fitness[row] / species.size[k]
@@ -109,7 +114,8 @@ def share_offspring(fitness, species_of, species, rules, generation, offspring):
         for k in range(n_species):
             if k != first and best_now[k] > best_now[second]:
                 second = k
-        share[:] = 0.0
+        for k in range(n_species):
+            share[k] = 0.0
         share[first] = 1.0
         share[second] = 1.0
     else:
@@ -160,7 +166,9 @@ def _other_champion(fitness, species_of, species, own, stream, cursor):
 
 
 @kernel
-def reproduce(old, fitness, species_of, species, rules, innovations, key, replicate, generation, new, parents):
+def reproduce(
+    old, fitness, species_of, species, rules, innovations, key, replicate, generation, new, parents
+):
     """Fill `new` with the next generation, whole; `old` stays as it is.
 
     Args:

@@ -115,18 +115,21 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
     archive_counters = np.zeros(2, np.int64)
     archive_threshold = np.empty(1)
     fitness = np.empty(n)
-    novelty = np.full(n, math.nan)
+    novelty = np.empty(n)
+    for row in range(n):
+        novelty[row] = math.nan
     species_of = np.zeros(n, np.int32)
     parents = np.empty((n, 2), np.int32)
     for run in range(rows.fitness.shape[0]):
         replicate = first_replicate + run
         innovations = make_innovations(neat, n)
         species = make_species(neat, n)
-        archive_state[:] = 0
-        archive_counters[:] = 0
+        archive_state[0] = archive_state[1] = 0
+        archive_counters[0] = archive_counters[1] = 0
         archive_threshold[0] = rules.archive_threshold
-        species_of[:] = 0
-        parents[:] = -1
+        for row in range(n):
+            species_of[row] = 0
+            parents[row, 0] = parents[row, 1] = -1
         first_genomes(genomes, neat, key, replicate, FIRST)
         if rules.selection != RANDOM:
             speciate(genomes, genomes, fitness, species_of, species, neat, key, replicate, FIRST)
@@ -148,7 +151,14 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
                     n_points[row] = counted
             if rules.selection == NOVELTY:
                 paper_archive_step(
-                    points, n_points, rules.padding, archive, n_archive, archive_state, rules.above_all, novelty
+                    points,
+                    n_points,
+                    rules.padding,
+                    archive,
+                    n_archive,
+                    archive_state,
+                    rules.above_all,
+                    novelty,
                 )
             elif rules.selection == NEAREST_NOVELTY:
                 nearest_archive_step(

@@ -87,7 +87,7 @@ def genome_distance(one, a, other, b, rules):
             matching += 1
             difference += abs(one.bias[a, k] - other.bias[b, k])
         for k in range(one.n_hidden[a]):
-            node = np.int64(one.hidden[a, k])
+            node = one.hidden[a, k]
             if has_node(other, b, rules, node):
                 matching += 1
                 difference += abs(one.bias[a, rules.n_outputs + k] - node_bias_of(other, b, rules, node))

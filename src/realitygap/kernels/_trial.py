@@ -24,7 +24,7 @@ from ._philox import FIRST, PURPOSE_NOISE, draw_words, make_stream, unit
 REACH_MARGIN = 1e-9
 
 
-class Scene(NamedTuple):
+class TrialScene(NamedTuple):
     """Where and with what body a trial takes place; lengths [m], angles [rad]."""
 
     walls: NDArray[np.float64]  # (w, 4) x1, y1, x2, y2
@@ -207,13 +207,15 @@ def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
         Cells along the line, cells at the ends of steps (the start counts for both), and blocked steps.
     """
     keep = trace.stalled.size > 0
+    for cell in range(work.visited.size):
+        work.visited[cell] = False
+        work.visited_ends[cell] = False
+    for node in range(work.values.size):
+        work.values[node] = 0.0
     x = scene.start[0]
     y = scene.start[1]
     heading = scene.start[2]
     sine, cosine = sin_cos(heading)
-    work.visited[:] = False
-    work.visited_ends[:] = False
-    work.values[:] = 0.0
     u = to_grid(x, scene.grid[0], scene.grid[2])
     v = to_grid(y, scene.grid[1], scene.grid[2])
     column = int(math.floor(u))
@@ -228,7 +230,8 @@ def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
         trace.poses[0, 1] = y
         trace.poses[0, 2] = heading
         trace.stalled[0] = False
-        trace.readings[0] = work.readings
+        for s in range(work.readings.size):
+            trace.readings[0, s] = work.readings[s]
     for step in range(rules.n_steps):
         work.values[0] = largest_noisy_reading(
             work.readings, scene.sensor_range, rules.noise, rules.clip, stream, step
@@ -266,19 +269,23 @@ def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
             )
             sense(scene, x, y, cosine, sine, work.readings)
         if keep:
-            trace.inputs[step] = work.values[: neat.n_inputs]
+            for k in range(neat.n_inputs):
+                trace.inputs[step, k] = work.values[k]
             trace.commands[step, 0] = move
             trace.commands[step, 1] = turn
             trace.poses[step + 1, 0] = x
             trace.poses[step + 1, 1] = y
             trace.poses[step + 1, 2] = heading
             trace.stalled[step + 1] = stalled
-            trace.readings[step + 1] = work.readings
+            for s in range(work.readings.size):
+                trace.readings[step + 1, s] = work.readings[s]
     return n_line, n_ends, n_stalls
 
 
 @kernel
-def run_trials(scene, rules, networks, neat, key, replicate, generation, first, repeat, work, order, counts, trace):
+def run_trials(
+    scene, rules, networks, neat, key, replicate, generation, first, repeat, work, order, counts, trace
+):
     """Try each of n networks once; network k draws the noise of individual `first` + k.
 
     Args:
@@ -289,7 +296,9 @@ def run_trials(scene, rules, networks, neat, key, replicate, generation, first, 
     """
     for row in range(counts.shape[0]):
         stream = make_stream(key, replicate, generation, first + row, repeat, PURPOSE_NOISE)
-        n_line, n_ends, n_stalls = run_trial(scene, rules, networks, row, neat, stream, work, order[row], trace)
+        n_line, n_ends, n_stalls = run_trial(
+            scene, rules, networks, row, neat, stream, work, order[row], trace
+        )
         counts[row, 0] = n_line
         counts[row, 1] = n_ends
         counts[row, 2] = n_stalls

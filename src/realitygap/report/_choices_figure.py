@@ -63,8 +63,8 @@ def compare_choices(folder: ResultsFolder | str | Path) -> list[list[Choice]]:
     """Every condition that names a baseline, beside it: one list per baseline.
 
     Returns:
-        For each baseline the baseline itself, then its variants from the largest increase of the median to the
-        largest decrease. Empty where no condition names a baseline.
+        For each baseline the baseline itself, then its variants from the largest increase of the median to
+        the largest decrease. Empty where no condition names a baseline.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -78,13 +78,17 @@ def compare_tally_choices(tally: Tally) -> list[list[Choice]]:
     groups: list[list[Choice]] = []
     for baseline in names:
         variants = [
-            condition for condition in tally.conditions if condition.get("baseline") == baseline != condition["name"]
+            condition
+            for condition in tally.conditions
+            if condition.get("baseline") == baseline != condition["name"]
         ]
         if not variants:
             continue
         reference = _choice(tally, tally.condition(baseline), baseline, math.nan)
         choices = [_choice(tally, condition, baseline, reference.median) for condition in variants]
-        choices.sort(key=lambda choice: (math.isnan(choice.effect), -choice.effect, names.index(choice.condition)))
+        choices.sort(
+            key=lambda choice: (math.isnan(choice.effect), -choice.effect, names.index(choice.condition))
+        )
         groups.append([reference, *choices])
     return groups
 
@@ -141,7 +145,7 @@ def draw_tally_choices(tally: Tally, *, width: float = WIDE, name: str = "choice
         return Drawing(to_svg(figure, name, _alt(groups)), caption, _alt(groups))
 
 
-# --- drawing --------------------------------------------------------------------------------------------------
+# --- drawing ------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -167,12 +171,15 @@ class _Layout:
         return self.width - (1.75 if self.is_wide else 0.62)
 
     def row_height(self, n_lines: int) -> float:
-        return 0.1 + 0.145 * n_lines + (0.0 if self.is_wide else 0.15)
+        return 0.1 + 0.145 * n_lines + (0.0 if self.is_wide else 0.19)
 
 
 def _draw(groups: list[list[Choice]], width: float) -> Figure:
     layout = _Layout(width)
-    texts = [[wrap(choice.change, layout.letters, 2 if layout.is_wide else 3) for choice in group] for group in groups]
+    texts = [
+        [wrap(choice.change, layout.letters, 2 if layout.is_wide else 3) for choice in group]
+        for group in groups
+    ]
     heights = [[layout.row_height(text.count("\n") + 1) for text in group] for group in texts]
     head, foot, legend = 0.42, 0.5, 0.3 if layout.is_wide else 0.52
     total = sum(head + sum(rows) + foot for rows in heights) + legend
@@ -192,7 +199,11 @@ def _range_of(groups: list[list[Choice]]) -> tuple[float, float]:
     """Ends of the common axis: whole twentieths around everything shown."""
     shown: list[float] = []
     for choice in (choice for group in groups for choice in group):
-        shown += [choice.median, *choice.published, *([choice.other_median] if choice.other_median is not None else [])]
+        shown += [
+            choice.median,
+            *choice.published,
+            *([choice.other_median] if choice.other_median is not None else []),
+        ]
         shown += [choice.interval.low, choice.interval.high] if choice.interval else []
     finite = [value for value in shown if math.isfinite(value)] or [0.0, 1.0]
     return max(0.0, math.floor(min(finite) * 20 - 0.2) / 20), min(1.0, math.ceil(max(finite) * 20 + 0.2) / 20)
@@ -214,14 +225,23 @@ def _draw_group(
     for index, (choice, text) in enumerate(zip(group, words, strict=True)):
         start, end = below[index], below[index + 1]
         y = (start + end) / 2 if layout.is_wide else end - 0.14
-        _draw_reference(axes, reference, start if layout.is_wide else end - 0.25, end)
+        _draw_reference(
+            axes, reference, start if layout.is_wide else end - 0.23, end - (0.0 if layout.is_wide else 0.04)
+        )
         _draw_choice(axes, choice, y, reference.median)
         is_reference = index == 0
         axes.annotate(
-            text, (0.0, y if layout.is_wide else start + 0.06), (x_words, 0.0), xycoords=("axes fraction", "data"),
-            textcoords="offset points", ha="left", va="center" if layout.is_wide else "top", fontsize=8.0,
-            weight="bold" if is_reference else "normal", linespacing=1.15,
-        )  # fmt: skip
+            text,
+            (0.0, y if layout.is_wide else start + 0.06),
+            (x_words, 0.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="left",
+            va="center" if layout.is_wide else "top",
+            fontsize=8.0,
+            weight="bold" if is_reference else "normal",
+            linespacing=1.15,
+        )
         _write_numbers(axes, choice, y, layout, is_reference=is_reference)
         if index:
             _draw_rule(axes, start, layout)
@@ -243,14 +263,28 @@ def _head(axes: Axes, group: list[Choice], x_words: float, layout: _Layout) -> N
     labels = ", ".join(sorted({choice.label for choice in group}))
     title = f"Changes to “{shorten(group[0].condition, 30)}”"
     axes.annotate(
-        title, (0.0, 1.0), (x_words, 9.0), xycoords="axes fraction", textcoords="offset points",
-        ha="left", va="bottom", fontsize=9.0, weight="bold",
-    )  # fmt: skip
+        title,
+        (0.0, 1.0),
+        (x_words, 9.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="left",
+        va="bottom",
+        fontsize=9.0,
+        weight="bold",
+    )
     right = (layout.width - layout.plot_right) * 72
     axes.annotate(
-        f"{labels}, {n}" + (" runs each" if layout.is_wide else ""), (1.0, 1.0), (right - 2, 9.0),
-        xycoords="axes fraction", textcoords="offset points", ha="right", va="bottom", fontsize=7.5, color=Ink.MUTED,
-    )  # fmt: skip
+        f"{labels}, {n}" + (" runs each" if layout.is_wide else ""),
+        (1.0, 1.0),
+        (right - 2, 9.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=7.5,
+        color=Ink.MUTED,
+    )
 
 
 def _draw_reference(axes: Axes, reference: Choice, start: float, end: float) -> None:
@@ -265,7 +299,9 @@ def _draw_reference(axes: Axes, reference: Choice, start: float, end: float) -> 
 def _draw_rule(axes: Axes, y: float, layout: _Layout) -> None:
     plot_width = layout.plot_right - layout.plot_left
     ends = [(0.02 - layout.plot_left) / plot_width, (layout.width - layout.plot_left) / plot_width]
-    axes.plot(ends, [y, y], transform=axes.get_yaxis_transform(), color=Ink.RULE, linewidth=0.4, clip_on=False)
+    axes.plot(
+        ends, [y, y], transform=axes.get_yaxis_transform(), color=Ink.RULE, linewidth=0.4, clip_on=False
+    )
 
 
 def _draw_choice(axes: Axes, choice: Choice, y: float, reference: float) -> None:
@@ -273,17 +309,34 @@ def _draw_choice(axes: Axes, choice: Choice, y: float, reference: float) -> None
         return
     axes.plot([reference, choice.median], [y, y], color=Ink.OURS, linewidth=0.8, linestyle=(0, (1.5, 1.5)))
     if choice.interval is not None:
-        axes.plot([choice.interval.low, choice.interval.high], [y, y], color=Ink.OURS, linewidth=2.2, solid_capstyle="butt")
+        axes.plot(
+            [choice.interval.low, choice.interval.high],
+            [y, y],
+            color=Ink.OURS,
+            linewidth=2.2,
+            solid_capstyle="butt",
+        )
     axes.plot([choice.median], [y], "o", color=Ink.OURS, markersize=5.2)
     if choice.other_median is not None:
         axes.plot(
-            [choice.other_median], [y], "s", color=Ink.OURS, markerfacecolor=Ink.GROUND, markersize=4.4, markeredgewidth=1.1
+            [choice.other_median],
+            [y],
+            "s",
+            color=Ink.OURS,
+            markerfacecolor=Ink.GROUND,
+            markersize=4.4,
+            markeredgewidth=1.1,
         )
     if choice.published:
         axes.plot(
-            choice.published, [y] * len(choice.published), "D", color=Ink.PUBLISHED, markerfacecolor=Ink.GROUND,
-            markersize=4.0, markeredgewidth=1.1,
-        )  # fmt: skip
+            choice.published,
+            [y] * len(choice.published),
+            "D",
+            color=Ink.PUBLISHED,
+            markerfacecolor=Ink.GROUND,
+            markersize=4.0,
+            markeredgewidth=1.1,
+        )
 
 
 def _write_numbers(axes: Axes, choice: Choice, y: float, layout: _Layout, *, is_reference: bool) -> None:
@@ -305,10 +358,17 @@ def _write_numbers(axes: Axes, choice: Choice, y: float, layout: _Layout, *, is_
         items = [(far - 2, middle, "normal")]
     for x, text, weight in items:
         axes.annotate(
-            text, (1.0, y), (x, 0.0), xycoords=("axes fraction", "data"), textcoords="offset points", ha="right",
-            va="center", fontsize=8.0 if weight == "bold" else 7.5, weight=weight,
+            text,
+            (1.0, y),
+            (x, 0.0),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=8.0 if weight == "bold" else 7.5,
+            weight=weight,
             color=Ink.TEXT if weight == "bold" else Ink.MUTED,
-        )  # fmt: skip
+        )
 
 
 def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout: _Layout) -> None:
@@ -316,7 +376,9 @@ def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout:
     from matplotlib.patches import Patch
 
     choices = [choice for group in groups for choice in group]
-    handles: list[Any] = [Line2D([], [], color=Ink.OURS, linewidth=0, marker="o", markersize=5.2, label="median")]
+    handles: list[Any] = [
+        Line2D([], [], color=Ink.OURS, linewidth=0, marker="o", markersize=5.2, label="median")
+    ]
     if any(choice.interval for choice in choices):
         handles += [
             Line2D([], [], color=Ink.OURS, linewidth=2.2, label="its 95 % interval"),
@@ -324,23 +386,48 @@ def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout:
         ]
     if any(choice.other_median is not None for choice in choices):
         handles.append(
-            Line2D([], [], color=Ink.OURS, markerfacecolor=Ink.GROUND, linewidth=0, marker="s", markersize=4.4,
-                   markeredgewidth=1.1, label="median as its selection counts")
-        )  # fmt: skip
+            Line2D(
+                [],
+                [],
+                color=Ink.OURS,
+                markerfacecolor=Ink.GROUND,
+                linewidth=0,
+                marker="s",
+                markersize=4.4,
+                markeredgewidth=1.1,
+                label="median as its selection counts",
+            )
+        )
     if any(choice.published for choice in choices):
         handles.append(
-            Line2D([], [], color=Ink.PUBLISHED, markerfacecolor=Ink.GROUND, linewidth=0, marker="D", markersize=4.0,
-                   markeredgewidth=1.1, label="the paper’s runs")
-        )  # fmt: skip
+            Line2D(
+                [],
+                [],
+                color=Ink.PUBLISHED,
+                markerfacecolor=Ink.GROUND,
+                linewidth=0,
+                marker="D",
+                markersize=4.0,
+                markeredgewidth=1.1,
+                label="the paper’s runs",
+            )
+        )
     height = float(figure.get_size_inches()[1])
     figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.02 / layout.width, 1.0 - top / height),
-        ncols=len(handles) if layout.is_wide else 2, frameon=False, fontsize=8.0 if layout.is_wide else 7.5,
-        borderaxespad=0.0, borderpad=0.0, handlelength=1.6, columnspacing=1.4 if layout.is_wide else 1.0,
-    )  # fmt: skip
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.02 / layout.width, 1.0 - top / height),
+        ncols=len(handles) if layout.is_wide else 2,
+        frameon=False,
+        fontsize=8.0 if layout.is_wide else 7.5,
+        borderaxespad=0.0,
+        borderpad=0.0,
+        handlelength=1.6,
+        columnspacing=1.4 if layout.is_wide else 1.0,
+    )
 
 
-# --- words ----------------------------------------------------------------------------------------------------
+# --- words --------------------------------------------------------------------------------------------------
 
 
 def _alt(groups: list[list[Choice]]) -> str:
@@ -349,7 +436,10 @@ def _alt(groups: list[list[Choice]]) -> str:
         effects = ", ".join(
             f"{choice.change} {choice.effect:+.3f}" for choice in group[1:] if not math.isnan(choice.effect)
         )
-        parts.append(f"Changes of the median best coverage from {group[0].condition} ({group[0].median:.3f}): {effects}.")
+        parts.append(
+            f"Changes of the median best coverage from {group[0].condition} ({group[0].median:.3f}): "
+            f"{effects}."
+        )
     return " ".join(parts)
 
 
@@ -360,8 +450,8 @@ def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
     counts = sorted({choice.n for choice in choices})
     n = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     parts = [
-        f"Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of the best "
-        f"coverage of a run, counted {counted}. {labels}, n = {n} runs for each condition.",
+        "Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of "
+        f"the best coverage of a run, counted {counted}. {labels}, n = {n} runs for each condition.",
         "Bar: its exact 95 % interval from order statistics. Band: the baseline’s. "
         if min(counts) >= SMALLEST_N
         else f"No interval below {SMALLEST_N} runs. ",
@@ -369,7 +459,7 @@ def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
     ]
     if any(choice.other_median is not None for choice in choices):
         parts.append("Square: the same runs with cells counted as the changed selection counts them.")
-    parts.append("Intervals of single medians, not tests of differences; with many rows some differ by chance.")
+    parts.append(
+        "Intervals of single medians, not tests of differences; with many rows some differ by chance."
+    )
     return " ".join(part.strip() for part in parts)
-
-

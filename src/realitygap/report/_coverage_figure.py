@@ -19,8 +19,8 @@ from realitygap.report._drawing import (
     house_style,
     new_figure,
     place_axes,
-    shorten,
     to_svg,
+    wrap,
 )
 from realitygap.report._statistics import SMALLEST_N, median_interval, quartiles
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
@@ -84,8 +84,8 @@ def draw_tally_coverage(
     panels = [_panel(tally, condition, points) for condition in tally.conditions]
     caption = _caption(tally, panels, points)
     alt = (
-        f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the median "
-        f"with its interval, and the best of the runs. Their numbers are in the table of results."
+        f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the "
+        "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
     with house_style():
         figure = _draw(panels, width)
@@ -101,7 +101,9 @@ def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> _Panel
     name = condition["name"]
     values = tally.generation_bests(name, tally.measure)
     if points == "best-so-far":
-        values = np.where(np.isnan(values), np.nan, np.fmax.accumulate(values, axis=1)) if values.size else values
+        values = (
+            np.where(np.isnan(values), np.nan, np.fmax.accumulate(values, axis=1)) if values.size else values
+        )
     return _Panel(
         title=name,
         note=f"{label_of(condition)}, n = {len(values)}",
@@ -121,7 +123,7 @@ def _count_drawable(values: npt.NDArray[np.float64]) -> int:
 
 
 def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]]:
-    """For each generation but the last: distinct (m, 2) values there and in the next, and (m,) how many runs."""
+    """For each generation but the last: distinct (m, 2) values there and in the next; (m,) how many runs."""
     found = []
     for left in range(values.shape[1] - 1):
         pairs = values[:, left : left + 2]
@@ -131,7 +133,7 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
     return found
 
 
-# --- drawing --------------------------------------------------------------------------------------------------
+# --- drawing ------------------------------------------------------------------------------------------------
 
 
 def _draw(panels: list[_Panel], width: float) -> Figure:
@@ -140,7 +142,11 @@ def _draw(panels: list[_Panel], width: float) -> Figure:
     left, right, gap = 0.56, 0.06, 0.22
     panel_width = (width - left - right - gap * (n_columns - 1)) / n_columns
     panel_height = min(1.75, max(1.15, 0.55 * panel_width))
-    title_height, tick_height, legend_height = 0.34, 0.24, 0.62 if width >= 6 else 0.98
+    letters = int(panel_width / 0.078)
+    notes_below = any(len(panel.title) + len(panel.note) + 1 > letters for panel in panels)
+    n_lines = max(wrap(panel.title, letters).count("\n") for panel in panels) + 1
+    title_height = 0.2 + 0.14 * (n_lines + notes_below)
+    tick_height, legend_height = 0.24, 0.62 if width >= 6 else 0.98
     height = n_rows * (title_height + panel_height + tick_height) + legend_height
     figure = new_figure(width, height)
     top = _top_of(panels)
@@ -149,12 +155,13 @@ def _draw(panels: list[_Panel], width: float) -> Figure:
         x = left + column * (panel_width + gap)
         y = row * (title_height + panel_height + tick_height) + title_height
         axes = place_axes(figure, x, y, panel_width, panel_height)
-        _draw_panel(axes, panel, top, first_column=column == 0, letters=int(panel_width / 0.075))
+        _draw_panel(axes, panel, top, first_column=column == 0)
+        _write_title(axes, panel, letters, note_below=notes_below)
         if column == 0:
             axes.set_ylabel("coverage", labelpad=4)
         if index + n_columns >= len(panels):
             axes.set_xlabel("generation", labelpad=2)
-    _draw_legend(figure, panels, left, height - legend_height + 0.3, width)
+    _draw_legend(figure, panels, left if width >= 6 else 0.1, height - legend_height + 0.3, width)
     return figure
 
 
@@ -171,7 +178,7 @@ def _top_of(panels: list[_Panel]) -> float:
     return min(1.0, math.ceil(highest * 10 + 0.2) / 10)
 
 
-def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool, letters: int) -> None:
+def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool) -> None:
     n_generations = max(1, panel.values.shape[1])
     side = n_generations - 1 + _side_offset(n_generations)
     step = _side_offset(n_generations)
@@ -184,9 +191,6 @@ def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool, le
     axes.spines["left"].set_visible(False)
     ticks = _generation_ticks(n_generations)
     axes.set_xticks([*ticks, side], [*map(str, ticks), "run"])
-    note_letters = len(panel.note) + 2
-    axes.set_title(shorten(panel.title, max(8, letters - note_letters)), loc="left", fontsize=8.5, weight="bold", pad=5)
-    axes.set_title(panel.note, loc="right", fontsize=7.5, color=Ink.MUTED, pad=5)
     axes.axvspan(side - 0.55 * step, side + 0.6 * step, color=Ink.RULE, alpha=0.35, linewidth=0)
     if len(panel.values):
         _draw_runs(axes, panel.values[: panel.n_drawn])
@@ -198,9 +202,33 @@ def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool, le
         # side by side in the order of the paper's runs, since two of them may be equal
         x = np.linspace(side, side + 0.42 * step, len(panel.published))
         axes.plot(
-            x, panel.published, "D", markersize=4.0, color=Ink.PUBLISHED, markerfacecolor=Ink.GROUND,
-            markeredgewidth=1.1, clip_on=False,
-        )  # fmt: skip
+            x,
+            panel.published,
+            "D",
+            markersize=4.0,
+            color=Ink.PUBLISHED,
+            markerfacecolor=Ink.GROUND,
+            markeredgewidth=1.1,
+            clip_on=False,
+        )
+
+
+def _write_title(axes: Axes, panel: _Panel, letters: int, *, note_below: bool) -> None:
+    title = wrap(panel.title, letters)
+    axes.set_title(
+        title, loc="left", fontsize=8.5, weight="bold", linespacing=1.1, pad=15 if note_below else 5
+    )
+    axes.annotate(
+        panel.note,
+        (0.0 if note_below else 1.0, 1.0),
+        (0.0, 5.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="left" if note_below else "right",
+        va="bottom",
+        fontsize=7.5,
+        color=Ink.MUTED,
+    )
 
 
 def _side_offset(n_generations: int) -> float:
@@ -214,7 +242,7 @@ def _generation_ticks(n_generations: int) -> list[int]:
 
 
 def _draw_runs(axes: Axes, values: npt.NDArray[np.float64]) -> None:
-    """A faint line for each run: a piece that k runs share is as dark as k translucent lines on each other."""
+    """A faint line for each run: a piece that k runs share is as dark as k translucent lines."""
     single = min(0.45, max(0.035, 9.0 / len(values)))
     if values.shape[1] == 1:
         distinct, counts = np.unique(np.round(values[:, 0], 9), return_counts=True)
@@ -283,18 +311,34 @@ def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, 
         handles.append(Line2D([], [], color=Ink.OURS, linewidth=1.0, label="quartiles, best of run"))
     if any(panel.published for panel in panels):
         handles.append(
-            Line2D([], [], linestyle="", marker="D", markersize=4.2, color=Ink.PUBLISHED,
-                   markerfacecolor=Ink.GROUND, markeredgewidth=1.1, label="the paper’s runs, best of run")
-        )  # fmt: skip
+            Line2D(
+                [],
+                [],
+                linestyle="",
+                marker="D",
+                markersize=4.2,
+                color=Ink.PUBLISHED,
+                markerfacecolor=Ink.GROUND,
+                markeredgewidth=1.1,
+                label="the paper’s runs",
+            )
+        )
     height = float(figure.get_size_inches()[1])
     figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(left / width, 1.0 - top / height),
-        ncols=len(handles) if width >= 6 else 2, frameon=False, fontsize=8.0, borderaxespad=0.0, borderpad=0.0,
-        handlelength=1.6, columnspacing=1.4,
-    )  # fmt: skip
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(left / width, 1.0 - top / height),
+        ncols=len(handles) if width >= 6 else 2,
+        frameon=False,
+        fontsize=8.0,
+        borderaxespad=0.0,
+        borderpad=0.0,
+        handlelength=1.6,
+        columnspacing=1.4,
+    )
 
 
-# --- words ----------------------------------------------------------------------------------------------------
+# --- words --------------------------------------------------------------------------------------------------
 
 
 def _caption(tally: Tally, panels: list[_Panel], points: Points) -> str:
@@ -319,10 +363,10 @@ def _say_runs(panels: list[_Panel]) -> str:
     if cut:
         drawn = ", ".join(f"{panel.n_drawn} of {len(panel.values)} in {panel.title}" for panel in cut)
         return (
-            f"Gray: one line a run; only the first runs are drawn where all would be too many ({drawn}); medians and "
-            "intervals are of all runs."
+            f"Gray: one line a run; only the first runs are drawn where all would be too many ({drawn}); "
+            "medians and intervals are of all runs."
         )
-    return "Gray: every run; a piece of line that several runs share is darker."
+    return "Gray: every run; a piece of line that several runs share is stronger."
 
 
 def _say_interval(panels: list[_Panel]) -> str:

@@ -1,7 +1,7 @@
-"""From a matplotlib figure to SVG: text as text, the same bytes every time, fit to stand beside others on a page.
+"""From a matplotlib figure to SVG: text as text, the same bytes every time, fit to stand beside others.
 
-A figure is drawn in the colors of `Ink`. On a page each of them becomes a CSS variable, so that one drawing serves
-light and dark; a drawing by itself keeps the light colors, which every program understands.
+A figure is drawn in the colors of `Ink`. On a page each of them becomes a CSS variable, so that one drawing
+serves light and dark; a drawing by itself keeps the light colors, which every program understands.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 import textwrap
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -54,7 +54,7 @@ class Ink:
         return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}
 
 
-_STYLE: Mapping[str, Any] = {
+_STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": Ink.MUTED,
     "axes.facecolor": "none",
@@ -132,7 +132,12 @@ def new_figure(width: float, height: float) -> Figure:
 def place_axes(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
     """Axes by the distances of their box from the figure's left and upper edge, and its size [in]."""
     total_width, total_height = figure.get_size_inches()
-    box = (left / total_width, 1.0 - (top + height) / total_height, width / total_width, height / total_height)
+    box = (
+        left / total_width,
+        1.0 - (top + height) / total_height,
+        width / total_width,
+        height / total_height,
+    )
     return figure.add_axes(box)
 
 
@@ -189,8 +194,6 @@ def _drop_baggage(root: ET.Element) -> None:
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"):
-                parent.remove(child)
-            elif child.tag == f"{{{_SVG}}}defs" and all(inner.tag == f"{{{_SVG}}}style" for inner in child):
                 parent.remove(child)
 
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_PANELS = 11
-"""Generations shown at most, evenly spread; with the legend they fill rows of two and of three nearly evenly."""
+"""Generations shown at most, evenly spread; with the legend they fill rows of two and of three."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ def draw_paths(
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
         condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, whose best coverage is the median of its condition
-            (the lower of the two middle ones, and the first of several alike).
+        replicate: which run; when not given the typical one, whose best coverage is the median of its
+            condition (the lower of the two middle ones, and the first of several alike).
         width: of the figure [in]; it decides how many panels stand side by side.
 
     Raises:
@@ -105,7 +105,7 @@ def draw_tally_paths(
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:
-    """The run whose best coverage is the median of its condition: the lower middle one, the first of several alike.
+    """The run whose best coverage is the median: the lower middle one, and the first of several alike.
 
     Raises:
         ValueError: the condition has no runs.
@@ -118,7 +118,7 @@ def typical_replicate(tally: Tally, condition: str) -> int:
 
 
 def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[_Path], str]:
-    """The best trial of each generation shown, and why trials could not be recomputed (empty when they could)."""
+    """The best trial of each generation shown, and why trials could not be recomputed (empty: they could)."""
     column = f"coverage_{tally.measure}"
     rows = tally.folder.read(condition.name, [replicate])
     if rows.is_empty():
@@ -127,20 +127,23 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
         "generation", keep="first", maintain_order=True
     )
     n_generations = best.height
-    shown = np.unique(np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int))
+    shown = np.unique(
+        np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
+    )
     paths, problem = [], ""
     for row in best[shown].iter_rows(named=True):
         poses = stalled = None
         try:
             trajectory = replay(condition, row)
             poses, stalled = trajectory.poses, trajectory.stalled
-        except RealityGapError as error:
+        except (RealityGapError, ValueError) as error:
+            # another version's genome or numbers; the cells visited are in the row
             problem = str(error)
         paths.append(_Path(row["generation"], row[column], tuple(row["cells"]), poses, stalled))
     return paths, problem
 
 
-# --- drawing --------------------------------------------------------------------------------------------------
+# --- drawing ------------------------------------------------------------------------------------------------
 
 
 def _draw(paths: list[_Path], arena: Arena, body: Body, label: str, width: float) -> Figure:
@@ -158,7 +161,7 @@ def _draw(paths: list[_Path], arena: Arena, body: Body, label: str, width: float
         if index < len(paths):
             _draw_arena(axes, arena, x_range, y_range)
             _draw_path(axes, paths[index], arena, body)
-            _write_below(axes, paths[index], arena, label)
+            _write_below(axes, paths[index], arena, label, panel_width)
         else:
             _draw_legend(axes, paths, small=width < 6)
     return figure
@@ -171,9 +174,7 @@ def _extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
     return (xs.min() - margin, xs.max() + margin), (ys.min() - margin, ys.max() + margin)
 
 
-def _draw_arena(
-    axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: tuple[float, float]
-) -> None:
+def _draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: tuple[float, float]) -> None:
     axes.set_axis_off()
     axes.set_xlim(*x_range)
     axes.set_ylim(*y_range)
@@ -191,9 +192,12 @@ def _draw_arena(
         ends += [y, y, math.nan]
     axes.plot(lines, ends, color=Ink.RULE, linewidth=0.4, zorder=1)
     axes.plot(
-        [grid.x, right, right, grid.x, grid.x], [grid.y, grid.y, top, top, grid.y],
-        color=Ink.REACH, linewidth=0.9, zorder=2,
-    )  # fmt: skip
+        [grid.x, right, right, grid.x, grid.x],
+        [grid.y, grid.y, top, top, grid.y],
+        color=Ink.REACH,
+        linewidth=0.9,
+        zorder=2,
+    )
     for x1, y1, x2, y2 in arena.walls:
         axes.plot([x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3)
 
@@ -211,14 +215,24 @@ def _draw_path(axes: Axes, path: _Path, arena: Arena, body: Body) -> None:
     axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
     if path.poses is None or path.stalled is None:
         return
-    axes.plot(path.poses[:, 0], path.poses[:, 1], color=Ink.OURS, linewidth=1.3, solid_joinstyle="round", zorder=5)
+    axes.plot(
+        path.poses[:, 0], path.poses[:, 1], color=Ink.OURS, linewidth=1.3, solid_joinstyle="round", zorder=5
+    )
     blocked = np.unique(np.round(path.poses[path.stalled, :2], 6), axis=0)
     if len(blocked):
-        axes.plot(blocked[:, 0], blocked[:, 1], "x", color=Ink.REACH, markersize=4.0, markeredgewidth=1.1, zorder=6)
+        axes.plot(
+            blocked[:, 0], blocked[:, 1], "x", color=Ink.REACH, markersize=4.0, markeredgewidth=1.1, zorder=6
+        )
     axes.plot(
-        path.poses[-1:, 0], path.poses[-1:, 1], "o", color=Ink.OURS, markerfacecolor=Ink.GROUND, markersize=4.4,
-        markeredgewidth=1.2, zorder=6,
-    )  # fmt: skip
+        path.poses[-1:, 0],
+        path.poses[-1:, 1],
+        "o",
+        color=Ink.OURS,
+        markerfacecolor=Ink.GROUND,
+        markersize=4.4,
+        markeredgewidth=1.2,
+        zorder=6,
+    )
 
 
 def _outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
@@ -226,25 +240,39 @@ def _outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
     corners = np.array([*body.corners, body.corners[0]])
     sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
     turn = np.array([[cosine, sine], [-sine, cosine]])
-    return np.array([pose.x, pose.y]) + corners @ turn
+    placed: npt.NDArray[np.float64] = corners @ turn + np.array([pose.x, pose.y])
+    return placed
 
 
-def _write_below(axes: Axes, path: _Path, arena: Arena, label: str) -> None:
+def _write_below(axes: Axes, path: _Path, arena: Arena, label: str, width: float) -> None:
     n_cells = arena.grid.n_cells
     figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
     axes.annotate(
-        f"generation {path.generation}", (0, 0), (1, -4), xycoords="axes fraction", textcoords="offset points",
-        ha="left", va="top", fontsize=8.0, weight="bold",
-    )  # fmt: skip
-    width = float(axes.get_position().width * axes.figure.get_figure(root=True).get_size_inches()[0])
+        f"generation {path.generation}",
+        (0, 0),
+        (1, -4),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="left",
+        va="top",
+        fontsize=8.0,
+        weight="bold",
+    )
     if width > 2.5:
         figure_text = f"{shorten(label, 12)}, coverage {figure_text}"
     else:
         figure_text = f"{path.coverage:.3f} {shorten(label, 12)}"
     axes.annotate(
-        figure_text, (1, 0), (-1, -4), xycoords="axes fraction", textcoords="offset points",
-        ha="right", va="top", fontsize=8.0, color=Ink.MUTED,
-    )  # fmt: skip
+        figure_text,
+        (1, 0),
+        (-1, -4),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=8.0,
+        color=Ink.MUTED,
+    )
 
 
 def _draw_legend(axes: Axes, paths: list[_Path], *, small: bool) -> None:
@@ -253,29 +281,62 @@ def _draw_legend(axes: Axes, paths: list[_Path], *, small: bool) -> None:
 
     axes.set_axis_off()
     handles: list[Any] = [
-        Line2D([], [], color=Ink.BODY, marker="s", markerfacecolor="none", linestyle="", markersize=7, label="robot at the start"),
+        Line2D(
+            [],
+            [],
+            color=Ink.BODY,
+            marker="s",
+            markerfacecolor="none",
+            linestyle="",
+            markersize=7,
+            label="robot at the start",
+        ),
         Line2D([], [], color=Ink.TEXT, marker="o", linestyle="", markersize=3.4, label="start"),
     ]
     if any(path.poses is not None for path in paths):
         handles += [
             Line2D([], [], color=Ink.OURS, linewidth=1.3, label="path of its center"),
-            Line2D([], [], color=Ink.OURS, marker="o", markerfacecolor=Ink.GROUND, linestyle="", markersize=4.4,
-                   markeredgewidth=1.2, label="end"),
-            Line2D([], [], color=Ink.REACH, marker="x", linestyle="", markersize=4.0, markeredgewidth=1.1,
-                   label="blocked here"),
-        ]  # fmt: skip
+            Line2D(
+                [],
+                [],
+                color=Ink.OURS,
+                marker="o",
+                markerfacecolor=Ink.GROUND,
+                linestyle="",
+                markersize=4.4,
+                markeredgewidth=1.2,
+                label="end",
+            ),
+            Line2D(
+                [],
+                [],
+                color=Ink.REACH,
+                marker="x",
+                linestyle="",
+                markersize=4.0,
+                markeredgewidth=1.1,
+                label="blocked here",
+            ),
+        ]
     handles += [
         Patch(facecolor=Ink.VISITED, label="cell visited"),
         Line2D([], [], color=Ink.REACH, linewidth=0.9, label="reachable cells"),
         Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="wall"),
     ]
     axes.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), ncols=1 if small else 2, frameon=False,
-        fontsize=7.0 if small else 8.0, handlelength=1.4, borderaxespad=0.0, labelspacing=0.25 if small else 0.8,
-    )  # fmt: skip
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=1 if small else 2,
+        frameon=False,
+        fontsize=7.0 if small else 8.0,
+        handlelength=1.4,
+        borderaxespad=0.0,
+        labelspacing=0.25 if small else 0.8,
+    )
 
 
-# --- words ----------------------------------------------------------------------------------------------------
+# --- words --------------------------------------------------------------------------------------------------
 
 
 def _caption(
@@ -292,7 +353,9 @@ def _caption(
     best = bests[list(tally.replicates(name)).index(replicate)]
     counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     n_generations = tally.generation_bests(name, tally.measure).shape[1]
-    which = "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
+    which = (
+        "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
+    )
     why = (
         f"It is the typical run and not a picked one: its best coverage, {best:.3f}, is the median of the "
         f"{len(bests)} runs (the lower middle one, the first of several alike)."
@@ -300,8 +363,8 @@ def _caption(
         else f"The run was chosen by number; its best coverage is {best:.3f}."
     )
     parts = [
-        f"Condition {name}, run {replicate}: the individual of highest coverage in {which}, coverage counted {counted}. "
-        f"{label_of(condition)}, n = 1 run, no interval.",
+        f"Condition {name}, run {replicate}: the individual of highest coverage in {which}, coverage counted "
+        f"{counted}. {label_of(condition)}, n = 1 run, no interval.",
         why if len(bests) > 1 else "It is the only run.",
     ]
     if problem:

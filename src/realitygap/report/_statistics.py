@@ -12,7 +12,7 @@ CONFIDENCE = 0.95
 """The least that an interval of ours covers, unless it says otherwise."""
 
 SMALLEST_N = 6
-"""Fewer values cannot give an interval of 95 %: the range of five covers the median with 1 - 2 / 2^5 = 93.75 %."""
+"""Fewer values give no interval of 95 %: the range of five covers the median with 1 - 2 / 2^5 = 93.75 %."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,7 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(stats.binom.cdf(lower - 1, n, 0.5)))
 
 
-def median_interval(
-    values: npt.NDArray[np.float64], confidence: float = CONFIDENCE
-) -> MedianInterval | None:
+def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> MedianInterval | None:
     """The order-statistic interval of the median: no distribution is assumed and nothing is resampled.
 
     Args:

@@ -35,8 +35,8 @@ def summarize(folder: ResultsFolder | str | Path) -> pl.DataFrame:
     Returns:
         Columns `condition`; `label`, such as SIM; `n`, the number of runs; then for coverage along the line
         (`line_`) and at the ends of steps (`ends_`) [0..1] `median`, the quartiles `q25` and `q75`, and the
-        bounds `low` and `high` of the median's 95 % interval; `interval_coverage`, what that interval covers in
-        truth; `published`, what the paper reports, one value per run of its own. Null where there are no
+        bounds `low` and `high` of the median's 95 % interval; `interval_coverage`, what that interval covers
+        in truth; `published`, what the paper reports, one value per run of its own. Null where there are no
         runs, too few for an interval (below 6), or nothing published.
 
     Raises:

@@ -69,7 +69,7 @@ class Tally:
 
     @cached_property
     def measure(self) -> Measure:
-        """What figures show: coverage by step ends where every condition selects by it, else along the line."""
+        """What figures show: coverage by step ends where all conditions select by it, else along the line."""
         cells = [settings_of(condition).get("task", {}).get("cells") for condition in self.conditions]
         return "ends" if set(cells) == {"ends"} else "line"
 
@@ -115,8 +115,14 @@ def read_tally(folder: ResultsFolder | str | Path) -> Tally:
     ]
     best = pl.concat(parts) if parts else pl.DataFrame(schema=_BEST)
     if best.is_empty():
-        raise RecordError(f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.")
-    return Tally(folder, folder.description, best)
+        raise RecordError(
+            f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first."
+        )
+    description = folder.description
+    description["conditions"] = [
+        each if isinstance(each, dict) else {"name": each} for each in description["conditions"]
+    ]
+    return Tally(folder, description, best)
 
 
 def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:

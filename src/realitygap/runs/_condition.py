@@ -39,13 +39,17 @@ class Condition(BaseModel):
     )
     platform: Literal["jyro"] = Field("jyro", description="What the networks are tried on.")
     noise: float = Field(
-        0.1, ge=0, le=10, description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8)."
+        0.1,
+        ge=0,
+        le=10,
+        description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
+        "(section 2.3: 0.1, 0.5, 0.8).",
     )
     seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
     pair: bool = Field(
-        True, description="Whether the conditions of a study draw the same random numbers, which narrows the "
-        "difference between them."
+        True,
+        description="Whether the conditions of a study draw the same random numbers, which narrows the "
+        "difference between them.",
     )
     arena: ArenaSettings = ArenaSettings()
     task: CoverageTask = CoverageTask()

@@ -40,10 +40,10 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
         noise=condition.noise,
         noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
     )
-    if list(trajectory.outcome.cells) != list(row["cells"]):
+    if list(trajectory.cells) != list(row["cells"]):
         raise RecordError(
             f"Condition {row['condition']!r}, replicate {row['replicate']}, generation {row['generation']}, "
-            f"individual {row['individual']}: the trial visits {len(trajectory.outcome.cells)} cells when run "
+            f"individual {row['individual']}: the trial visits {len(trajectory.cells)} cells when run "
             f"again, its row has {len(row['cells'])}. Was the row computed by another version, or changed?"
         )
     return trajectory

@@ -25,7 +25,9 @@ def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
     arena = condition.arena.arena()
     novelty = condition.novelty
-    selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[condition.selection]
+    selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[
+        condition.selection
+    ]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
         selection = _run.NEAREST_NOVELTY
     return RunRules(

@@ -1,8 +1,10 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
+from ._bench import measure_speed
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._run import Progress, StudyResult, machine_facts, run_study, usable_processors
 from ._study import ConditionNotes, ReportSection, Study, StudySection
+from ._template import study_template
 
 __all__ = [
     "DEFAULT_NEAT",
@@ -15,8 +17,10 @@ __all__ = [
     "StudySection",
     "load_study",
     "machine_facts",
+    "measure_speed",
     "named_studies",
     "parse_study",
     "run_study",
+    "study_template",
     "usable_processors",
 ]

@@ -34,12 +34,12 @@ _OWN_KEYS = ("name", "selection", "platform", "noise")
 def named_studies() -> list[str]:
     """Names of the studies that come with realitygap."""
     folder = resources.files(__package__) / "studies"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    )
 
 
-def load_study(
-    study: str | Path, *, seed: int | None = None, replicates: int | None = None
-) -> Study:
+def load_study(study: str | Path, *, seed: int | None = None, replicates: int | None = None) -> Study:
     """Read a study by name or from a file, and resolve every setting.
 
     Args:
@@ -58,7 +58,9 @@ def load_study(
     path = Path(study)
     if not path.exists():
         if path.suffix == ".toml" or len(path.parts) > 1:
-            raise StudyError(f"There is no file {path}. `realitygap new-study {path}` writes one to start from.")
+            raise StudyError(
+                f"There is no file {path}. `realitygap new-study {path}` writes one to start from."
+            )
         raise StudyError(
             f"Unknown study {name!r}. {did_you_mean(name, named_studies())} A file of your own ends in .toml; "
             "`realitygap new-study` writes one."
@@ -70,9 +72,7 @@ def load_study(
     return parse_study(text, str(path), seed=seed, replicates=replicates)
 
 
-def parse_study(
-    text: str, origin: str, *, seed: int | None = None, replicates: int | None = None
-) -> Study:
+def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: int | None = None) -> Study:
     """Resolve a study from the text of its file; arguments and errors as in `load_study`.
 
     Args:
@@ -104,7 +104,11 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     about_values |= {key: value for key, value in changes.items() if value is not None}
     about = problems.check(StudySection, about_values, "study") if "study" in data else None
     report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")
-    base = {section: problems.table(section, data.get(section, {})) for section in SECTIONS if section not in PLATFORMS}
+    base = {
+        section: problems.table(section, data.get(section, {}))
+        for section in SECTIONS
+        if section not in PLATFORMS
+    }
     platforms = problems.table("platform", data.get("platform", {}))
     for key, value in platforms.items():
         if key in PLATFORMS:
@@ -134,7 +138,9 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     for index, note in enumerate(notes):
         if note.baseline is not None and note.baseline not in names:
             place = f"condition {conditions[index].name!r}.baseline"
-            problems.add(place, f"there is no condition {note.baseline!r}. {did_you_mean(note.baseline, names)}")
+            problems.add(
+                place, f"there is no condition {note.baseline!r}. {did_you_mean(note.baseline, names)}"
+            )
     if problems.lines or about is None or report is None:
         return None
     return Study(about=about, report=report, conditions=tuple(conditions), notes=tuple(notes))
@@ -156,7 +162,9 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
     if section == "neat":
         name = values.get("settings", DEFAULT_NEAT)
         if name not in NAMED_SETTINGS:
-            problems.add(f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}")
+            problems.add(
+                f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}"
+            )
             values = {key: value for key, value in values.items() if key != "settings"}
         values = _neat_values(values, name)
     problems.check(SECTIONS[section], values, place)
@@ -185,7 +193,9 @@ def _condition(
         if changed:
             _check_section(section, changed, f"{place}.{section}", problems)
         both = {**base.get(section, {}), **changed}
-        merged[section] = _neat_values(both, both.get("settings", DEFAULT_NEAT)) if section == "neat" else both
+        merged[section] = (
+            _neat_values(both, both.get("settings", DEFAULT_NEAT)) if section == "neat" else both
+        )
     if "name" in own:
         problems.check(Condition, own, place)
     if len(problems.lines) > before or about is None:
@@ -198,4 +208,3 @@ def _condition(
                 problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
         return None, notes
     return condition, notes
-

@@ -104,7 +104,10 @@ def run_study(
     n_threads = threads or usable_processors()
     with folder.locked():
         _adopt(folder, study)
-        missing = {condition.name: folder.missing(condition.name, study.about.replicates) for condition in study.conditions}
+        missing = {
+            condition.name: folder.missing(condition.name, study.about.replicates)
+            for condition in study.conditions
+        }
         n_missing = sum(len(gap) for gaps in missing.values() for gap in gaps)
         folder.append_log(
             {"event": "start", "missing_runs": n_missing, "threads": n_threads, "machine": machine_facts()}
@@ -112,7 +115,9 @@ def run_study(
         progress = _Counter(study.n_runs, study.n_runs - n_missing, tell)
         if n_missing:
             _compute(study, folder, missing, n_threads, chunk, progress)
-        folder.append_log({"event": "end", "computed_runs": progress.n_computed, "seconds": round(progress.seconds, 3)})
+        folder.append_log(
+            {"event": "end", "computed_runs": progress.n_computed, "seconds": round(progress.seconds, 3)}
+        )
     return StudyResult(folder, study.n_runs, progress.n_computed, progress.seconds)
 
 
@@ -144,12 +149,12 @@ def processor_name() -> str:
 
 
 def _open_folder(path: Path, study: Study, *, fresh: bool) -> ResultsFolder:
-    if (path / "study.json").exists():
-        folder = ResultsFolder.open(path)
-        if not fresh:
-            return folder
-        folder.clear(["report.html"])
-    return ResultsFolder.create(path, study.description())
+    if not (path / "study.json").exists():
+        return ResultsFolder.create(path, study.description())
+    folder = ResultsFolder.open(path)
+    if fresh:
+        folder.restart(study.description(), also=["report.html"])
+    return folder
 
 
 def _adopt(folder: ResultsFolder, study: Study) -> None:
@@ -164,7 +169,9 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
     if differences:
-        shown = differences[:20] + ([f"... and {len(differences) - 20} more"] if len(differences) > 20 else [])
+        shown = differences[:20] + (
+            [f"... and {len(differences) - 20} more"] if len(differences) > 20 else []
+        )
         raise StudyError(
             "\n  ".join(
                 [
@@ -213,10 +220,14 @@ class _Counter:
         self.n_computed += n
         self.seconds = time.perf_counter() - self._since
         if self._tell is not None:
-            self._tell(Progress(self._n_before + self.n_computed, self._n_runs, self.n_computed, self.seconds))
+            self._tell(
+                Progress(self._n_before + self.n_computed, self._n_runs, self.n_computed, self.seconds)
+            )
 
 
-def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) -> Iterator[tuple[Condition, int, int]]:
+def _chunks(
+    study: Study, missing: dict[str, list[range]], chunk: int | None
+) -> Iterator[tuple[Condition, int, int]]:
     """(condition, first replicate, runs) of each chunk to compute."""
     for condition in study.conditions:
         size = chunk or _chunk_size(condition, study.about.replicates)

@@ -16,7 +16,9 @@ class StudySection(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(
-        pattern=NAME_PATTERN, max_length=80, description="Letters, digits, dot, dash, underscore; names the folder."
+        pattern=NAME_PATTERN,
+        max_length=80,
+        description="Letters, digits, dot, dash, underscore; names the folder.",
     )
     title: str = Field("", max_length=200, description="What the report is headed with; the name when empty.")
     seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")

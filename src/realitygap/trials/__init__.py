@@ -3,19 +3,23 @@
 from ._jyro import (
     NoiseKey,
     Trajectory,
-    TrialOutcome,
+    TrialBatch,
     jyro_rules,
     jyro_scene,
     trace_genome,
     try_genomes,
 )
+from ._scene import SceneTrack, simulate_case, simulate_file
 
 __all__ = [
     "NoiseKey",
+    "SceneTrack",
     "Trajectory",
-    "TrialOutcome",
+    "TrialBatch",
     "jyro_rules",
     "jyro_scene",
+    "simulate_case",
+    "simulate_file",
     "trace_genome",
     "try_genomes",
 ]

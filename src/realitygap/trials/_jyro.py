@@ -9,15 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.evolution import Genome
+from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._math import sin_cos
-from realitygap.kernels._network import decode, make_networks
-from realitygap.kernels._trial import Scene, TrialRules, make_trace, make_workspace, run_trials
+from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_trace, make_workspace, run_trials
 from realitygap.robots import STEP_S, JyroPlatform
 from realitygap.world import Arena
 
 
-def jyro_scene(platform: JyroPlatform, arena: Arena) -> Scene:
+def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
     """Arena, body and sensors in the form that kernels read.
 
     Raises:
@@ -38,7 +37,7 @@ def jyro_scene(platform: JyroPlatform, arena: Arena) -> Scene:
         sensors[k] = forward, left, cosine, sine
         radius = max(radius, math.hypot(forward, left) + platform.sensors.max_range)
     grid = arena.grid
-    return Scene(
+    return TrialScene(
         walls=walls,
         normals=np.column_stack([normals, offsets]),
         body=np.array(platform.body.corners, np.float64),
@@ -68,21 +67,35 @@ def jyro_rules(platform: JyroPlatform, *, noise: float, bias_input: bool, bias_v
 
 
 @dataclass(frozen=True)
-class TrialOutcome:
-    """What came of one trial.
+class TrialBatch:
+    """What came of n trials in an arena of c reachable cells.
 
     Attributes:
-        cells: Cells along the line in order of first visit, columns * row + column.
-        n_end_cells: Cells in which steps ended; the start counts.
-        coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
-        n_stalls: Blocked steps.
+        cells: (n, c) uint8; the first `n_line` of a row are the cells along the line in order of first
+            visit, columns * row + column.
+        n_line: (n,) cells that the line crosses; the start counts.
+        n_ends: (n,) cells in which steps end; the start counts.
+        n_stalls: (n,) blocked steps.
     """
 
-    cells: tuple[int, ...]
-    n_end_cells: int
-    coverage_line: float
-    coverage_ends: float
-    n_stalls: int
+    cells: NDArray[np.uint8]
+    n_line: NDArray[np.int32]
+    n_ends: NDArray[np.int32]
+    n_stalls: NDArray[np.int32]
+
+    @property
+    def coverage_line(self) -> NDArray[np.float64]:
+        """(n,) visited share of the reachable cells along the line, 0..1."""
+        return np.divide(self.n_line, self.cells.shape[1])
+
+    @property
+    def coverage_ends(self) -> NDArray[np.float64]:
+        """(n,) visited share of the reachable cells at the ends of steps, 0..1."""
+        return np.divide(self.n_ends, self.cells.shape[1])
+
+    def behavior(self, k: int) -> NDArray[np.uint8]:
+        """The cells that trial k visited along its line, in order of first visit."""
+        return self.cells[k, : self.n_line[k]]
 
 
 @dataclass(frozen=True)
@@ -97,7 +110,8 @@ class Trajectory:
             constant.
         commands: (t, 2) what it answered: move and turn.
         stalled: (t + 1,) whether the step was blocked.
-        outcome: What came of it.
+        coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
+        cells: Cells along the line in order of first visit, columns * row + column.
     """
 
     step_s: float
@@ -106,7 +120,9 @@ class Trajectory:
     inputs: NDArray[np.float64]
     commands: NDArray[np.float64]
     stalled: NDArray[np.bool_]
-    outcome: TrialOutcome
+    coverage_line: float
+    coverage_ends: float
+    cells: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -127,19 +143,17 @@ def _run(
     noise: float,
     noise_key: NoiseKey,
     kept_steps: int,
-) -> tuple[list[TrialOutcome], Trajectory]:
+) -> tuple[TrialBatch, Trace]:
+    _check_sizes(genomes)
     rules = genomes[0].rules
     scene = jyro_scene(platform, arena)
-    bias_input = rules.bias_input >= 0
-    trial = jyro_rules(platform, noise=noise, bias_input=bias_input, bias_value=genomes[0].bias_value)
-    room = max(len(genome.connections) for genome in genomes)
-    hidden_room = max(genome.n_hidden for genome in genomes)
-    networks = make_networks(len(genomes), rules, room, hidden_room)
-    for k, genome in enumerate(genomes):
-        decode(genome._genomes, genome._row, rules, networks, k)
-    work = make_workspace(scene, rules.n_inputs + rules.n_outputs + hidden_room)
+    trial = jyro_rules(
+        platform, noise=noise, bias_input=rules.bias_input >= 0, bias_value=genomes[0].bias_value
+    )
+    networks = decode_all(genomes)
+    work = make_workspace(scene, rules.n_inputs + networks.order.shape[1])
     trace = make_trace(scene, rules.n_inputs, kept_steps)
-    order = np.zeros((len(genomes), arena.grid.n_cells), np.uint8)
+    cells = np.zeros((len(genomes), arena.grid.n_cells), np.uint8)
     counts = np.zeros((len(genomes), 3), np.int32)
     run_trials(
         scene,
@@ -152,25 +166,11 @@ def _run(
         noise_key.individual,
         noise_key.repeat,
         work,
-        order,
+        cells,
         counts,
         trace,
     )
-    n_cells = arena.grid.n_cells
-    outcomes = [
-        TrialOutcome(
-            tuple(int(cell) for cell in order[k, : counts[k, 0]]),
-            int(counts[k, 1]),
-            counts[k, 0] / n_cells,
-            counts[k, 1] / n_cells,
-            int(counts[k, 2]),
-        )
-        for k in range(len(genomes))
-    ]
-    trajectory = Trajectory(
-        STEP_S, trace.poses, trace.readings, trace.inputs, trace.commands, trace.stalled, outcomes[-1]
-    )
-    return outcomes, trajectory
+    return TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2]), trace
 
 
 def try_genomes(
@@ -180,7 +180,7 @@ def try_genomes(
     *,
     noise: float,
     noise_key: NoiseKey,
-) -> list[TrialOutcome]:
+) -> TrialBatch:
     """Try each of n genomes of one population once.
 
     Args:
@@ -193,7 +193,6 @@ def try_genomes(
     Raises:
         ValueError: No genome, or one with other inputs or outputs.
     """
-    _check_sizes(genomes)
     return _run(platform, arena, genomes, noise, noise_key, -1)[0]
 
 
@@ -201,8 +200,18 @@ def trace_genome(
     platform: JyroPlatform, arena: Arena, genome: Genome, *, noise: float, noise_key: NoiseKey
 ) -> Trajectory:
     """Try one genome once and keep every step; arguments as in `try_genomes`."""
-    _check_sizes([genome])
-    return _run(platform, arena, [genome], noise, noise_key, platform.steps)[1]
+    batch, trace = _run(platform, arena, [genome], noise, noise_key, platform.steps)
+    return Trajectory(
+        STEP_S,
+        trace.poses,
+        trace.readings,
+        trace.inputs,
+        trace.commands,
+        trace.stalled,
+        float(batch.coverage_line[0]),
+        float(batch.coverage_ends[0]),
+        tuple(int(cell) for cell in batch.behavior(0)),
+    )
 
 
 def _check_sizes(genomes: Sequence[Genome]) -> None:

@@ -10,6 +10,7 @@ from ._arena import (
     is_inside,
     paper_arena,
 )
+from ._case import Case
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._settings import ArenaSettings
 
@@ -20,6 +21,7 @@ __all__ = [
     "Arena",
     "ArenaSettings",
     "Body",
+    "Case",
     "Grid",
     "Pose",
     "RangeSensors",

@@ -43,9 +43,12 @@ class ArenaSettings(BaseModel):
 
     def pose(self) -> Pose:
         """Where trials begin."""
-        return NAMED_STARTS[self.start] if isinstance(self.start, str) else Pose(self.start[0], self.start[1], self.start[2])
+        return (
+            NAMED_STARTS[self.start]
+            if isinstance(self.start, str)
+            else Pose(self.start[0], self.start[1], self.start[2])
+        )
 
     def arena(self) -> Arena:
         """The arena."""
         return paper_arena(self.pose())
-

@@ -1,0 +1,49 @@
+"""All commands together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from realitygap._version import __version__
+
+from ._bench import bench
+from ._results import digest, report
+from ._simulate import simulate
+from ._study import new_study, run
+
+app = typer.Typer(
+    name="realitygap",
+    help="Evolve robot controllers in simulation and on a real robot, measure the gap between the two honestly, "
+    "and shrink it.",
+    epilog="Example: realitygap run paper",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"realitygap {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    pass
+
+
+app.command("run")(run)
+app.command("new-study")(new_study)
+app.command("report")(report)
+app.command("digest")(digest)
+app.command("simulate")(simulate)
+app.command("bench")(bench)

@@ -1,0 +1,365 @@
+"""One page that holds a whole study: what was run, its numbers and figures, and how to run it again."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+from pydantic import ValidationError
+
+from realitygap._version import __version__
+from realitygap.errors import RealityGapError, RecordError
+from realitygap.records import RecordWarning, ResultsFolder, column_table
+from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
+from realitygap.report._coverage_figure import draw_tally_coverage
+from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
+from realitygap.report._parameters import neat_parameters, settings_tables
+from realitygap.report._path_figure import draw_tally_paths
+from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
+from realitygap.report._summary import summarize_tally
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.study import load_study, named_studies
+
+REPORT_NAME = "report.html"
+
+_LABELS = {
+    "SIM": "computed by a simulation of robot and arena; no robot was driven",
+    "TWIN": "computed by a second, structurally different simulation that stands in for a robot",
+    "EMULATED": "driven over the robot’s own protocol, with a simulated robot behind it",
+    "REAL": "driven on the physical robot",
+}
+
+_PLATFORMS = {
+    "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
+}
+
+_MOST_GAPS = 12
+"""Conditions whose missing runs are listed; of more it is said how many."""
+
+
+@dataclass(frozen=True)
+class _FigureOnPage:
+    """A figure in two widths, of which the page shows the one that fits."""
+
+    anchor: str
+    title: str
+    caption: str
+    wide: str
+    narrow: str
+
+
+def write_report(folder: ResultsFolder | str | Path, out: str | Path | None = None) -> Path:
+    """Write the page of a study: one HTML file that needs no other file, no network and no script.
+
+    Args:
+        folder: the results of a study, or the path to them. They are only read; trials that are drawn are
+            recomputed.
+        out: the file to write; `report.html` in the folder when not given. A file that is there gives way,
+            and stays as it is until the new one is complete.
+
+    Returns:
+        The path of the page.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the page
+            cannot be written.
+    """
+    with warnings.catch_warnings():
+        # another version's results are announced on the page itself
+        warnings.simplefilter("ignore", RecordWarning)
+        tally = read_tally(folder)
+        page = _render(tally)
+    path = tally.folder.path / REPORT_NAME if out is None else Path(out)
+    _write_whole(path, page)
+    return path
+
+
+def _write_whole(path: Path, text: str) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        raise RecordError(
+            f"Could not write {path}: {error.strerror or error}. Name another file or folder."
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _render(tally: Tally) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("realitygap.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["share"] = _share
+    environment.filters["count"] = _count
+    return environment.get_template("report.html.jinja").render(_content(tally))
+
+
+def _content(tally: Tally) -> dict[str, Any]:
+    """Everything the template shows."""
+    summary = summarize_tally(tally)
+    description = tally.description
+    return {
+        "title": description.get("title") or description.get("name") or "A study",
+        "name": description.get("name") or "–",
+        "css": resources.files("realitygap.report")
+        .joinpath("templates/report.css")
+        .read_text(encoding="utf-8"),
+        "banners": _banners(tally),
+        "facts": _facts(tally),
+        "labels": _labels(tally),
+        "digest": tally.folder.digest(),
+        "results_version": tally.folder.results_version,
+        "version": __version__,
+        "software": description.get("software") or "unknown",
+        "parameters": neat_parameters(tally.conditions),
+        "settings": settings_tables(tally.conditions),
+        "summary": summary.to_dicts(),
+        "measure": tally.measure,
+        "published_sources": _published_sources(tally),
+        "n_published": max((len(values) for values in summary["published"].drop_nulls()), default=0),
+        "interval_notes": _interval_notes(summary),
+        "confidence": f"{100 * CONFIDENCE:.0f} %",
+        "coverage": _coverage_figure(tally),
+        "paths": _path_figures(tally),
+        "choices": _choices_figure(tally),
+        "command": _command(tally),
+        "columns": column_table(),
+    }
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+
+
+def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> _FigureOnPage:
+    from markupsafe import Markup
+
+    return _FigureOnPage(anchor, title, wide.caption, Markup(inline(wide.svg)), Markup(inline(narrow.svg)))
+
+
+def _coverage_figure(tally: Tally) -> _FigureOnPage:
+    wide, narrow = (
+        draw_tally_coverage(tally, width=width, name=name)
+        for width, name in ((WIDE, "coverage-wide"), (NARROW, "coverage-narrow"))
+    )
+    return _on_page("figure-4", "Figure 4", wide, narrow)
+
+
+def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
+    """A figure for a condition that selects by coverage and one by novelty, or why there is none."""
+    names = _conditions_with_paths(tally)
+    found: list[_FigureOnPage | str] = []
+    for index, condition in enumerate(names):
+        number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
+        anchor = f"figure-6-{index}"
+        try:
+            wide, narrow = (
+                draw_tally_paths(tally, condition, width=width, name=f"{anchor}-{name}")
+                for width, name in ((WIDE, "wide"), (NARROW, "narrow"))
+            )
+        except ValidationError:
+            found.append(
+                f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
+                f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
+            )
+        else:
+            found.append(_on_page(anchor, number, wide, narrow))
+    return found
+
+
+def _conditions_with_paths(tally: Tally) -> list[str]:
+    with_runs = set(tally.runs["condition"])
+    there = [condition for condition in tally.conditions if condition["name"] in with_runs]
+    by_selection = {
+        selection: [each["name"] for each in there if settings_of(each).get("selection") == selection]
+        for selection in ("coverage", "novelty")
+    }
+    names = [found[0] for found in by_selection.values() if found]
+    return names or [there[0]["name"]]
+
+
+def _choices_figure(tally: Tally) -> _FigureOnPage | None:
+    if not compare_tally_choices(tally):
+        return None
+    wide, narrow = (
+        draw_tally_choices(tally, width=width, name=name)
+        for width, name in ((WIDE, "choices-wide"), (NARROW, "choices-narrow"))
+    )
+    return _on_page("figure-10", "Figure 10", wide, narrow)
+
+
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def _banners(tally: Tally) -> list[tuple[str, str]]:
+    """What a reader must know first: a heading and a sentence each."""
+    banners = []
+    if tally.folder.version_note is not None:
+        banners.append(("Results of another version", tally.folder.version_note))
+    missing = _missing_runs(tally)
+    if missing:
+        expected = len(tally.conditions) * _expected_replicates(tally)
+        n_missing = sum(count for _, count, _ in missing)
+        listed = [f"{name} lacks {count:,} ({where})" for name, count, where in missing[:_MOST_GAPS]]
+        if len(missing) > _MOST_GAPS:
+            listed.append(f"and {len(missing) - _MOST_GAPS} more conditions")
+        banners.append(
+            (
+                "The study is incomplete",
+                f"{expected - n_missing:,} of {expected:,} runs are there. {'; '.join(listed)}. "
+                "The same command goes on with what is missing.",
+            )
+        )
+    return banners
+
+
+def _expected_replicates(tally: Tally) -> int:
+    most = int(tally.runs["replicate"].max()) + 1  # type: ignore[arg-type]
+    return int(tally.description.get("replicates") or most)
+
+
+def _missing_runs(tally: Tally) -> list[tuple[str, int, str]]:
+    """Name, number of missing runs, and which, of each condition that lacks some."""
+    missing = []
+    for condition in tally.conditions:
+        gaps = _gaps([int(run) for run in tally.replicates(condition["name"])], _expected_replicates(tally))
+        if gaps:
+            shown = [str(first) if first == last else f"{first} to {last}" for first, last in gaps]
+            where = "replicates " + ", ".join(shown[:4]) + (", …" if len(shown) > 4 else "")
+            missing.append((condition["name"], sum(last - first + 1 for first, last in gaps), where))
+    return missing
+
+
+def _gaps(there: list[int], n: int) -> list[tuple[int, int]]:
+    """First and last of each stretch of 0 to n - 1 that is not `there`, a list in order."""
+    edges = [-1, *(number for number in there if number < n), n]
+    return [(before + 1, after - 1) for before, after in itertools.pairwise(edges) if after > before + 1]
+
+
+def _facts(tally: Tally) -> list[tuple[str, str]]:
+    description = tally.description
+    n_runs, n_trials, n_steps = tally.runs.height, tally.n_trials(), _robot_steps(tally)
+    platforms = sorted({str(settings_of(each).get("platform", "unknown")) for each in tally.conditions})
+    facts = [
+        ("Study", str(description.get("name") or "–")),
+        ("Conditions", _count(len(tally.conditions))),
+        (
+            "Runs",
+            f"{_count(n_runs)} ({_count(_expected_replicates(tally))} replicates of each condition planned)",
+        ),
+        ("Trials", f"{_count(n_trials)} networks tried once each"),
+    ]
+    if n_steps is not None:
+        facts.append(("Robot-steps", _count(n_steps)))
+    facts.append(
+        (
+            "Platform",
+            "; ".join(f"{each}: {_PLATFORMS[each]}" if each in _PLATFORMS else each for each in platforms),
+        )
+    )
+    numbers = {
+        "True": "; all conditions draw the same random numbers",
+        "False": "; conditions draw apart",
+    }.get(str(description.get("pair")), "")
+    facts.append(("Seed", f"{description.get('seed', '–')}{numbers}"))
+    return facts
+
+
+def _robot_steps(tally: Tally) -> int | None:
+    """Steps of all trials together; None where a condition does not say how many a trial has."""
+    total = 0
+    for condition in tally.conditions:
+        settings = settings_of(condition)
+        platform = settings.get(str(settings.get("platform")))
+        steps = platform.get("steps") if isinstance(platform, Mapping) else None
+        if not isinstance(steps, int):
+            return None
+        total += steps * tally.n_trials(condition["name"])
+    return total
+
+
+def _labels(tally: Tally) -> list[tuple[str, str]]:
+    labels = sorted({label_of(condition) for condition in tally.conditions})
+    return [(label, _LABELS.get(label, "as the records say")) for label in labels]
+
+
+def _published_sources(tally: Tally) -> list[str]:
+    sources = [
+        condition.get("published_source") for condition in tally.conditions if condition.get("published")
+    ]
+    return list(dict.fromkeys(str(source) for source in sources if source))
+
+
+def _interval_notes(summary: pl.DataFrame) -> list[str]:
+    """What the intervals are in truth, for each number of runs."""
+    notes = []
+    for n in sorted(set(summary["n"]) - {0}):
+        ranks = interval_ranks(n)
+        if ranks is None:
+            notes.append(
+                f"With n = {n} there is no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %."
+            )
+        else:
+            notes.append(
+                f"With n = {n:,} it runs from the {_ordinal(ranks.lower)} to the {_ordinal(ranks.upper)} of "
+                f"the ordered values and covers the median with {100 * ranks.coverage:.1f} %."
+            )
+    return notes
+
+
+def _command(tally: Tally) -> dict[str, Any]:
+    """How to run the study again: the words of the command, and whether it comes with realitygap."""
+    description = tally.description
+    name = str(description.get("name") or "")
+    built_in = _is_built_in(description)
+    study = name if built_in else "STUDY.toml"
+    return {
+        "built_in": built_in,
+        "run": f"realitygap run {study} --seed {description.get('seed', 1)} "
+        f"--replicates {_expected_replicates(tally)} --out DIR",
+        "python": f"run_study({study!r}, 'DIR', seed={description.get('seed', 1)}, "
+        f"replicates={_expected_replicates(tally)})",
+    }
+
+
+def _is_built_in(description: Mapping[str, Any]) -> bool:
+    """Whether these are the conditions, to the hash, of the study of this name that comes with realitygap."""
+    name = description.get("name")
+    if name not in named_studies():
+        return False
+    try:
+        ours = load_study(str(name), seed=description.get("seed")).description()
+    except RealityGapError:
+        return False
+    return {each["hash"] for each in ours["conditions"]} == {
+        each.get("hash") for each in description["conditions"]
+    }
+
+
+def _share(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"
+
+
+def _count(value: int) -> str:
+    return f"{value:,}"
+
+
+def _ordinal(number: int) -> str:
+    ending = "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number:,}{ending}"

@@ -129,6 +129,8 @@ class _ProgressBar:
         self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
 
     def __enter__(self) -> _ProgressBar:
+        if not self._console.is_terminal:
+            self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
         self._progress.start()
         return self
 
@@ -175,7 +177,7 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
     from ._tables import summary_table
 
     console = Console()
-    console.print(summary_table(summary, result.folder.description.get("title", "")))
+    console.print(summary_table(summary, result.folder.description["title"]))
     path = result.folder.path
     if result.n_computed:
         typer.echo(

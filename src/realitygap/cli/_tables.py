@@ -4,46 +4,51 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich import box
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     import polars as pl
 
 
 def summary_table(summary: pl.DataFrame, title: str) -> Table:
-    """Best coverage of a run: one row a condition, by line and by the ends of steps."""
-    published = any(values is not None for values in summary["published"].to_list())
+    """Best coverage of a run: one row a condition, along the line and at the ends of steps."""
+    labels = ", ".join(sorted(set(summary["label"].to_list())))
     table = Table(
-        title=f"{title}: best coverage of a run (share of the reachable cells)",
-        caption="median, quartiles, [interval of the median, at least 95 %]; "
-        "line: cells the line crosses, ends: cells in which steps end",
+        title=Text(f"{title}\nBest coverage of a run, share of the reachable cells ({labels})"),
+        caption=Text(
+            "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses,\n"
+            "ends: cells in which steps end"
+        ),
         title_justify="left",
         caption_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
     )
-    table.add_column("condition", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    table.add_column("n", justify="right")
-    for kind in ("line", "ends"):
-        table.add_column(kind, justify="right", no_wrap=True)
-        table.add_column("quartiles", no_wrap=True)
-        table.add_column("interval", no_wrap=True)
+    table.add_column("condition")
+    table.add_column("runs", justify="right", no_wrap=True)
+    table.add_column("line", no_wrap=True)
+    table.add_column("ends", no_wrap=True)
+    published = any(values is not None for values in summary["published"].to_list())
     if published:
         table.add_column("published", no_wrap=True)
     for row in summary.iter_rows(named=True):
-        cells = [row["condition"], row["label"], f"{row['n']:,}"]
-        for kind in ("line", "ends"):
-            cells += [
-                _number(row[f"{kind}_median"]),
-                f"{_number(row[f'{kind}_q25'])}-{_number(row[f'{kind}_q75'])}",
-                "n too small"
-                if row[f"{kind}_low"] is None
-                else f"[{_number(row[f'{kind}_low'])}, {_number(row[f'{kind}_high'])}]",
-            ]
+        cells = [row["condition"], f"{row['n']:,}"]
+        for measure in ("line", "ends"):
+            median, q25, q75, low, high = (
+                _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
+            )
+            interval = f"[{low}, {high}]" if low != "-" else "[too few runs]"
+            cells.append(f"{median} {interval}\n{q25} to {q75}")
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))
-        table.add_row(*cells)
+        table.add_row(*(Text(cell) for cell in cells))
     return table
 
 
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}".replace("0.", ".", 1)
+    if value is None:
+        return "-"
+    text = f"{value:.3f}"
+    return text.removeprefix("0") if value < 1 else text

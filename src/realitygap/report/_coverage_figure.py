@@ -145,7 +145,7 @@ def _draw(panels: list[_Panel], width: float) -> Figure:
     letters = int(panel_width / 0.078)
     notes_below = any(len(panel.title) + len(panel.note) + 1 > letters for panel in panels)
     n_lines = max(wrap(panel.title, letters).count("\n") for panel in panels) + 1
-    title_height = 0.2 + 0.14 * (n_lines + notes_below)
+    title_height = 0.2 + 0.145 * (n_lines + notes_below)
     tick_height, legend_height = 0.24, 0.62 if width >= 6 else 0.98
     height = n_rows * (title_height + panel_height + tick_height) + legend_height
     figure = new_figure(width, height)
@@ -216,7 +216,7 @@ def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool) ->
 def _write_title(axes: Axes, panel: _Panel, letters: int, *, note_below: bool) -> None:
     title = wrap(panel.title, letters)
     axes.set_title(
-        title, loc="left", fontsize=8.5, weight="bold", linespacing=1.1, pad=15 if note_below else 5
+        title, loc="left", fontsize=8.5, weight="bold", linespacing=1.1, pad=17 if note_below else 5
     )
     axes.annotate(
         panel.note,

@@ -33,6 +33,10 @@ _METRIC_FONT = "DejaVu Sans"
 """Comes with matplotlib, so that the layout is the same everywhere; wider than those in `FONT`."""
 
 
+_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""What a user's text may hold and XML may not."""
+
+
 class Ink:
     """The colors of all figures: apart in lightness, and for color-blind eyes (after Okabe & Ito, 2008)."""
 
@@ -167,14 +171,14 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
     """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    root = ET.fromstring(buffer.getvalue())
+    root = ET.fromstring(_NOT_XML.sub("", buffer.getvalue()))
     _drop_baggage(root)
     _rename_ids(root, name)
     for element in root.iter():
         _tidy(element)
     root.attrib.pop("version", None)
     root.set("role", "img")
-    root.set("aria-label", alt)
+    root.set("aria-label", _NOT_XML.sub("", alt))
     root.set("style", "stroke-linejoin: round; stroke-linecap: butt")
     ET.register_namespace("", _SVG)
     return ET.tostring(root, encoding="unicode")

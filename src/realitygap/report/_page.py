@@ -85,7 +85,7 @@ def write_report(folder: ResultsFolder | str | Path, out: str | Path | None = No
 def _write_whole(path: Path, text: str) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(text.encode("utf-8", "replace"))
         temporary.replace(path)
     except OSError as error:
         raise RecordError(

@@ -62,7 +62,7 @@ def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> list[Parameter]:
         counts = {value: shown.count(value) for value in dict.fromkeys(shown)}
         usual = max(counts, key=lambda value: counts[value])
         others = [
-            f"{value} in {_list_names([name for name, each in zip(names, shown, strict=True) if each == value])}"
+            f"{value} in {_list_names(_names_with(value, names, shown))}"
             for value in counts
             if value != usual
         ]
@@ -120,6 +120,10 @@ def _show(value: Any) -> str:
     if isinstance(value, str):
         return value
     return json.dumps(value)
+
+
+def _names_with(value: str, names: list[str], shown: list[str]) -> list[str]:
+    return [name for name, each in zip(names, shown, strict=True) if each == value]
 
 
 def _list_names(names: list[str]) -> str:

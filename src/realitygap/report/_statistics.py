@@ -80,8 +80,10 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
         raise ValueError(f"confidence is {confidence}, expected a number between 0 and 1.")
     if n == 0:
         return None
-    # the smallest k with P(X <= k) >= half of what may be missed: the largest rank that may be the bound
-    lower = int(stats.binom.ppf((1.0 - confidence) / 2.0, n, 0.5))
+    may_miss = (1.0 - confidence) / 2.0
+    # the largest rank r with P(X <= r - 1) <= may_miss; ppf gives the smallest k with P(X <= k) >= may_miss
+    k = int(stats.binom.ppf(may_miss, n, 0.5))
+    lower = k + 1 if stats.binom.cdf(k, n, 0.5) <= may_miss else k
     if lower < 1:
         return None
     return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(stats.binom.cdf(lower - 1, n, 0.5)))

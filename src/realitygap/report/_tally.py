@@ -133,4 +133,4 @@ def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def label_of(condition: Mapping[str, Any]) -> str:
     """What stands on every figure for where the numbers come from: SIM, TWIN, EMULATED or REAL."""
-    return str(condition.get("label") or "unlabeled")
+    return str(condition.get("label") or "unlabeled").encode("utf-8", "replace").decode()

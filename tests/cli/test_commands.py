@@ -1,0 +1,216 @@
+"""The command line as a user meets it: a process, its output and its exit status."""
+
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+
+from realitygap._version import __version__
+from realitygap.cli import app
+
+DATA = Path(__file__).parent.parent / "data"
+
+
+def realitygap(*words: str, cwd: Path | None = None, **options) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "realitygap", *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300, check=False, **options)
+
+
+def one_message(done: subprocess.CompletedProcess, *texts: str) -> str:
+    """The error of a command: one message, no traceback, status 1."""
+    assert done.returncode == 1, done
+    assert done.stderr.count("realitygap: ") == 1
+    assert "Traceback" not in done.stderr
+    for text in texts:
+        assert text in done.stderr
+    return done.stderr
+
+
+COMMANDS = sorted(typer.main.get_command(app).commands)
+
+
+def test_all_commands_are_known():
+    assert COMMANDS == ["bench", "digest", "new-study", "report", "run", "simulate"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example_and_the_python_twin(command):
+    done = realitygap(command, "--help")
+    assert done.returncode == 0
+    assert f"Example: realitygap {command}" in done.stdout
+    assert "In Python: realitygap." in done.stdout
+
+
+def test_python_twins_exist():
+    import realitygap as package
+
+    for command in typer.main.get_command(app).commands.values():
+        path = re.search(r"In Python: realitygap\.([\w.]+)", command.help)[1]
+        thing = package
+        for name in path.split("."):
+            if not hasattr(thing, name):
+                __import__(f"{thing.__name__}.{name}")
+            thing = getattr(thing, name)
+        assert callable(thing), path
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys, realitygap.cli; print([m for m in sys.modules if m.split('.')[0] in %r])"
+    heavy = ["numpy", "numba", "polars", "pydantic", "scipy", "matplotlib", "jinja2"]
+    done = subprocess.run([sys.executable, "-c", code % heavy], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_version():
+    assert realitygap("--version").stdout.strip() == f"realitygap {__version__}"
+
+
+def test_run_prints_a_summary_and_where_things_are(tmp_path):
+    done = realitygap("run", "paper", "--replicates", "6", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for text in ("coverage-10", "novelty-50", "random-80", "SIM", ".154 .222 .166", "54 of 54 runs"):
+        assert text in done.stdout
+    assert "results/paper" in done.stdout
+    assert len(max(done.stdout.splitlines(), key=len)) <= 100
+    again = realitygap("run", "paper", "--replicates", "6", cwd=tmp_path)
+    assert "All 54 runs were there already" in again.stdout
+
+
+def test_run_as_json(tmp_path):
+    done = realitygap("run", "paper", "--replicates", "6", "--json", "--out", str(tmp_path / "r"))
+    summary = json.loads(done.stdout)
+    assert summary["computed"] == 54
+    rows = {row["condition"]: row for row in summary["conditions"]}
+    assert len(rows) == 9
+    for row in rows.values():
+        assert row["n"] == 6
+        assert 0 < row["ends_median"] <= row["line_median"] <= 1
+        assert row["line_low"] <= row["line_median"] <= row["line_high"]
+    assert rows["coverage-10"]["published"] == [0.154, 0.222, 0.166]
+
+
+def test_run_ends_with_130_on_ctrl_c_and_goes_on(tmp_path):
+    command = [sys.executable, "-m", "realitygap", "run", "paper", "--replicates", "300", "--chunk", "3"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    trials = tmp_path / "results" / "paper" / "trials"
+    until = time.monotonic() + 120
+    while len(list(trials.glob("*.parquet"))) < 3 and time.monotonic() < until:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130, errors
+    assert "the same command goes on where it stopped" in errors
+    assert "Traceback" not in errors
+    before = len(list(trials.glob("*.parquet")))
+    assert before >= 3
+    done = realitygap("run", "paper", "--replicates", "300", cwd=tmp_path)
+    assert done.returncode == 0
+    computed = int(re.search(r"(\d+) of 2700 runs computed", done.stdout)[1])
+    assert 0 < computed <= 2700 - 3 * 3
+
+
+def limit_file_size() -> None:
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+
+def test_a_full_disk_stops_the_run_with_a_message_and_loses_nothing(tmp_path):
+    small = realitygap("run", "paper", "--replicates", "4", "--chunk", "1", "--out", "r", cwd=tmp_path)
+    assert small.returncode == 0, small.stderr
+    environment = {**os.environ, "NUMBA_CACHE_DIR": ""}
+    full = realitygap(
+        "run", "paper", "--replicates", "200", "--chunk", "100", "--out", "r",
+        cwd=tmp_path, preexec_fn=limit_file_size, env=environment,
+    )  # fmt: skip
+    one_message(full, "goes on")
+    assert len(list((tmp_path / "r" / "trials").glob("*.parquet"))) == 9 * 4
+    done = realitygap("run", "paper", "--replicates", "8", "--out", "r", cwd=tmp_path)
+    assert "36 of 72 runs computed" in done.stdout
+
+
+def test_a_torn_file_is_named(tmp_path):
+    realitygap("run", "paper", "--replicates", "1", "--out", "r", cwd=tmp_path)
+    victim = next((tmp_path / "r" / "trials").glob("*.parquet"))
+    victim.write_bytes(victim.read_bytes()[:1000])
+    for command in ("run paper --replicates 1 --out r", "digest r", "report r"):
+        one_message(realitygap(*command.split(), cwd=tmp_path), victim.name)
+
+
+def test_digest_prints_64_digits(tmp_path):
+    realitygap("run", "paper", "--replicates", "1", "--out", "r", cwd=tmp_path)
+    done = realitygap("digest", "r", cwd=tmp_path)
+    assert re.fullmatch(r"[0-9a-f]{64}\n", done.stdout)
+
+
+def test_new_study_writes_a_file_that_runs(tmp_path):
+    assert realitygap("new-study", "mine.toml", cwd=tmp_path).returncode == 0
+    done = realitygap("run", "mine.toml", "--replicates", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "results" / "mine" / "study.json").exists()
+
+
+def test_new_study_never_overwrites(tmp_path):
+    (tmp_path / "mine.toml").write_text("precious")
+    one_message(realitygap("new-study", "mine.toml", cwd=tmp_path), "exists already")
+    assert (tmp_path / "mine.toml").read_text() == "precious"
+
+
+def test_report_writes_a_page(tmp_path):
+    realitygap("run", "paper", "--replicates", "6", "--out", "r", cwd=tmp_path)
+    done = realitygap("report", "r", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "r" / "report.html").stat().st_size > 10_000
+
+
+def test_simulate_repeats_jyro(tmp_path):
+    case = DATA / "jyro" / "s15_net_linear_a.json"
+    done = realitygap("simulate", str(case), "--out", "track.csv", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "track.csv").read_text() == case.with_suffix(".csv").read_text()
+
+
+def test_bench_measures_what_it_names():
+    done = realitygap("bench", "--json", "--seconds", "0.05")
+    figures = json.loads(done.stdout)
+    assert set(figures) == {
+        "robot_steps_per_second",
+        "paper_runs_per_second",
+        "paper_runs_recorded_per_second",
+        "machine",
+        "versions",
+    }
+    for name in list(figures)[:3]:
+        assert set(figures[name]) == {"per_core", "all_cores"}
+        assert all(rate > 0 for rate in figures[name].values())
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        ("run papr", ["Unknown study 'papr'", "Did you mean 'paper'?"]),
+        ("run nowhere.toml", ["no file nowhere.toml", "new-study"]),
+        ("digest nowhere", ["nowhere does not exist"]),
+        ("report nowhere", ["nowhere does not exist"]),
+        ("simulate nowhere.json --out x.csv", ["nowhere.json"]),
+        ("new-study mine.txt", ["does not end in .toml"]),
+        ("new-study no/such/folder/mine.toml", ["cannot be written"]),
+        ("run paper --replicates 1 --out /dev/null/x", ["/dev/null/x"]),
+    ],
+)
+def test_a_wrong_word_gets_one_message(words, texts, tmp_path):
+    one_message(realitygap(*words.split(), cwd=tmp_path), *texts)
+
+
+@pytest.mark.parametrize("words", ["run", "run paper --replicates 0", "run paper --replicates x", "fly"])
+def test_wrong_usage_ends_with_2(words, tmp_path):
+    done = realitygap(*words.split(), cwd=tmp_path)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,249 @@
+from __future__ import annotations
+
+import re
+import socket
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from realitygap.errors import RecordError
+from realitygap.report import summarize, write_report
+from tests.report.results import describe, random_runs, settings, write_results
+
+VOID = {"meta", "br", "hr", "img", "input", "link", "col"}
+
+
+class Page(HTMLParser):
+    """A page taken apart: that tags close in order, which ids and references there are, and its text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.ids: list[str] = []
+        self.text: list[str] = []
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        assert len(values) == len(attrs), f"{tag} repeats an attribute"
+        self.tags.append((tag, values))
+        if "id" in values:
+            self.ids.append(values["id"])
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if "id" in dict(attrs):
+            self.ids.append(dict(attrs)["id"])
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text.append(data)
+
+    @property
+    def words(self) -> str:
+        return re.sub(r"\s+", " ", " ".join(self.text))
+
+
+def report(folder) -> tuple[str, Page]:
+    html = write_report(folder).read_text("utf-8")
+    return html, Page(html)
+
+
+@pytest.fixture(scope="module")
+def tiny_page(tiny_study):
+    return report(tiny_study)
+
+
+def test_page_needs_nothing_from_elsewhere(tiny_page):
+    html, page = tiny_page
+    assert "http:" not in html
+    assert "https:" not in html
+    assert not {"script", "link", "img", "iframe", "image", "object", "embed"} & {tag for tag, _ in page.tags}
+    for _, attributes in page.tags:
+        assert not {"src", "srcset", "xlink:href", "onload", "onclick"} & set(attributes)
+        assert attributes.get("href", "#").startswith("#")
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", html))
+    assert "@import" not in html
+
+
+def test_ids_are_unique_and_references_lead_somewhere(tiny_page):
+    html, page = tiny_page
+    assert len(set(page.ids)) == len(page.ids)
+    wanted = re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)|aria-labelledby="([^"]+)"', html)
+    assert {next(filter(None, target)) for target in wanted} <= set(page.ids)
+
+
+def test_page_can_be_heard(tiny_page):
+    _, page = tiny_page
+    pictures = [attributes for tag, attributes in page.tags if tag == "svg"]
+    assert len(pictures) == 8, "coverage, two path figures and choices, each wide and narrow"
+    assert all(each["role"] == "img" and len(each["aria-label"]) > 40 for each in pictures)
+    headings = [tag for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
+    assert headings[0] == "h1"
+    assert set(headings[1:]) == {"h2"}
+    assert [tag for tag, _ in page.tags].count("caption") == [tag for tag, _ in page.tags].count("table")
+    assert ("a", {"class": "skip", "href": "#main"}) in page.tags
+    assert ("html", {"lang": "en"}) in page.tags
+
+
+def test_page_says_what_was_run(tiny_page, tiny_study):
+    _, page = tiny_page
+    assert tiny_study.digest() in page.words
+    assert "A tiny study" in page.words
+    assert "28 (7 replicates of each condition planned)" in page.words
+    assert f"{28 * 24} networks tried once each" in page.words
+    assert f"{28 * 24 * 30:,}" in page.words
+    assert "realitygap run STUDY.toml --seed 1 --replicates 7 --out DIR" in page.words
+    assert "no robot was driven" in page.words
+
+
+def test_numbers_are_those_of_the_summary(tiny_page, tiny_study):
+    html, _ = tiny_page
+    table = re.search(r"<table class=\"numbers\">.*?</table>", html, re.S)[0]
+    rows = re.findall(r"<tr><th scope=\"row\">.*?</tr>", table)
+    summary = summarize(tiny_study)
+    assert len(rows) == summary.height == 4
+    for html_row, row in zip(rows, summary.iter_rows(named=True), strict=True):
+        cells = [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<t[hd].*?</t[hd]>", html_row)]
+        expected = [row["condition"], row["label"], str(row["n"])]
+        for which in ("line", "ends"):
+            expected.append(f"{row[f'{which}_median']:.3f}")
+            expected.append(f"{row[f'{which}_low']:.3f}–{row[f'{which}_high']:.3f}")
+            expected.append(f"{row[f'{which}_q25']:.3f}–{row[f'{which}_q75']:.3f}")
+        expected += [f"{value:.3f}" for value in row["published"] or []] or ["–"] * 3
+        assert cells == expected
+
+
+def test_interval_is_described_as_it_is(tiny_page):
+    _, page = tiny_page
+    assert (
+        "With n = 7 it runs from the 1st to the 7th of the ordered values and covers the median with 98.4 %"
+        in (page.words)
+    )
+
+
+def test_input_nodes_are_counted_by_condition(tiny_page):
+    _, page = tiny_page
+    assert "Input nodes 3; 4 with novelty 3 ; 4 in novelty" in page.words
+
+
+def test_settings_that_differ_are_marked(tiny_page):
+    html, _ = tiny_page
+    marked = re.findall(r"<mark>(.*?)</mark>", html)
+    assert sorted(marked) == ["0.9", "ends", "novelty"]
+    assert "<code>neat.add_link</code>" in html
+
+
+def test_a_study_that_comes_along_is_rerun_by_name(out):
+    from realitygap.study import load_study, run_study
+
+    folder = run_study(load_study("paper", replicates=1), out).folder
+    _, page = report(folder)
+    assert "The study comes with realitygap." in page.words
+    assert "realitygap run paper --seed 1 --replicates 1 --out DIR" in page.words
+
+
+def test_hostile_text_stays_text(out, no_replay):
+    evil = "<script>alert(1)</script>\"'&${x}$ \x07 \ud800 url(http://x) #1c1f24"
+    conditions = [
+        describe("base", label=evil, published=[0.2], published_source=evil),
+        describe(
+            "other", label=evil, baseline="base", change=evil, settings=settings(selection=evil, noise=evil)
+        ),
+    ]
+    coverages = {"base": random_runs(6), "other": random_runs(6)}
+    folder = write_results(out, conditions, coverages, title=evil, name=evil, software=evil, seed=evil)
+    html, page = report(folder)
+    assert "script" not in {tag for tag, _ in page.tags}
+    assert "<script" not in html
+    assert "alert(1)" in page.words
+    assert len(set(page.ids)) == len(page.ids)
+
+
+def test_incomplete_study_says_what_is_missing(out, no_replay):
+    conditions = [describe("c"), describe("d")]
+    folder = write_results(out, conditions, {"c": random_runs(3)}, replicates=10)
+    _, page = report(folder)
+    assert "The study is incomplete" in page.words
+    assert (
+        "3 of 20 runs are there. c lacks 7 (replicates 3 to 9); d lacks 10 (replicates 0 to 9)." in page.words
+    )
+    assert "no runs yet" in page.words
+
+
+def test_complete_study_has_no_banner(tiny_page):
+    html, _ = tiny_page
+    assert 'class="banner"' not in html
+
+
+def test_other_version_is_announced_and_not_warned_of(out, monkeypatch, recwarn):
+    for module in ("_folder", "_chunk"):
+        monkeypatch.setattr(f"realitygap.records.{module}.RESULTS_VERSION", 99)
+    strange = describe("c", settings=settings(flux=3))
+    folder = write_results(out, [strange], {"c": random_runs(2)})
+    monkeypatch.undo()
+    _, page = report(folder.path)
+    assert "Results of another version" in page.words
+    assert "results version 99" in page.words
+    assert "cannot read the settings of condition c" in page.words
+    assert len(recwarn) == 0
+
+
+@pytest.mark.parametrize(("n", "generations"), [(1, 3), (2, 1), (1, 1)])
+def test_the_smallest_studies_have_a_page(out, no_replay, n, generations):
+    folder = write_results(out, [describe("only")], {"only": random_runs(n, generations)})
+    _, page = report(folder)
+    assert f"With n = {n} there is no interval" in page.words
+    assert "Figure 6." in page.words
+    assert "Choices" not in page.words
+
+
+def test_conditions_without_settings_have_a_page(out, no_replay):
+    _, page = report(write_results(out, ["c"], {"c": random_runs(2)}))
+    assert "unlabeled" in page.words
+
+
+def test_no_rows_is_a_clear_error_and_leaves_nothing(out):
+    write_results(out, [describe("c")], {})
+    with pytest.raises(RecordError, match="holds no trials yet"):
+        write_report(out)
+    assert not list(out.glob("*report*"))
+
+
+def test_page_goes_where_it_is_told_and_replaces_what_is_there(tiny_study, tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text("old")
+    assert write_report(tiny_study.path, path) == path
+    assert path.read_text("utf-8").startswith("<!DOCTYPE html>")
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+
+
+def test_a_folder_that_is_not_there_is_a_clear_error(tiny_study, tmp_path):
+    with pytest.raises(RecordError, match="Could not write"):
+        write_report(tiny_study, tmp_path / "nowhere" / "page.html")
+
+
+def test_the_same_results_give_the_same_page(tiny_study, tmp_path):
+    first, second = write_report(tiny_study, tmp_path / "a"), write_report(tiny_study, tmp_path / "b")
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_writing_a_page_uses_no_network(tiny_study, tmp_path, monkeypatch):
+    def refuse(*_: object) -> None:
+        raise AssertionError("a socket was opened")
+
+    monkeypatch.setattr(socket.socket, "connect", refuse)
+    write_report(tiny_study, tmp_path / "page.html")
+
+
+def test_page_is_small(tiny_study):
+    assert Path(write_report(tiny_study)).stat().st_size < 500_000

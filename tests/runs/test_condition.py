@@ -1,0 +1,68 @@
+"""A condition as resolved."""
+
+import pytest
+from pydantic import ValidationError
+
+from realitygap.runs import Condition
+
+
+def test_settings_give_the_condition_again():
+    condition = Condition(name="a", selection="novelty", noise=0.5, arena={"start": [0.3, 0.3, 1.0]}, pair=False)
+    again = Condition.from_settings("a", condition.settings())
+    assert again == condition
+    assert again.hash() == condition.hash()
+
+
+def test_every_setting_changes_the_hash():
+    base = Condition(name="a")
+    changed = [
+        Condition(name="a", **change)
+        for change in (
+            {"selection": "random"},
+            {"noise": 0.2},
+            {"seed": 2},
+            {"pair": False},
+            {"arena": {"start": "center"}},
+            {"task": {"cells": "ends"}},
+            {"novelty": {"archive_size": 9}},
+            {"jyro": {"steps": 88}},
+            {"neat": base.neat.model_copy(update={"add_node": 0.06})},
+        )
+    ]
+    assert len({condition.hash() for condition in [base, *changed]}) == len(changed) + 1
+
+
+def test_the_name_counts_only_where_random_numbers_depend_on_it():
+    assert Condition(name="a").hash() == Condition(name="b").hash()
+    assert Condition(name="a").key == Condition(name="b").key
+    assert Condition(name="a", pair=False).hash() != Condition(name="b", pair=False).hash()
+    assert Condition(name="a", pair=False).key != Condition(name="b", pair=False).key
+
+
+@pytest.mark.parametrize("start", [[0.05, 0.3, 0.0], [0.1, 0.1, 0.7], [0.5, 0.55, 0.0]])
+def test_a_robot_that_does_not_fit_at_the_start_is_refused(start):
+    with pytest.raises(ValidationError, match="does not fit at the start"):
+        Condition(name="a", arena={"start": start})
+
+
+@pytest.mark.parametrize(
+    ("selection", "bias_input", "has"),
+    [
+        ("coverage", "with-novelty", False),
+        ("novelty", "with-novelty", True),
+        ("random", "with-novelty", False),
+        ("coverage", "always", True),
+        ("novelty", "never", False),
+    ],
+)
+def test_the_constant_input_comes_with_novelty(selection, bias_input, has):
+    condition = Condition(name="a", selection=selection, task={"bias_input": bias_input})
+    assert condition.has_bias_input is has
+    assert condition.neat_rules.n_inputs == 3 + has
+    assert condition.neat_rules.bias_input == (3 if has else -1)
+
+
+@pytest.mark.parametrize("name", ["", "a b", "../a", ".a", "a/b", "ä"])
+def test_a_name_must_fit_into_a_file_name(name):
+    with pytest.raises(ValidationError):
+        Condition(name=name)

@@ -1,0 +1,279 @@
+"""Study files: read by name and by path, mistakes said all at once."""
+
+import pytest
+
+from realitygap.errors import StudyError
+from realitygap.study import load_study, named_studies, parse_study
+
+MINIMAL = """
+[study]
+name = "mine"
+[[condition]]
+name = "a"
+"""
+
+
+def mistakes(text: str) -> list[str]:
+    with pytest.raises(StudyError) as caught:
+        parse_study(text, "mine.toml")
+    head, *lines = str(caught.value).split("\n  ")
+    assert head == f"mine.toml has {len(lines)} mistake{'s' if len(lines) != 1 else ''}; nothing was run."
+    return lines
+
+
+def test_paper_study_is_table_1_of_the_paper():
+    study = load_study("paper")
+    assert [condition.name for condition in study.conditions] == [
+        f"{selection}-{noise}" for selection in ("coverage", "novelty", "random") for noise in (10, 50, 80)
+    ]
+    for condition in study.conditions:
+        selection, noise = condition.name.split("-")
+        assert condition.selection == selection
+        assert condition.noise == int(noise) / 100
+        assert (condition.neat.population, condition.neat.generations) == (8, 5)
+        assert (condition.neat.add_link, condition.neat.add_node) == (0.1, 0.05)
+        assert condition.jyro.steps == 87
+        assert condition.has_bias_input == (selection == "novelty")
+        assert condition.neat_rules.n_inputs == (4 if selection == "novelty" else 3)
+        assert condition.neat_rules.n_outputs == 2
+    assert study.about.replicates == 100
+
+
+def test_paper_values_are_those_of_table_2():
+    notes = dict(zip((c.name for c in load_study("paper").conditions), load_study("paper").notes, strict=True))
+    assert notes["coverage-10"].published == [0.154, 0.222, 0.166]
+    assert notes["coverage-50"].published == [0.208, 0.432, 0.389]
+    assert notes["coverage-80"].published == [0.180, 0.333, 0.333]
+    assert all(notes[f"novelty-{noise}"].published is None for noise in (10, 50, 80))
+
+
+def flat(values: dict, place: str = "") -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key, value in values.items():
+        where = f"{place}.{key}".removeprefix(".")
+        found |= flat(value, where) if isinstance(value, dict) else {where: value}
+    return found
+
+
+def test_paper_choices_change_one_choice_at_a_time():
+    study = load_study("paper-choices")
+    by_name = {condition.name: flat(condition.settings()) for condition in study.conditions}
+    together = {  # one choice that takes several settings
+        "coverage-sigmoid": {"neat.activation", "neat.activation_slope"},
+        "coverage-neat-python": {
+            "neat.settings",
+            "neat.node_bias",
+            "neat.activation_slope",
+            "neat.structural_mutations",
+            "neat.split_bias_links",
+        },
+    }
+    for condition, notes in zip(study.conditions, study.notes, strict=True):
+        if notes.baseline is None:
+            assert notes.change is None
+            continue
+        ours, base = by_name[condition.name], by_name[notes.baseline]
+        changed = {key for key in ours if ours[key] != base[key]}
+        assert notes.change
+        assert changed == together.get(condition.name, changed)
+        assert len(changed) == 1 or condition.name in together, (condition.name, changed)
+
+
+@pytest.mark.parametrize(
+    ("setting", "alternatives"),
+    [
+        ("neat.activation", {"tanh", "sigmoid"}),
+        ("arena.start", {"corner", "center", "left"}),
+        ("task.cells", {"line", "ends"}),
+        ("jyro.noisy_reading", {"leave", "clip"}),
+        ("jyro.steps", {87, 70}),
+        ("neat.settings", {"rosenzweig-remy", "rosenzweig-remy-neat-python"}),
+        ("novelty.enter", {"above-all", "above-least"}),
+        ("novelty.kind", {"paper", "lehman-stanley"}),
+        ("novelty.sort", {"x-then-y", "y-then-x"}),
+    ],
+)
+def test_paper_choices_try_every_alternative(setting, alternatives):
+    tried = {flat(condition.settings())[setting] for condition in load_study("paper-choices").conditions}
+    assert tried == alternatives
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "jyro.sensor_offset",
+        "jyro.turn_per_step",
+        "novelty.archive_size",
+        "task.bias_input",
+        "neat.initial_weight",
+        "neat.weight_step",
+        "neat.replace_weight",
+        "neat.threshold",
+    ],
+)
+def test_paper_choices_vary_every_number(setting):
+    tried = {flat(condition.settings())[setting] for condition in load_study("paper-choices").conditions}
+    assert len(tried) > 1
+
+
+def test_all_mistakes_are_said_at_once_each_with_its_place():
+    lines = mistakes(
+        """
+        sede = 1
+        [study]
+        name = "a b"
+        replicates = "many"
+        sede = 3
+        [neat]
+        settings = "stanly"
+        populaton = 3
+        add_link = 2
+        [arena]
+        start = "middle"
+        [platform.jyrp]
+        [[condition]]
+        name = "x"
+        noise = "high"
+        selection = "covrage"
+        baseline = "y"
+        [condition.neat]
+        population = 1
+        [[condition]]
+        [[condition]]
+        name = "x"
+        [condition.arena]
+        preset = "papr"
+        """
+    )
+    expected = [
+        ("sede", "unknown section"),
+        ("study.name", "expected letters"),
+        ("study.replicates", "expected a whole number, came 'many'"),
+        ("study.sede", "Did you mean 'seed'?"),
+        ("platform.jyrp", "Did you mean 'jyro'?"),
+        ("arena.start", "came 'middle'"),
+        ("neat.settings", "Did you mean 'stanley-2002'?"),
+        ("neat.populaton", "Did you mean 'population'?"),
+        ("neat.add_link", "expected at most 1.0, came 2"),
+        ("condition[1] 'x'.noise", "expected a number, came 'high'"),
+        ("condition[1] 'x'.selection", "Did you mean 'coverage'?"),
+        ("condition[1] 'x'.neat.population", "expected at least 2, came 1"),
+        ("condition[2].name", "missing"),
+        ("condition[3] 'x'", "taken by an earlier condition"),
+        ("condition[3] 'x'.arena.preset", "came 'papr'"),
+    ]
+    for place, text in expected:
+        assert any(line.startswith(f"{place}: ") and text in line for line in lines), (place, text, lines)
+    assert len(lines) == len(expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "text"),
+    [
+        ('noise = "a"', "condition[1] 'a'.noise", "expected a number"),
+        ("noise = nan", "condition[1] 'a'.noise", "expected a finite number"),
+        ("noise = true", "condition[1] 'a'.noise", "expected a number"),
+        ("noise = -0.1", "condition[1] 'a'.noise", "expected at least 0"),
+        ('platform = "sim"', "condition[1] 'a'.platform", "came 'sim'"),
+        ('baseline = "b"', "condition 'a'.baseline", "there is no condition 'b'"),
+        ("published = [0.1, 2]", "condition[1] 'a'.published", "expected at most 1"),
+        ("wheels = 2", "condition[1] 'a'.wheels", "unknown setting"),
+        ("neat = 3", "condition[1] 'a'.neat", "expected a table"),
+        ("arena.start = [9.0, 0.3, 0.0]", "condition[1] 'a'.arena.start", "outside the arena"),
+        ("arena.start = [0.1, 0.3]", "condition[1] 'a'.arena.start", "expected"),
+        ("arena.start = [0.1, 0.05, 0.0]", "condition[1] 'a'", "does not fit at the start"),
+        ("jyro.steps = 0", "condition[1] 'a'.jyro.steps", "expected at least 1"),
+        ("novelty.archive_size = 0", "condition[1] 'a'.novelty.archive_size", "expected at least 1"),
+    ],
+)
+def test_a_mistake_in_a_condition_is_said_with_its_place(change, place, text):
+    (line,) = mistakes(MINIMAL + change)
+    assert line.startswith(f"{place}: ")
+    assert text in line
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[study", "not TOML"),
+        ("", "study: missing"),
+        ('[study]\nname = "x"', "at least one [[condition]]"),
+        ('[study]\nname = "x"\n[condition]\nname = "y"', "at least one [[condition]]"),
+        ('study = "x"\n[[condition]]\nname = "y"', "study: expected a table"),
+    ],
+)
+def test_a_file_that_is_no_study_is_refused(text, message):
+    with pytest.raises(StudyError, match="mine.toml") as caught:
+        parse_study(text, "mine.toml")
+    assert message in str(caught.value)
+
+
+def test_the_same_mistake_in_a_shared_section_is_said_once():
+    text = MINIMAL + '[[condition]]\nname = "b"\n[neat]\nadd_link = 7\n'
+    assert mistakes(text) == ["neat.add_link: expected at most 1.0, came 7."]
+
+
+def test_unknown_study_names_the_nearest():
+    with pytest.raises(StudyError, match="Did you mean 'paper'"):
+        load_study("papr")
+
+
+def test_missing_file_says_how_to_write_one():
+    with pytest.raises(StudyError, match="new-study"):
+        load_study("nowhere/mine.toml")
+
+
+def test_binary_file_is_refused(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(StudyError, match="cannot be read"):
+        load_study(path)
+
+
+def test_conditions_override_sections_and_named_sets_fill_the_rest():
+    study = parse_study(
+        """
+        [study]
+        name = "mine"
+        [neat]
+        settings = "stanley-2002"
+        population = 20
+        add_node = 0.2
+        [platform.jyro]
+        steps = 50
+        [[condition]]
+        name = "base"
+        [[condition]]
+        name = "other"
+        [condition.neat]
+        settings = "rosenzweig-remy"
+        add_node = 0.3
+        [condition.jyro]
+        turn_per_step = 0.5
+        """,
+        "mine.toml",
+    )
+    base, other = study.conditions
+    assert (base.neat.settings, base.neat.population, base.neat.add_node) == ("stanley-2002", 20, 0.2)
+    assert base.neat.activation == "sigmoid"
+    assert (other.neat.settings, other.neat.population, other.neat.add_node) == ("rosenzweig-remy", 20, 0.3)
+    assert other.neat.activation == "tanh"
+    assert (base.jyro.steps, base.jyro.turn_per_step) == (50, 0.1)
+    assert (other.jyro.steps, other.jyro.turn_per_step) == (50, 0.5)
+
+
+def test_seed_and_replicates_can_be_given_beside_the_file():
+    study = load_study("paper", seed=9, replicates=3)
+    assert study.about.replicates == 3
+    assert {condition.seed for condition in study.conditions} == {9}
+
+
+def test_a_wrong_seed_beside_the_file_is_said():
+    with pytest.raises(StudyError, match=r"study.replicates: expected at least 1"):
+        load_study("paper", replicates=0)
+
+
+def test_every_named_study_resolves():
+    assert named_studies() == ["paper", "paper-choices"]
+    for name in named_studies():
+        assert load_study(name).about.name == name

@@ -1,0 +1,30 @@
+"""The file that `realitygap new-study` writes."""
+
+import re
+
+from realitygap.runs import Condition
+from realitygap.study import SECTIONS, ConditionNotes, ReportSection, StudySection, parse_study, study_template
+
+
+def test_template_is_a_study_with_the_defaults():
+    study = parse_study(study_template("mine"), "mine.toml")
+    first, second = study.conditions
+    assert first == Condition(name="coverage-10", seed=1, pair=True)
+    assert second.arena.start == "center"
+    assert study.about == StudySection(name="mine")
+
+
+def test_every_setting_stands_in_the_template():
+    text = study_template("mine")
+    for model in (StudySection, ReportSection, ConditionNotes, *SECTIONS.values()):
+        for key in model.model_fields:
+            assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), (model, key)
+
+
+def test_settings_shown_as_defaults_can_be_switched_on_and_change_nothing():
+    text = study_template("mine")
+    until_conditions = text.split("[[condition]]")[0]
+    on = re.sub(r"^# (\w+ = )", r"\1", until_conditions, flags=re.MULTILINE)
+    assert on != until_conditions
+    rest = text[len(until_conditions) :]
+    assert parse_study(on + rest, "on.toml").conditions == parse_study(text, "off.toml").conditions

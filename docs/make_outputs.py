@@ -67,7 +67,12 @@ def blocks(text: str) -> Iterator[Block]:
     """The fenced blocks of a document, in order."""
     for match in BLOCK.finditer(text):
         yield Block(
-            match["kind"], match["body"], match["mark"] or "", match["text"] or "", match.start("body"), match.end("body")
+            match["kind"],
+            match["body"],
+            match["mark"] or "",
+            match["text"] or "",
+            match.start("body"),
+            match.end("body"),
         )
 
 
@@ -187,7 +192,9 @@ def differences(written: str, now: str, where: str) -> list[str]:
         written, now = pattern.sub(word, written), pattern.sub(word, now)
     if written == now:
         return []
-    diff = difflib.unified_diff(written.splitlines(), now.splitlines(), "as written", "as it is now", lineterm="")
+    diff = difflib.unified_diff(
+        written.splitlines(), now.splitlines(), "as written", "as it is now", lineterm=""
+    )
     return [f"{where}:\n" + "\n".join(diff)]
 
 

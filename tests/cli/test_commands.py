@@ -21,7 +21,9 @@ DATA = Path(__file__).parent.parent / "data"
 
 def realitygap(*words: str, cwd: Path | None = None, **options) -> subprocess.CompletedProcess:
     command = [sys.executable, "-m", "realitygap", *words]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300, check=False, **options)
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, timeout=300, check=False, **options
+    )
 
 
 def one_message(done: subprocess.CompletedProcess, *texts: str) -> str:
@@ -99,7 +101,9 @@ def test_run_as_json(tmp_path):
 
 def test_run_ends_with_130_on_ctrl_c_and_goes_on(tmp_path):
     command = [sys.executable, "-m", "realitygap", "run", "paper", "--replicates", "300", "--chunk", "3"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     trials = tmp_path / "results" / "paper" / "trials"
     until = time.monotonic() + 120
     while len(list(trials.glob("*.parquet"))) < 3 and time.monotonic() < until:

@@ -6,7 +6,6 @@ from ._arena import (
     Arena,
     Grid,
     Pose,
-    distance_to_walls,
     is_inside,
     paper_arena,
 )
@@ -25,7 +24,6 @@ __all__ = [
     "Grid",
     "Pose",
     "RangeSensors",
-    "distance_to_walls",
     "is_inside",
     "paper_arena",
 ]

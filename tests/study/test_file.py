@@ -207,7 +207,7 @@ def test_a_mistake_in_a_condition_is_said_with_its_place(change, place, text):
     ],
 )
 def test_a_file_that_is_no_study_is_refused(text, message):
-    with pytest.raises(StudyError, match="mine.toml") as caught:
+    with pytest.raises(StudyError, match=r"mine\.toml") as caught:
         parse_study(text, "mine.toml")
     assert message in str(caught.value)
 

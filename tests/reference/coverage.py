@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -27,7 +28,7 @@ def cells_on_line(u0: float, v0: float, u1: float, v1: float) -> list[Cell]:
                 crossings.add((border - start) / (end - start))
     ordered = sorted(crossings)
     cells = [cell_of(a, b)]
-    for before, after in zip(ordered[:-1], ordered[1:], strict=True):
+    for before, after in itertools.pairwise(ordered):
         middle = (before + after) / 2
         cells.append(cell_of(a + middle * (c - a), b + middle * (d - b)))
     cells.append(cell_of(c, d))

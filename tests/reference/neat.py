@@ -209,7 +209,7 @@ class Neat:
             share_of_a = 1.0 if len(a.genes) <= len(b.genes) else 0.0
             if settings.equal_parents == "mix":
                 share_of_a = 0.5
-        child = Genome(biases={node: 0.0 for node in self.outputs})
+        child = Genome(biases=dict.fromkeys(self.outputs, 0.0))
         for number in sorted(a.genes.keys() | b.genes.keys()):
             genes = [parent.genes[number] for parent in (a, b) if number in parent.genes]
             if len(genes) == 2:
@@ -373,9 +373,7 @@ class Evolution:
             shared = [f if f >= 0.0 else 0.0001 for f in fitness]
         else:
             shared = [f - min(0.0, *fitness) for f in fitness]
-        counts = self.neat.offspring(
-            shared, self.species_of, self.species, self.generation, self.improved_at
-        )
+        counts = self.neat.offspring(shared, self.species_of, self.species, self.generation, self.improved_at)
         self.history.forget()
         children: list[Genome] = []
         self.parents = []

@@ -95,7 +95,7 @@ class NeatSettings(BaseModel):
         0.03, ge=0, le=1, description="Share of mutated children that split a link (EC02 4.1: 0.03)."
     )
     add_link: float = Field(
-        0.05,
+        0.3,
         ge=0,
         le=1,
         description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
@@ -199,7 +199,7 @@ class NeatSettings(BaseModel):
         description="The champion is copied unchanged in species of this many (EC02 4.1: more than five).",
     )
     champion_counts: Literal["members", "offspring"] = Field(
-        "members", description="Many members (EC02), or many children to come (C++)."
+        "offspring", description="Many members (EC02), or many children to come (C++)."
     )
     stagnation: int = Field(
         15,
@@ -215,7 +215,7 @@ class NeatSettings(BaseModel):
         description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01).",
     )
     best_species_spared: bool = Field(
-        False,
+        True,
         description="Whether the species with the fittest individual is never called stagnant (EC02: no).",
     )
     population_stagnation: int = Field(
@@ -305,8 +305,11 @@ _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
     "generations": 100,
+    "add_link": 0.05,
     "normalize_genes": "large",
+    "champion_counts": "members",
     "stagnation_factor": 0.0,
+    "best_species_spared": False,
 }
 
 # Table 1 on top; its words are those of an old neat-python, whose networks answered from -1 to 1.
@@ -322,12 +325,7 @@ _ROSENZWEIG: dict[str, Any] = {
 }
 
 NAMED_SETTINGS: Mapping[str, Mapping[str, Any]] = {
-    "default": {
-        "settings": "default",
-        "add_link": 0.3,
-        "champion_counts": "offspring",
-        "best_species_spared": True,
-    },
+    "default": {"settings": "default"},
     "stanley-2002": _STANLEY,
     "rosenzweig-remy": _ROSENZWEIG,
     "rosenzweig-remy-neat-python": {

@@ -41,8 +41,9 @@ BLOCK = re.compile(
 # What differs from one run and machine to the next.
 VOLATILE = [
     (re.compile(r"\b[\d.]+ s \([\d,]+ runs/s\)"), "T s (R runs/s)"),
-    (re.compile(r"^-?rw\S+ .*$", re.MULTILINE), ""),
 ]
+# What stands where a terminal would have the progress bar.
+STARTING = re.compile(r"^Compiling or loading the kernels .*\n+", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,9 @@ def rewrite(text: str, name: str) -> tuple[str, list[str]]:
                 Path(block.text).write_text(body, "utf-8")
             elif block.mark != "not run" and block.kind == "console":
                 body = run_console(body)
-                problems += differences(block.body, body, where)
+                changes = differences(block.body, body, where)
+                problems += changes
+                body = body if changes else block.body  # no new times where nothing else is new
             elif block.mark != "not run" and block.kind == "python":
                 problems += run_python(body, namespace, where)
             parts += [text[since : block.start], body]
@@ -150,10 +153,10 @@ def run_console(body: str) -> str:
 
 def run_command(command: str) -> str:
     """What a command prints; ours runs in this process, which has its kernels loaded already."""
-    words = shlex.split(command, comments=True)
-    if words[0] != "realitygap" or set(words) & {"&&", "|", ">", ";"}:
-        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
-        return done.stdout + (done.stderr if done.returncode else "")
+    own, pipe, rest = command.partition(" | ")
+    words = shlex.split(own, comments=True)
+    if words[0] != "realitygap":
+        return run_shell(command, "")
     from realitygap.cli import main
 
     out, error, before = io.StringIO(), io.StringIO(), sys.argv
@@ -166,7 +169,15 @@ def run_command(command: str) -> str:
         status = end.code
     finally:
         sys.argv = before
-    return out.getvalue() + (error.getvalue() if status else "")
+    if status:
+        return out.getvalue() + STARTING.sub("", error.getvalue())
+    return run_shell(rest, out.getvalue()) if pipe else out.getvalue()
+
+
+def run_shell(command: str, given: str) -> str:
+    """What a command of the system prints."""
+    done = subprocess.run(["bash", "-c", command], input=given, capture_output=True, text=True, check=False)
+    return done.stdout + (done.stderr if done.returncode else "")
 
 
 def run_python(body: str, namespace: dict[str, object], where: str) -> list[str]:

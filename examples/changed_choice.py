@@ -47,7 +47,7 @@ def main() -> None:
         higher = (best["turn-0.9"] > best["turn-0.1"]).sum()
         lower = (best["turn-0.9"] < best["turn-0.1"]).sum()
         print(
-            f"With 0.9 rad, {higher} of {RUNS} runs cover more than with 0.1 rad and the same random numbers, {lower} less."
+            f"Pairs of runs with the same random numbers: {higher} of {RUNS} cover more with 0.9 rad, {lower} less."
         )
 
 

@@ -42,10 +42,10 @@ def main() -> None:
 
     rows = run_replicates(condition, REPLICATE, 1)
     as_study = list(zip(rows["novelty"].to_list(), rows["coverage_line"].to_list(), strict=True))
-    print(
-        f"Equal to the study's run in {sum(a == b for a, b in zip(by_hand, as_study, strict=True))} of {len(rows)} trials."
-    )
-    assert by_hand == as_study
+    n_equal = sum(mine == theirs for mine, theirs in zip(by_hand, as_study, strict=True))
+    print(f"Equal to the study's run in {n_equal} of {len(rows)} trials.")
+    if n_equal != len(rows):
+        raise SystemExit("The two roads differ, which they must not.")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,97 @@
+"""How Sphinx builds these pages: `sphinx-build -W docs docs/_build`. Nothing is fetched from a network."""
+
+import re
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+import reference_pages  # noqa: E402
+
+from realitygap import __version__  # noqa: E402
+
+project = "realitygap"
+author = "the realitygap authors"
+copyright = author
+version = release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["colon_fence", "deflist"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build", "generated/parts"]
+root_doc = "index"
+html_theme = "furo"
+html_title = f"realitygap {__version__}"
+html_show_sphinx = False
+html_copy_source = False
+
+default_role = "code"
+nitpicky = True
+nitpick_ignore_regex = [
+    # other people's packages, and short names inside our own signatures
+    (
+        r"py:.*",
+        r"(numpy|np|polars|pl|pydantic|pathlib|collections|typing|annotated_types|NDArray|ArrayLike)\b.*",
+    ),
+    (
+        r"py:.*",
+        r"(Any|Callable|Iterator|Iterable|Literal|Mapping|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
+    ),
+    (r"py:(class|obj)", r"(float64|int32|uint8|bool|columns|_?[A-Z]|n|t|s|ge|le|gt|lt|\d.*|.*=.*)"),
+    (r"py:.*", r"realitygap\..*\._.*"),
+    (r"py:.*", r"realitygap\.kernels.*"),
+]
+autodoc_default_options = {"members": True, "member-order": "bysource"}
+autodoc_typehints = "none"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+napoleon_custom_sections = [("Source", "notes_style"), ("Differs", "notes_style")]
+
+SECTION = re.compile(r"(Args|Returns|Raises|Attributes|Yields|Example|Examples|Note):$")
+
+
+def as_restructured(app, what, name, obj, options, lines):
+    """Our docstrings' code by indentation as reStructuredText's literal blocks; their tables as they are."""
+    out, previous, in_code, in_table = [], "", False, False
+    if what == "property":  # napoleon would take what stands before a colon for a type
+        lines[:] = [line.replace(": ", " – ") for line in lines]
+    for line in lines:
+        text = line.strip()
+        indented = line.startswith("    ") and not in_section(out)
+        if text.startswith("|") and not in_table:
+            out += ["::", ""]
+            in_table = True
+        if in_table and not text.startswith("|"):
+            in_table = False
+        if indented and not previous and not in_code:
+            out += ["::", ""]
+            in_code = True
+        if text and not line.startswith("    "):
+            in_code = False
+        out.append("    " + line if in_table else line)
+        previous = text
+    lines[:] = out
+
+
+def skip_pydantic(app, what, name, obj, skip, options):
+    """Leave out what pydantic adds to a model."""
+    return True if name.startswith("model_") else None
+
+
+def in_section(lines):
+    """Whether the last line that is not indented opens a section such as `Args:`."""
+    for line in reversed(lines):
+        if line and not line.startswith(" "):
+            return bool(SECTION.match(line)) or line.startswith(("Source:", "Differs:"))
+    return False
+
+
+def setup(app):
+    """Write the generated pages before Sphinx looks for pages."""
+    reference_pages.write_all(HERE / "generated")
+    app.connect("autodoc-skip-member", skip_pydantic)
+    app.connect("autodoc-process-docstring", as_restructured, priority=1)

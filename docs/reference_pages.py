@@ -1,0 +1,394 @@
+"""The reference pages that come from the code itself: settings, named sets, columns, commands, choices.
+
+`conf.py` calls `write_all` at each build, so none of these can say something else than the program.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import typer
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from realitygap.cli import app
+from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.records import column_table
+from realitygap.robots import JyroPlatform
+from realitygap.runs import Condition
+from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
+from realitygap.tasks import CoverageTask
+from realitygap.world import ArenaSettings
+
+CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
+CONDITION_KEYS = ("name", "selection", "platform", "noise")
+TABLES: dict[str, type[BaseModel]] = {
+    "[study]": StudySection,
+    "[arena]": ArenaSettings,
+    "[task]": CoverageTask,
+    "[neat]": NeatSettings,
+    "[novelty]": NoveltySettings,
+    "[platform.jyro]": JyroPlatform,
+    "[report]": ReportSection,
+    "[[condition]]": Condition,
+    "[[condition]], notes": ConditionNotes,
+}
+
+
+def write_all(folder: Path) -> None:
+    """Write all generated pages, and parts of pages, into a folder; files that did not change stay untouched."""
+    pages = {
+        "parts/settings.md": settings_page(),
+        "parts/neat-sets.md": neat_sets(),
+        "parts/columns.md": columns(),
+    }
+    pages["parts/choices.md"] = choices()
+    pages |= {f"commands/{name}.md": page for name, page in command_pages().items()}
+    for name, text in pages.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_text("utf-8") != text:
+            path.write_text(text, "utf-8")
+
+
+# --- settings -----------------------------------------------------------------------------------------------
+
+
+def settings_page() -> str:
+    """Every setting of every table of a study file."""
+    parts = []
+    for table, model in TABLES.items():
+        parts += [f"## `{table}`", first_line(model)]
+        parts += [setting(key, info, model) for key, info in settings_of(model).items()]
+    return "\n\n".join(parts) + "\n"
+
+
+def settings_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
+    """The fields that a study file can set: of a condition only its own keys, its tables being listed apart."""
+    if model is Condition:
+        return {key: Condition.model_fields[key] for key in CONDITION_KEYS}
+    return model.model_fields
+
+
+def first_line(model: type[BaseModel]) -> str:
+    """What a model is, in one sentence."""
+    return (model.__doc__ or "").strip().splitlines()[0]
+
+
+def setting(key: str, info: FieldInfo, model: type[BaseModel]) -> str:
+    """One setting as an entry of a definition list."""
+    facts = [values_of(info.annotation, info.metadata)]
+    default = NAMED_SETTINGS[DEFAULT_NEAT].get(key, info.default) if model is NeatSettings else info.default
+    facts.append("no default" if info.is_required() else f"default {toml(default)}")
+    return f"`{key}`\n: {'; '.join(facts)}.\n\n  {escape(info.description or '')}"
+
+
+def values_of(annotation: Any, metadata: list[Any]) -> str:
+    """What a setting may be, in words."""
+    origin = typing.get_origin(annotation)
+    if origin is typing.Annotated:
+        inner, *more = typing.get_args(annotation)
+        limits = [
+            part for each in more for part in (each.metadata if isinstance(each, FieldInfo) else [each])
+        ]
+        return values_of(inner, [*limits, *metadata])
+    if origin in (typing.Union, types.UnionType):
+        each = [values_of(arm, metadata) for arm in typing.get_args(annotation) if arm is not type(None)]
+        return ", or ".join(each)
+    if origin is Literal:
+        return ", ".join(toml(value) for value in typing.get_args(annotation))
+    if origin is list:
+        (inner,) = typing.get_args(annotation)
+        length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)
+        return f"a list of {length or 'any number of'} numbers{values_of(inner, []).removeprefix('a number')}"
+    limits = limits_of(metadata)
+    names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+    return names[annotation] + (f", {limits}" if limits else "")
+
+
+def limits_of(metadata: list[Any]) -> str:
+    """Limits in words, from what pydantic keeps of them."""
+    found = {name: value for part in metadata for name, value in vars_of(part).items()}
+    if "max_length" in found:
+        return f"at most {found['max_length']} letters"
+    least = f"more than {number(found['gt'])}" if "gt" in found else number(found.get("ge"))
+    most = f"less than {number(found['lt'])}" if "lt" in found else number(found.get("le"))
+    if least and most:
+        return f"{least} to {most}"
+    return f"at least {least}" if least and "ge" in found else least
+
+
+def number(value: float | None) -> str:
+    """A limit; empty where there is none."""
+    return "" if value is None else f"{value:,.10g}" if isinstance(value, float) else f"{value:,}"
+
+
+def vars_of(part: Any) -> dict[str, Any]:
+    """The attributes of a limit, with or without slots."""
+    names = getattr(type(part), "__slots__", ()) or vars(part)
+    found = {name: getattr(part, name, None) for name in names if not name.startswith("_")}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def toml(value: Any) -> str:
+    """A value as it stands in a study file."""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    return "none" if value is None else f"`{value}`"
+
+
+def escape(text: str) -> str:
+    """Prose that Markdown leaves as it is."""
+    return re.sub(r"([*<>|\[\]_])", r"\\\1", text).replace("\n", " ")
+
+
+def neat_sets() -> str:
+    """The named sets of NEAT settings side by side; in bold where one differs from `default`."""
+    names = list(NAMED_SETTINGS)
+    sets = [NeatSettings.named(name) for name in names]
+    lines = [
+        "| setting | " + " | ".join(f"`{name}`" for name in names) + " |",
+        "|---" * (len(names) + 1) + "|",
+    ]
+    for key in NeatSettings.model_fields:
+        if key == "settings":
+            continue
+        values = [getattr(each, key) for each in sets]
+        shown = [f"**{value_text(v)}**" if v != values[0] else value_text(v) for v in values]
+        lines.append(f"| `{key}` | " + " | ".join(shown) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def value_text(value: Any) -> str:
+    """A value in a table."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+# --- columns ------------------------------------------------------------------------------------------------
+
+
+def columns() -> str:
+    """The columns of a frame of results."""
+    lines = ["| column | type | what it holds |", "|---|---|---|"]
+    lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in column_table()]
+    return "\n".join(lines) + "\n"
+
+
+# --- commands -----------------------------------------------------------------------------------------------
+
+
+def commands() -> dict[str, Any]:
+    """Every command of the command line by name."""
+    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def command_pages() -> dict[str, str]:
+    """A page for each command: what it does, how it is called, its options, and last its Python twin."""
+    return {name: command_page(name, command) for name, command in commands().items()}
+
+
+def command_page(name: str, command: Any) -> str:
+    """One command's page."""
+    text = (command.help or "").strip()
+    about, _, twin = text.partition("In Python: ")
+    about, _, example = about.partition("Example: ")
+    arguments = [each for each in command.params if each.param_type_name == "argument"]
+    options = [each for each in command.params if each.param_type_name == "option"]
+    called = " ".join(
+        ["realitygap", name, *(each.metavar or each.name.upper() for each in arguments), "[OPTIONS]"]
+    )
+    paragraphs = "\n\n".join(escape(each) for each in about.strip().split("\n\n"))
+    parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
+    rows = [(f"`{each.metavar}`", each.help) for each in arguments]
+    rows += [(option_text(each), each.help) for each in options]
+    parts.append(
+        "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])
+    )
+    parts += ["Example:", f"```sh\n{example.strip()}\n```", "In Python:", f"```py\n{twin.strip()}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def option_text(option: Any) -> str:
+    """An option with what it takes."""
+    takes = "" if option.is_flag else f" {option.metavar or 'N'}"
+    return ", ".join(f"`{each}{takes}`" for each in option.opts)
+
+
+# --- choices ------------------------------------------------------------------------------------------------
+
+# What the paper leaves open; what we do; the alternatives, each with the conditions of `paper-choices` that try it.
+CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
+    (
+        "What comes out of the network",
+        "“a direction for the robot composed of a move and a turn”",
+        '`neat.activation = "tanh"`: −1 to 1',
+        [('`"sigmoid"`: 0 to 1, which can neither reverse nor turn right', ["coverage-sigmoid"])],
+    ),
+    (
+        "Where trials begin",
+        "“the same initial point for every path”",
+        '`arena.start = "corner"`: the center of cell (1, 1), facing along the long side',
+        [
+            ('`"center"`: the arena\'s center', ["coverage-start-center"]),
+            ('`"left"`: the middle of the left side', ["coverage-start-left"]),
+        ],
+    ),
+    (
+        "Which cells count as visited",
+        "squares that the path “crosses through”; a full-speed step is longer than a cell",
+        '`task.cells = "line"`: all cells that the line crosses',
+        [('`"ends"`: the cells in which steps end', ["coverage-cells-ends", "novelty-cells-ends"])],
+    ),
+    (
+        "Where the sensors sit",
+        "three sensors on the front, facing straight ahead",
+        "`jyro.sensor_offset = 0.05`: 0.05 m apart, on the front edge",
+        [("`0.02`", ["coverage-sensors-near"]), ("`0.08`", ["coverage-sensors-wide"])],
+    ),
+    (
+        "A reading after noise was added",
+        "limited to 1 before; nothing is said of after",
+        '`jyro.noisy_reading = "leave"`',
+        [('`"clip"`: limited to 0..1', ["coverage-clip"])],
+    ),
+    (
+        "Steps of a simulated trial",
+        "87, from 13.75 in and 19.7 in; these lengths give 70",
+        "`jyro.steps = 87`",
+        [("`70`", ["coverage-steps-70"])],
+    ),
+    (
+        "Turn in one step at full output",
+        "not mentioned: the simulator's 0.1 rad; the robot turns several times as far in one command",
+        "`jyro.turn_per_step = 0.1`",
+        [
+            ("`0.3`", ["coverage-turn-0.3"]),
+            ("`0.6`", ["coverage-turn-0.6"]),
+            ("`0.9`", ["coverage-turn-0.9", "novelty-turn-0.9"]),
+        ],
+    ),
+    (
+        "The constant (bias) input",
+        "“when we use novelty”; Table 1 has 3 inputs",
+        '`task.bias_input = "with-novelty"`',
+        [('`"always"`', ["coverage-bias-input"]), ('`"never"`', ["novelty-no-bias-input"])],
+    ),
+    (
+        "The time input",
+        "“a measure of time”",
+        '`task.time_input = "from-0"`: step / steps',
+        [],
+    ),
+    (
+        "Which NEAT",
+        "“Kenneth O. Stanley's Python implementation”; Table 1 uses an old neat-python's words",
+        '`neat.settings = "rosenzweig-remy"`: the published NEAT with Table 1 on top',
+        [('`"rosenzweig-remy-neat-python"`: a bias in every node, its slope', ["coverage-neat-python"])],
+    ),
+    (
+        "First weights",
+        "not given",
+        "`neat.initial_weight = 1.0`",
+        [("`3.0`", ["coverage-weights-wide"]), ("`0.3`", ["coverage-weights-narrow"])],
+    ),
+    (
+        "How far weights move",
+        "not given",
+        "`neat.weight_step = 2.5`",
+        [("`0.5`", ["coverage-steps-small"])],
+    ),
+    (
+        "Weights drawn anew",
+        "not given",
+        "`neat.replace_weight = 0.1`",
+        [("`0.0`", ["coverage-replace-none"])],
+    ),
+    (
+        "Compatibility of genomes",
+        "not given",
+        "`neat.threshold = 3.0`",
+        [("`1.0`", ["coverage-threshold-1"])],
+    ),
+    (
+        "Size of the novelty archive",
+        "not given",
+        "`novelty.archive_size = 8`",
+        [("`4`", ["novelty-archive-4"]), ("`20`", ["novelty-archive-20"])],
+    ),
+    (
+        "Who enters the full archive",
+        "a behavior “more novel than the other behaviors in the archive”",
+        '`novelty.enter = "above-all"`',
+        [('`"above-least"`: above the least novel', ["novelty-least"])],
+    ),
+    (
+        "How the cells of a behavior are sorted",
+        "“sorted”",
+        '`novelty.sort = "x-then-y"`',
+        [('`"y-then-x"`', ["novelty-sort-y"])],
+    ),
+    (
+        "How novelty is computed from distances",
+        "not given",
+        '`novelty.kind = "paper"`: the mean distance to the archive',
+        [('`"lehman-stanley"`: the nearest in population and archive', ["novelty-nearest"])],
+    ),
+    (
+        "What Figure 4 shows at a generation",
+        "not given",
+        '`report.points = "best-of-generation"`',
+        [('`"best-so-far"`; changes the figure and no result', [])],
+    ),
+]
+
+
+def choices_rows() -> dict[str, dict[str, str]]:
+    """What `make_choices.py` wrote, by condition."""
+    with CHOICES_DATA.open(newline="", encoding="utf-8") as file:
+        return {row["condition"]: row for row in csv.DictReader(file)}
+
+
+def choices() -> str:
+    """The table of choices with the result of each alternative beside that of our setting."""
+    rows = choices_rows()
+    n = sorted({row["n"] for row in rows.values()})
+    lines = [f"SIM, n = {', '.join(n)} runs of each condition, 50 % noise.", ""]
+    for baseline in sorted({row["baseline"] for row in rows.values()}):
+        row = rows[baseline]
+        lines.append(f"* Ours, selection by {baseline}: median {row['median']} [{row['low']}, {row['high']}]")
+    lines += ["", "| choice, and the paper's words | ours | alternative | selection | median | difference |"]
+    lines.append("|---|---|---|---|---|---|")
+    for question, paper, ours, alternatives in CHOICES:
+        head = [f"**{question}**: {paper}", ours]
+        for alternative, conditions in alternatives or [("none is offered", [])]:
+            words = alternative
+            for result in [results(rows[each]) for each in conditions] or [["", "", ""]]:
+                lines.append("| " + " | ".join([*head, words, *result]) + " |")
+                head, words = ["", ""], ""
+    return "\n".join(lines) + "\n"
+
+
+def results(row: Mapping[str, str]) -> list[str]:
+    """One alternative's selection, median with interval, and difference."""
+    return [row["baseline"], f"{row['median']} [{row['low']}, {row['high']}]", row["effect"]]
+
+
+def tried_conditions() -> list[str]:
+    """Conditions of `paper-choices` that the table names."""
+    return [name for *_, alternatives in CHOICES for _, names in alternatives for name in names]
+
+
+def conditions_to_try() -> list[str]:
+    """Conditions of `paper-choices` that change something."""
+    study = load_study("paper-choices")
+    return [
+        c.name for c, note in zip(study.conditions, study.notes, strict=True) if note.baseline is not None
+    ]

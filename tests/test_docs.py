@@ -1,0 +1,150 @@
+"""The documents say what is true: outputs, settings, commands, columns and numbers are those of the program."""
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from realitygap import run_study
+from realitygap.cli import app
+from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.records import column_table
+from realitygap.robots import JyroPlatform
+from realitygap.study import ConditionNotes, ReportSection, StudySection
+from realitygap.tasks import CoverageTask
+from realitygap.world import ArenaSettings
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+
+
+def _load(name):
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+make_outputs = _load("make_outputs")
+reference_pages = _load("reference_pages")
+PAGES = [path for path in make_outputs.documents() if path.name != "README.md"]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(DOCS)) for path in PAGES])
+def test_examples_of_a_page_run_and_print_what_it_shows(path):
+    _, problems = make_outputs.rewrite(path.read_text("utf-8"), str(path.relative_to(ROOT)))
+    assert problems == []
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        ArenaSettings,
+        ConditionNotes,
+        CoverageTask,
+        JyroPlatform,
+        NeatSettings,
+        NoveltySettings,
+        ReportSection,
+        StudySection,
+    ],
+)
+def test_every_setting_is_in_the_reference_with_a_description(model):
+    page = reference_pages.settings_page()
+    for name, info in model.model_fields.items():
+        assert info.description, name
+        assert f"`{name}`\n: " in page
+        assert reference_pages.escape(info.description) in page
+
+
+def test_the_keys_of_a_condition_are_in_the_reference():
+    page = reference_pages.settings_page()
+    for name in reference_pages.CONDITION_KEYS:
+        assert f"`{name}`\n: " in page
+
+
+def test_limits_and_alternatives_of_settings_are_said_in_words():
+    page = reference_pages.settings_page()
+    assert "`population`\n: a whole number, 2 to 1,000,000; default `8`." in page
+    assert '`activation`\n: `"tanh"`, `"sigmoid"`, `"identity"`; default `"tanh"`.' in page
+    assert "`turn_per_step`\n: a number, more than 0 to 3; default `0.1`." in page
+    assert '`start`\n: `"corner"`, `"center"`, `"left"`, or a list of 3 numbers; default `"corner"`.' in page
+    assert "`pair`\n: true or false; default `true`." in page
+    assert "`name`\n: a text, at most 80 letters; no default." in page
+
+
+def test_named_sets_stand_side_by_side_with_every_setting():
+    table = reference_pages.neat_sets()
+    for name in NAMED_SETTINGS:
+        assert f"`{name}`" in table.splitlines()[0]
+    for key in NeatSettings.model_fields.keys() - {"settings"}:
+        assert f"| `{key}` |" in table
+
+
+def test_every_command_has_a_page_with_every_option_an_example_and_its_python_twin():
+    pages = reference_pages.command_pages()
+    assert sorted(pages) == sorted(command.name for command in app.registered_commands)
+    for name, command in reference_pages.commands().items():
+        page = pages[name]
+        for parameter in command.params:
+            for option in parameter.opts:
+                assert f"`{option}" in page or f"`{parameter.metavar}`" in page
+        assert f"```sh\nrealitygap {name}" in page
+        assert page.rstrip().splitlines()[-2].startswith("realitygap.")
+
+
+def test_every_column_is_in_the_reference():
+    page = reference_pages.columns()
+    for name, _, _ in column_table():
+        assert f"| `{name}` |" in page
+
+
+def test_every_condition_of_paper_choices_is_on_the_page_of_choices():
+    assert sorted(reference_pages.tried_conditions()) == sorted(reference_pages.conditions_to_try())
+
+
+def test_numbers_on_the_page_of_choices_are_those_of_the_study(tmp_path):
+    make_choices = _load("make_choices")
+    folder = run_study("paper-choices", tmp_path / "results").folder
+    assert make_choices.table(folder) == reference_pages.CHOICES_DATA.read_text("utf-8")
+
+
+def test_a_changed_output_is_noticed():
+    page = "```console\n$ realitygap --version\nrealitygap 0.0.0\n```\n"
+    text, problems = make_outputs.rewrite(page, "page")
+    assert len(problems) == 1
+    assert "-realitygap 0.0.0" in problems[0]
+    assert make_outputs.rewrite(text, "page") == (text, [])
+
+
+def test_nothing_that_is_installed_asks_for_an_address():
+    for path in (ROOT / "src").rglob("*.*"):
+        if path.suffix in {".py", ".toml", ".css", ".jinja"}:
+            found = re.findall(r"https?://[^\s\"'`)>]+", path.read_text("utf-8"))
+            names_only = {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+            assert set(found) <= names_only, path
+
+
+def test_documents_name_no_addresses():
+    for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *PAGES]:
+        assert not re.search(r"https?://", path.read_text("utf-8")), path
+
+
+def test_locked_packages_have_hashes_and_no_addresses():
+    lines = (ROOT / "requirements.lock").read_text("utf-8").splitlines()
+    pinned = [line for line in lines if "==" in line and not line.startswith("#")]
+    assert len(pinned) > 20
+    assert all(line.endswith("\\") for line in pinned)
+    assert not [line for line in lines if re.search(r"https?:|index-url|find-links", line)]
+
+
+@pytest.mark.parametrize("command", sorted(reference_pages.command_pages()))
+def test_python_twin_of_a_command_is_found_after_a_bare_import(command):
+    twin = reference_pages.command_pages()[command].rstrip().splitlines()[-2]
+    code = f"import realitygap\nassert callable({re.match(r'[.a-zA-Z_]+', twin)[0]})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -7,7 +7,9 @@ from realitygap.runs import Condition
 
 
 def test_settings_give_the_condition_again():
-    condition = Condition(name="a", selection="novelty", noise=0.5, arena={"start": [0.3, 0.3, 1.0]}, pair=False)
+    condition = Condition(
+        name="a", selection="novelty", noise=0.5, arena={"start": [0.3, 0.3, 1.0]}, pair=False
+    )
     again = Condition.from_settings("a", condition.settings())
     assert again == condition
     assert again.hash() == condition.hash()

@@ -13,7 +13,9 @@ CONDITIONS = [
     Condition(name="nearest", selection="novelty", novelty={"kind": "lehman-stanley"}),
     Condition(name="random", selection="random", noise=0.8),
     Condition(name="ends", task={"cells": "ends"}),
-    Condition(name="biases", neat=Condition(name="x").neat.model_copy(update={"node_bias": True, "add_node": 0.6})),
+    Condition(
+        name="biases", neat=Condition(name="x").neat.model_copy(update={"node_bias": True, "add_node": 0.6})
+    ),
 ]
 
 

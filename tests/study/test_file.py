@@ -40,7 +40,9 @@ def test_paper_study_is_table_1_of_the_paper():
 
 
 def test_paper_values_are_those_of_table_2():
-    notes = dict(zip((c.name for c in load_study("paper").conditions), load_study("paper").notes, strict=True))
+    notes = dict(
+        zip((c.name for c in load_study("paper").conditions), load_study("paper").notes, strict=True)
+    )
     table_2 = {10: [0.154, 0.222, 0.166], 50: [0.208, 0.432, 0.389], 80: [0.180, 0.333, 0.333]}
     for noise, values in table_2.items():
         assert notes[f"novelty-{noise}"].published == values
@@ -205,7 +207,7 @@ def test_a_mistake_in_a_condition_is_said_with_its_place(change, place, text):
     ],
 )
 def test_a_file_that_is_no_study_is_refused(text, message):
-    with pytest.raises(StudyError, match="mine.toml") as caught:
+    with pytest.raises(StudyError, match=r"mine\.toml") as caught:
         parse_study(text, "mine.toml")
     assert message in str(caught.value)
 

@@ -119,7 +119,7 @@ def test_fewer_replicates_leave_what_is_there(study, undisturbed, tmp_path):
 
 
 def test_new_conditions_extend_the_results(undisturbed, tmp_path):
-    only_first = SMALL.split("[[condition]]\nname = \"novelty\"")[0]
+    only_first = SMALL.split('[[condition]]\nname = "novelty"')[0]
     run_study(parse_study(only_first, "small.toml"), tmp_path / "r")
     result = run_study(parse_study(SMALL, "small.toml"), tmp_path / "r")
     assert result.n_computed == 24

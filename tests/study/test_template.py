@@ -3,7 +3,14 @@
 import re
 
 from realitygap.runs import Condition
-from realitygap.study import SECTIONS, ConditionNotes, ReportSection, StudySection, parse_study, study_template
+from realitygap.study import (
+    SECTIONS,
+    ConditionNotes,
+    ReportSection,
+    StudySection,
+    parse_study,
+    study_template,
+)
 
 
 def test_template_is_a_study_with_the_defaults():

@@ -189,6 +189,8 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
 
     console = Console()
     console.print(summary_table(summary, result.folder.description["title"]))
+    if note := result.folder.description.get("note"):
+        console.print(note, style="italic", highlight=False, markup=False)
     path = result.folder.path
     if result.n_computed:
         typer.echo(

@@ -18,7 +18,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
     table = Table(
         title=Text(f"{title}\nBest coverage of a run, share of the reachable cells ({labels})"),
         caption=Text(
-            "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses,\n"
+            "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses, "
             "ends: cells in which steps end"
         ),
         title_justify="left",

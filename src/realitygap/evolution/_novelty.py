@@ -228,7 +228,7 @@ class NearestArchive:
         rows = np.asarray(behaviors, np.float64)
         if rows.ndim != 2 or not np.isfinite(rows).all():
             raise ValueError(f"behaviors has shape {rows.shape}, expected (n, d) finite numbers.")
-        if self.behaviors and self.behaviors[0].shape != rows[0].shape:
+        if self.behaviors and self.behaviors[0].shape != rows.shape[1:]:
             raise ValueError(
                 f"behaviors has {rows.shape[1]} columns, expected {self.behaviors[0].size}: as in the archive."
             )

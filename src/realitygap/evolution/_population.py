@@ -47,7 +47,7 @@ class Population:
         Args:
             n_inputs: Inputs that the task gives, >= 1.
             n_outputs: Outputs that it reads, >= 1.
-            settings: NEAT's settings; `NeatSettings()` when not given.
+            settings: NEAT's settings; the set 'default', which is `NeatSettings()`, when not given.
             seed: Of the random numbers.
             replicate: Which of many runs from one seed.
             bias: Whether networks have a constant input as their last (EC02, section 4.1).

@@ -50,7 +50,7 @@ class NeatSettings(BaseModel):
     activation: Literal["tanh", "sigmoid", "identity"] = Field(
         "sigmoid",
         description="Of hidden and output nodes, of slope * x. EC02 4.1: sigmoid, 1 / (1 + exp(-4.9 x)). "
-        "tanh reaches -1..1; tanh(2.45 x) is that sigmoid stretched to it.",
+        "tanh reaches -1..1; tanh(2.45 x) is that sigmoid stretched to it. identity is x, whatever the slope.",
     )
     activation_slope: float = Field(4.9, gt=0, le=100, description="Slope of the activation (EC02 4.1: 4.9).")
     node_bias: bool = Field(
@@ -70,7 +70,7 @@ class NeatSettings(BaseModel):
         description="First weights, and those of new links, are uniform within +- this (C++: 1).",
     )
     mutate_weights: float = Field(
-        0.8, ge=0, le=1, description="Share of children whose weights are mutated (EC02 4.1: 0.8)."
+        0.8, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
     )
     replace_weight: float = Field(
         0.1,
@@ -87,16 +87,18 @@ class NeatSettings(BaseModel):
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
     )
-    weight_limit: float = Field(8.0, gt=0, le=1e6, description="Weights stay within +- this (C++: 8).")
+    weight_limit: float = Field(
+        8.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
+    )
 
     add_node: float = Field(
-        0.03, ge=0, le=1, description="Share of children that split a link (EC02 4.1: 0.03)."
+        0.03, ge=0, le=1, description="Share of mutated children that split a link (EC02 4.1: 0.03)."
     )
     add_link: float = Field(
-        0.05,
+        0.3,
         ge=0,
         le=1,
-        description="Share of children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
+        description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
     )
     add_link_tries: int = Field(
         20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
@@ -110,14 +112,18 @@ class NeatSettings(BaseModel):
         False, description="Whether links out of the constant input may be split (C++: no)."
     )
     reenable: float = Field(
-        0.0, ge=0, le=1, description="Share of children whose oldest disabled gene is switched on (C++: 0)."
+        0.0,
+        ge=0,
+        le=1,
+        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0).",
     )
 
     crossover: float = Field(
         0.75,
         ge=0,
         le=1,
-        description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone).",
+        description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone). Where both draws "
+        "name the same one, as in a species with a single parent, the child comes from mutation alone.",
     )
     crossover_only: float = Field(
         0.2, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
@@ -193,7 +199,7 @@ class NeatSettings(BaseModel):
         description="The champion is copied unchanged in species of this many (EC02 4.1: more than five).",
     )
     champion_counts: Literal["members", "offspring"] = Field(
-        "members", description="Many members (EC02), or many children to come (C++)."
+        "offspring", description="Many members (EC02), or many children to come (C++)."
     )
     stagnation: int = Field(
         15,
@@ -209,7 +215,7 @@ class NeatSettings(BaseModel):
         description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01).",
     )
     best_species_spared: bool = Field(
-        False,
+        True,
         description="Whether the species with the fittest individual is never called stagnant (EC02: no).",
     )
     population_stagnation: int = Field(
@@ -299,8 +305,11 @@ _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
     "generations": 100,
+    "add_link": 0.05,
     "normalize_genes": "large",
+    "champion_counts": "members",
     "stagnation_factor": 0.0,
+    "best_species_spared": False,
 }
 
 # Table 1 on top; its words are those of an old neat-python, whose networks answered from -1 to 1.
@@ -316,12 +325,7 @@ _ROSENZWEIG: dict[str, Any] = {
 }
 
 NAMED_SETTINGS: Mapping[str, Mapping[str, Any]] = {
-    "default": {
-        "settings": "default",
-        "add_link": 0.3,
-        "champion_counts": "offspring",
-        "best_species_spared": True,
-    },
+    "default": {"settings": "default"},
     "stanley-2002": _STANLEY,
     "rosenzweig-remy": _ROSENZWEIG,
     "rosenzweig-remy-neat-python": {

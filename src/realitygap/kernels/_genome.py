@@ -173,7 +173,7 @@ def has_link(genomes, row, source, target):
 def closes_cycle(genomes, row, source, target, reached):
     """Whether a link from `source` to `target` would close a cycle, disabled genes counted.
 
-    `reached` is room for the ids of nodes, one for each hidden node and two more.
+    `reached` is room for the ids of nodes: one more than the row has genes is always enough.
     """
     if source == target:
         return True

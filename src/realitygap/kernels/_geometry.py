@@ -1,7 +1,8 @@
 """Where straight lines meet: the only geometry that walls, bodies and rays need.
 
-Jyro's rules hold (its model, sections 4 and 6): touching counts, parallel lines never meet. Its rounding to
-seven decimals is left out; it moves a crossing by less than 1e-7 m.
+Jyro's rules hold: touching counts, parallel lines never meet. Its rounding to seven decimals is left out. That
+rounding moves a crossing by 1e-7 m or so where two lines meet at a wide angle, the more the flatter they meet,
+and calls nearly parallel lines parallel; `_scene.py` repeats it, for cases that must equal Jyro.
 """
 
 from __future__ import annotations

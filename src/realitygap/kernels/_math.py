@@ -79,7 +79,7 @@ def exp(x: float) -> float:
 
 @kernel
 def tanh(x: float) -> float:
-    """Hyperbolic tangent, within 2e-16 absolute."""
+    """Hyperbolic tangent, within 3e-16 absolute."""
     size = abs(x)
     if size > TANH_IS_ONE:
         value = 1.0
@@ -98,4 +98,5 @@ def sigmoid(x: float) -> float:
 def wrap_heading(heading: float) -> float:
     """The same direction in [0, 2 pi)."""
     wrapped = heading - TWO_PI * math.floor(heading / TWO_PI)
-    return 0.0 if wrapped >= TWO_PI else wrapped
+    # Rounding can lift a quotient just below a whole number to it, or leave a sum at the upper end.
+    return wrapped if 0.0 <= wrapped < TWO_PI else 0.0

@@ -20,7 +20,7 @@ from ._compile import kernel
 PURPOSE_NOISE = np.int64(1)  # sensor noise of a trial
 PURPOSE_GENOME = np.int64(2)  # the first genomes
 PURPOSE_CHILD = np.int64(3)  # making one child: parents, crossover, mutation
-PURPOSE_SPECIES = np.int64(4)  # representatives of species
+PURPOSE_SPECIES = np.int64(4)  # representatives of species; the individual is the species' place in the list
 
 FIRST = np.int64(0)  # the first repeat, generation or row: a literal 0 would have every kernel compiled twice
 

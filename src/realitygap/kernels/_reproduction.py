@@ -191,7 +191,8 @@ def reproduce(
     share_offspring(shared, species_of, species, rules, generation, offspring)
     start_generation(innovations)
     members = np.empty(n, np.int64)
-    reached = np.empty(new.hidden.shape[1] + rules.n_outputs + 2, np.int32)
+    # As many as there are genes, and not nodes: a row without room for its hidden nodes still holds their genes.
+    reached = np.empty(new.innovation.shape[1] + 1, np.int32)
     cursor = np.zeros(1, np.int64)
     child = FIRST
     for k in range(n_species):

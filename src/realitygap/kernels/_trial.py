@@ -192,6 +192,19 @@ def largest_noisy_reading(readings, sensor_range, noise, clip, stream, step):
 
 
 @kernel
+def as_command(output):
+    """A network's output as a command: limited to -1..1, and 0 where it is no number.
+
+    Only `identity` gives such outputs; a recurrent network of it can grow without limit.
+    """
+    if output > 1.0:
+        return 1.0
+    if output < -1.0:
+        return -1.0
+    return output if output == output else 0.0
+
+
+@kernel
 def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
     """Drive one network from the start for all steps.
 
@@ -241,8 +254,8 @@ def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
         if rules.bias_input:
             work.values[3] = rules.bias_value
         activate(networks, row, neat, work.values, work.before)
-        move = work.values[neat.n_inputs]
-        turn = work.values[neat.n_inputs + 1]
+        move = as_command(work.values[neat.n_inputs])
+        turn = as_command(work.values[neat.n_inputs + 1])
         distance = move * rules.speed * rules.step_s
         new_x = x + distance * cosine
         new_y = y + distance * sine

@@ -21,6 +21,7 @@ class StudySection(BaseModel):
         description="Letters, digits, dot, dash, underscore; names the folder.",
     )
     title: str = Field("", max_length=200, description="What the report is headed with; the name when empty.")
+    note: str = Field("", max_length=500, description="A remark for whoever reads the summary.")
     seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
     replicates: int = Field(
         100, ge=1, le=4_000_000_000, description="Runs of each condition. More extend what is there."
@@ -75,6 +76,7 @@ class Study(BaseModel):
         return {
             "name": self.about.name,
             "title": self.about.title or self.about.name,
+            "note": self.about.note,
             "software": __version__,
             "seed": self.about.seed,
             "pair": self.about.pair,

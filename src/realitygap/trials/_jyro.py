@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._math import sin_cos
+from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS
 from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_trace, make_workspace, run_trials
 from realitygap.robots import STEP_S, JyroPlatform
 from realitygap.world import Arena
@@ -139,6 +140,21 @@ class NoiseKey:
     generation: int = 0
     individual: int = 0
     repeat: int = 0
+
+    def __post_init__(self) -> None:
+        limits = {
+            "key": 1 << 64,
+            "replicate": 1 << 32,
+            "generation": MAX_GENERATIONS,
+            "individual": MAX_INDIVIDUALS,
+            "repeat": MAX_REPEATS,
+        }
+        for name, limit in limits.items():
+            value = getattr(self, name)
+            if not 0 <= value < limit:
+                raise ValueError(
+                    f"{name} is {value}, expected 0 to {limit - 1}: beyond it numbers would repeat."
+                )
 
 
 def _run(

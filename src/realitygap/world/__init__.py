@@ -6,7 +6,6 @@ from ._arena import (
     Arena,
     Grid,
     Pose,
-    distance_to_walls,
     is_inside,
     paper_arena,
 )
@@ -27,7 +26,6 @@ __all__ = [
     "Pose",
     "RangeSensors",
     "arena_picture",
-    "distance_to_walls",
     "is_inside",
     "paper_arena",
     "robot_picture",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
@@ -109,14 +108,3 @@ def is_inside(arena: Arena, x: float, y: float) -> bool:
         if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
             crossings += 1
     return crossings % 2 == 1
-
-
-def distance_to_walls(arena: Arena, x: float, y: float) -> float:
-    """Distance from a point to the nearest wall [m]."""
-    nearest = math.inf
-    for x1, y1, x2, y2 in arena.walls:
-        dx, dy = x2 - x1, y2 - y1
-        along = ((x - x1) * dx + (y - y1) * dy) / (dx * dx + dy * dy)
-        along = min(max(along, 0.0), 1.0)
-        nearest = min(nearest, math.hypot(x - x1 - along * dx, y - y1 - along * dy))
-    return nearest

@@ -1,0 +1,91 @@
+"""Elementary functions against Python's, and against decimals of 45 digits where the last bit is at stake."""
+
+from __future__ import annotations
+
+import math
+import random
+from decimal import Decimal, localcontext
+
+import pytest
+
+from realitygap.kernels import _math
+from tests.reference.effort import cases
+
+TWO_PI = 2.0 * math.pi
+
+
+def angles(n: int) -> list[float]:
+    """Angles of all sizes below 1e5, and those at which the quadrant changes."""
+    rng = random.Random(1)
+    spread = [rng.uniform(-1, 1) * 10.0 ** rng.uniform(-8, 5) for _ in range(n)]
+    turns = [quarter * math.pi / 4 for quarter in range(-40, 41)]
+    beside = [math.nextafter(angle, side) for angle in turns for side in (-math.inf, math.inf)]
+    return [*spread, *turns, *beside, 0.0, -0.0, 5e-324, 99_999.9, -99_999.9]
+
+
+def test_sine_and_cosine_are_within_their_bound() -> None:
+    for angle in angles(cases(50_000, 2_000)):
+        sine, cosine = _math.sin_cos(angle)
+        assert abs(sine - math.sin(angle)) < 1e-15, angle
+        assert abs(cosine - math.cos(angle)) < 1e-15, angle
+
+
+def test_a_heading_of_zero_points_exactly_along_x() -> None:
+    assert _math.sin_cos(0.0) == (0.0, 1.0)
+
+
+def numbers(n: int) -> list[float]:
+    rng = random.Random(2)
+    small = [rng.uniform(-1, 1) * 10.0 ** rng.uniform(-9, 0) for _ in range(n)]
+    large = [rng.uniform(-45, 45) for _ in range(n)]
+    corners = [0.0, -0.0, 5e-324, 20.0, math.nextafter(20.0, 21), -20.0, 1.5397e-4]
+    return [*small, *large, *corners]
+
+
+def test_exp_is_within_two_units_in_the_last_place() -> None:
+    rng = random.Random(3)
+    with localcontext(prec=45):
+        for x in [
+            *numbers(cases(3_000, 200)),
+            *(rng.uniform(-699.9, 699.9) for _ in range(cases(3_000, 200))),
+        ]:
+            true = Decimal(x).exp()
+            assert abs(Decimal(_math.exp(x)) - true) <= 2 * Decimal(math.ulp(float(true))), x
+
+
+def test_tanh_and_sigmoid_are_within_their_bounds() -> None:
+    with localcontext(prec=45):
+        for x in numbers(cases(6_000, 300)):
+            true = 1 - 2 / ((2 * Decimal(x)).exp() + 1)
+            assert abs(Decimal(_math.tanh(x)) - true) < Decimal("3e-16"), x
+            true = 1 / ((-Decimal(x)).exp() + 1)
+            assert abs(Decimal(_math.sigmoid(x)) - true) < Decimal("2e-16"), x
+
+
+@pytest.mark.parametrize("x", [25.0, 1e3, 1e300, math.inf])
+def test_far_out_tanh_is_one_and_sigmoid_zero_or_one(x: float) -> None:
+    assert (_math.tanh(x), _math.tanh(-x)) == (1.0, -1.0)
+    assert (_math.sigmoid(2 * x), _math.sigmoid(-2 * x)) == (1.0, 0.0)
+
+
+def test_tanh_is_odd() -> None:
+    for x in numbers(500):
+        assert _math.tanh(-x) == -_math.tanh(x)
+
+
+def test_a_wrapped_heading_is_the_same_direction() -> None:
+    for heading in angles(cases(20_000, 1_000)):
+        wrapped = _math.wrap_heading(heading)
+        assert 0.0 <= wrapped < TWO_PI
+        turned = (wrapped - heading) / TWO_PI
+        assert abs(turned - round(turned)) < 1e-11, heading
+        if 0.0 <= heading < TWO_PI:
+            assert wrapped == heading
+
+
+def test_a_heading_beside_a_whole_turn_is_not_wrapped_to_less_than_zero() -> None:
+    """The quotient was rounded up to a whole number: -39 turns less one bit came out as -2.8e-14."""
+    for turns in range(-2_000, 2_001):
+        heading = turns * TWO_PI
+        for value in (heading, math.nextafter(heading, -math.inf), math.nextafter(heading, math.inf)):
+            assert 0.0 <= _math.wrap_heading(value) < TWO_PI, value

@@ -1,0 +1,237 @@
+"""Distances, archives and novelty against the plain reference and by hand."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from realitygap.kernels import _novelty
+from tests.reference import novelty as reference
+from tests.reference.effort import COMPILED, cases
+
+COLUMNS, ROWS = 12, 6
+PADDING = math.hypot(11, 5)
+Cells = list[int]
+
+
+def sorted_points(cells: Cells, columns: int, rows: int, by_column: bool) -> np.ndarray:
+    points = np.empty((columns * rows, 2))
+    _novelty.sort_cells(np.array(cells, np.uint8), len(cells), columns, rows, by_column, points)
+    return points[: len(cells)].copy()
+
+
+def random_cells(rng: random.Random, n_cells: int) -> Cells:
+    """Anything from one cell to all, in any order."""
+    return rng.sample(range(n_cells), rng.choice([1, 2, rng.randint(1, n_cells), n_cells]))
+
+
+def packed(behaviors: list[Cells], by_column: bool) -> tuple[np.ndarray, np.ndarray]:
+    points = np.zeros((len(behaviors), COLUMNS * ROWS, 2))
+    for k, cells in enumerate(behaviors):
+        points[k, : len(cells)] = sorted_points(cells, COLUMNS, ROWS, by_column)
+    return points, np.array([len(cells) for cells in behaviors], np.int32)
+
+
+@pytest.mark.parametrize("by_column", [True, False])
+def test_cells_are_sorted_as_pairs(by_column: bool) -> None:
+    rng = random.Random(1)
+    for _ in range(cases(300, 50)):
+        columns, rows = rng.choice([(12, 6), (1, 9), (5, 1), (16, 16)])
+        cells = random_cells(rng, columns * rows)
+        expected = reference.points_of(cells, columns, x_first=by_column)
+        assert sorted_points(cells, columns, rows, by_column).tolist() == [list(point) for point in expected]
+
+
+@pytest.mark.parametrize("by_column", [True, False])
+def test_the_distance_equals_the_reference(by_column: bool) -> None:
+    rng = random.Random(2)
+    for _ in range(cases(500, 50)):
+        one, other = random_cells(rng, COLUMNS * ROWS), random_cells(rng, COLUMNS * ROWS)
+        a, b = (sorted_points(cells, COLUMNS, ROWS, by_column) for cells in (one, other))
+        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), PADDING)
+        points = [reference.points_of(cells, COLUMNS, x_first=by_column) for cells in (one, other)]
+        assert distance == pytest.approx(reference.paper_distance(*points, COLUMNS, ROWS), rel=1e-13)
+        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), PADDING)
+        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), PADDING) == 0.0
+
+
+# --- the paper's archive ----------------------------------------------------------------------------------------
+
+
+class KernelPaperArchive:
+    """The arrays that the kernel changes."""
+
+    def __init__(self, size: int, *, above_all: bool, by_column: bool) -> None:
+        self.above_all, self.by_column = above_all, by_column
+        self.archive = np.empty((size, COLUMNS * ROWS, 2))
+        self.n_archive = np.zeros(size, np.int32)
+        self.state = np.zeros(2, np.int64)
+
+    def update(self, behaviors: list[Cells]) -> list[float]:
+        points, n_points = packed(behaviors, self.by_column)
+        novelty = np.empty(len(behaviors))
+        _novelty.paper_archive_step(
+            points, n_points, PADDING, self.archive, self.n_archive, self.state, self.above_all, novelty
+        )
+        return novelty.tolist()
+
+    def behaviors(self) -> list[list[tuple[int, int]]]:
+        """Oldest first."""
+        n = int(self.state[0])
+        places = [(int(self.state[1]) + k) % n for k in range(n)]
+        return [
+            [(int(x), int(y)) for x, y in self.archive[place, : self.n_archive[place]]] for place in places
+        ]
+
+
+@pytest.mark.parametrize("above_all", [True, False])
+@pytest.mark.parametrize("size", [1, 2, 3, 8, 20])
+def test_the_papers_archive_equals_the_reference(above_all: bool, size: int) -> None:
+    """Generations of several sizes: below, at and above the archive's, some behaviors alike."""
+    replaced = 0
+    for seed in range(cases(12, 3)):
+        rng = random.Random(seed)
+        by_column = rng.random() < 0.5
+        kernel = KernelPaperArchive(size, above_all=above_all, by_column=by_column)
+        plain = reference.PaperArchive(size, COLUMNS, ROWS, above_all=above_all, x_first=by_column)
+        n = rng.choice([1, 3, 8])
+        pool = [random_cells(rng, COLUMNS * ROWS) for _ in range(5)]
+        for _ in range(size // n + 6):
+            behaviors = [rng.choice(pool) if rng.random() < 0.3 else random_cells(rng, 72) for _ in range(n)]
+            full = len(plain.behaviors) == size
+            before = list(plain.behaviors)
+            assert kernel.update(behaviors) == pytest.approx(plain.update(behaviors), rel=1e-12)
+            assert kernel.behaviors() == plain.behaviors
+            replaced += full and before != plain.behaviors
+    if size <= 3:  # in a long archive there is soon a behavior that no other exceeds
+        assert replaced > 0
+
+
+def test_the_archive_is_filled_first_and_an_individual_is_not_compared_with_itself() -> None:
+    archive = KernelPaperArchive(8, above_all=True, by_column=True)
+    assert archive.update([[0]]) == [0.0]  # nothing to compare with
+    assert archive.update([[3], [4]]) == [
+        pytest.approx((3 + 1) / 2),  # to cells 0 and 4
+        pytest.approx((4 + 1) / 2),
+    ]
+    assert archive.behaviors() == [[(0, 0)], [(3, 0)], [(4, 0)]]
+
+
+def test_two_individuals_with_one_behavior_are_compared_with_each_other() -> None:
+    """Itself is the entry of that individual, not any that is alike."""
+    archive = KernelPaperArchive(8, above_all=True, by_column=True)
+    assert archive.update([[5], [5], [7]]) == [pytest.approx(v) for v in (1.0, 1.0, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("above_all", "newcomer", "enters"),
+    [
+        (True, [4], False),  # (4 + 3 + 6) / 3 = 4.3
+        (False, [4], False),
+        (True, [11], False),  # (11 + 10 + 1) / 3 = 7.3
+        (False, [11], True),
+        (True, [11, 71], True),  # as cell 11, and 12.1 for the cell that no other has
+    ],
+)
+def test_who_enters_is_more_novel_than_every_archived_one_or_than_the_least(
+    above_all: bool, newcomer: Cells, enters: bool
+) -> None:
+    """Archived are the cells 0, 1 and 10, with mean distances to one another of 5.5, 5 and 9.5."""
+    archive = KernelPaperArchive(3, above_all=above_all, by_column=True)
+    archive.update([[0], [1], [10]])
+    before = archive.behaviors()
+    archive.update([newcomer])
+    after = [*before[1:], reference.points_of(newcomer, COLUMNS)] if enters else before
+    assert archive.behaviors() == after
+
+
+def test_the_oldest_is_replaced_each_time_and_the_bar_is_that_of_the_archive_then() -> None:
+    archive = KernelPaperArchive(2, above_all=True, by_column=True)
+    archive.update([[0], [1]])
+    archive.update([[5], [9]])  # mean distances 4.5 and 8.5, above 1; after 5 entered the bar is |5 - 1| = 4
+    assert archive.behaviors() == [[(5, 0)], [(9, 0)]]
+
+
+# --- nearest neighbors ------------------------------------------------------------------------------------------
+
+
+def test_nearest_novelty_equals_the_reference() -> None:
+    rng = random.Random(3)
+    for _ in range(cases(300, 50)):
+        n, m, k = rng.randint(1, 6), rng.randint(0, 9), rng.randint(1, 8)
+        distance = np.array([[float(rng.randint(0, 5)) for _ in range(n + m)] for _ in range(n)])
+        np.fill_diagonal(distance, -1.0)
+        novelty = np.empty(n)
+        _novelty.nearest_novelty(distance, k, novelty)
+        expected = [reference.mean(sorted(v for v in row if v >= 0)[:k]) for row in distance.tolist()]
+        assert novelty.tolist() == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("patience", [1, 7, 20])
+def test_the_growing_archive_equals_the_reference(patience: int) -> None:
+    moved = set()
+    for seed in range(cases(15, 4)):
+        rng = random.Random(seed)
+        n, k, generations = 4 + seed % 6, rng.randint(1, 12), 10
+        start = [20.0, 400.0, 0.0, 150.0][seed % 4]
+        archive = np.empty((n * generations, COLUMNS * ROWS, 2))
+        n_archive = np.zeros(n * generations, np.int32)
+        state, counters = np.zeros(1, np.int64), np.zeros(2, np.int64)
+        threshold = np.array([start])
+        plain = reference.NearestArchive(
+            lambda a, b: reference.paper_distance(a, b, COLUMNS, ROWS), k, start, patience
+        )
+        for _ in range(generations):
+            behaviors = [random_cells(rng, COLUMNS * ROWS) for _ in range(n)]
+            points, n_points = packed(behaviors, True)
+            novelty = np.empty(n)
+            _novelty.nearest_archive_step(
+                points,
+                n_points,
+                PADDING,
+                k,
+                patience,
+                archive,
+                n_archive,
+                state,
+                counters,
+                threshold,
+                novelty,
+            )
+            expected = plain.update([reference.points_of(cells, COLUMNS) for cells in behaviors])
+            assert novelty.tolist() == pytest.approx(expected, rel=1e-12)
+            assert state[0] == len(plain.behaviors)
+            assert threshold[0] == pytest.approx(plain.threshold, rel=1e-12)
+            for place, behavior in enumerate(plain.behaviors):
+                assert archive[place, : n_archive[place]].tolist() == [list(point) for point in behavior]
+        moved.add(int(np.sign(threshold[0] - start)))
+    assert {-1, 1} <= moved or not COMPILED
+
+
+def admitted(novelty: list[float], threshold: float, patience: int) -> tuple[list[bool], float]:
+    entered = np.empty(len(novelty), np.bool_)
+    level = np.array([threshold])
+    _novelty.admit(np.array(novelty), np.zeros(2, np.int64), level, patience, entered)
+    return entered.tolist(), float(level[0])
+
+
+def test_what_equals_the_threshold_stays_outside() -> None:
+    assert admitted([6.0, 6.0001], 6.0, 100) == ([False, True], 6.0)
+
+
+def test_the_threshold_rises_by_a_fifth_when_a_fifth_enters_in_a_row() -> None:
+    assert admitted([9.0] * 4, 6.0, 100) == ([True] * 4, 6.0)
+    entered, threshold = admitted([7.0] * 7, 6.0, 100)
+    assert entered == [True] * 5 + [False] * 2  # 7 is below the 7.2 of after the fifth
+    assert threshold == pytest.approx(7.2)
+    assert admitted([9.0] * 4 + [0.0] + [9.0] * 4, 6.0, 100)[1] == 6.0  # not in a row
+
+
+def test_the_threshold_falls_by_a_twentieth_after_so_many_without_an_entry() -> None:
+    assert admitted([0.0] * 9, 6.0, 10)[1] == 6.0
+    assert admitted([0.0] * 10, 6.0, 10)[1] == pytest.approx(5.7)
+    assert admitted([0.0] * 20, 6.0, 10)[1] == pytest.approx(5.7 * 0.95)
+    assert admitted([0.0] * 9 + [9.0] + [0.0] * 9, 6.0, 10)[1] == 6.0

@@ -26,6 +26,10 @@ class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
 
 
+class TableError(RealityGapError):
+    """A table of results for `realitygap audit-results` cannot be read as written."""
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A hint that names the known word nearest to `name`, or lists all; empty when nothing is known."""
     choices = sorted(known)

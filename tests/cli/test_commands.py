@@ -40,7 +40,7 @@ COMMANDS = sorted(typer.main.get_command(app).commands)
 
 
 def test_all_commands_are_known():
-    assert COMMANDS == ["bench", "digest", "new-study", "report", "run", "simulate"]
+    assert COMMANDS == ["audit-results", "bench", "digest", "new-study", "report", "run", "show", "simulate"]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -172,6 +172,41 @@ def test_report_writes_a_page(tmp_path):
     done = realitygap("report", "r", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "r" / "report.html").stat().st_size > 10_000
+
+
+def _browser_that_notes(folder: Path) -> dict[str, str]:
+    """An environment whose browser writes the address it is given into the file `opened`."""
+    browser = folder / "browser"
+    browser.write_text(f"#!/bin/sh\nprintf '%s\\n' \"$1\" >> '{folder}/opened'\n")
+    browser.chmod(0o755)
+    return os.environ | {"BROWSER": f"{browser} %s"}
+
+
+def test_open_shows_the_report_in_the_browser(tmp_path):
+    options = {"cwd": tmp_path, "env": _browser_that_notes(tmp_path)}
+    done = realitygap("run", "paper", "--replicates", "6", "--out", "r", "--open", **options)
+    assert done.returncode == 0, done.stderr
+    page = tmp_path / "r" / "report.html"
+    assert "Written: r/report.html" in done.stdout
+    assert (tmp_path / "opened").read_text() == f"{page.as_uri()}\n"
+    done = realitygap("report", "r", "--out", "other.html", "--open", **options)
+    assert done.returncode == 0, done.stderr
+    other = (tmp_path / "other.html").as_uri()
+    assert (tmp_path / "opened").read_text() == f"{page.as_uri()}\n{other}\n"
+    done = realitygap("run", "paper", "--replicates", "6", "--out", "r", "--open", "--json", **options)
+    assert json.loads(done.stdout)["computed"] == 0, "what is printed stays JSON"
+    assert (tmp_path / "opened").read_text().count("\n") == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the system opens a browser by itself")
+def test_open_says_where_the_page_is_when_there_is_no_browser(tmp_path):
+    realitygap("run", "paper", "--replicates", "6", "--out", "r", cwd=tmp_path)
+    unwanted = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
+    alone = {key: value for key, value in os.environ.items() if key not in unwanted} | {"PATH": str(tmp_path)}
+    done = realitygap("report", "r", "--open", cwd=tmp_path, env=alone)
+    assert done.returncode == 0, done.stderr
+    assert "no browser could be opened here" in done.stderr
+    assert (tmp_path / "r" / "report.html").as_uri() in done.stderr
 
 
 def test_simulate_repeats_jyro(tmp_path):

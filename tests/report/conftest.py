@@ -72,6 +72,7 @@ def no_replay(monkeypatch: pytest.MonkeyPatch) -> None:
         raise RecordError("The trial cannot be recomputed.")
 
     monkeypatch.setattr("realitygap.report._path_figure.replay", refuse)
+    monkeypatch.setattr("realitygap.report._replay.replay", refuse)
 
 
 @pytest.fixture

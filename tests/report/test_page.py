@@ -45,7 +45,7 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if "style" not in self.open:
+        if not {"style", "script"} & set(self.open):
             self.text.append(data)
 
     @property
@@ -67,7 +67,7 @@ def test_page_needs_nothing_from_elsewhere(tiny_page):
     html, page = tiny_page
     assert "http:" not in html
     assert "https:" not in html
-    assert not {"script", "link", "img", "iframe", "image", "object", "embed"} & {tag for tag, _ in page.tags}
+    assert not {"link", "img", "iframe", "image", "object", "embed"} & {tag for tag, _ in page.tags}
     for _, attributes in page.tags:
         assert not {"src", "srcset", "xlink:href", "onload", "onclick"} & set(attributes)
         assert attributes.get("href", "#").startswith("#")
@@ -84,8 +84,12 @@ def test_ids_are_unique_and_references_lead_somewhere(tiny_page):
 
 def test_page_can_be_heard(tiny_page):
     _, page = tiny_page
-    pictures = [attributes for tag, attributes in page.tags if tag == "svg"]
-    assert len(pictures) == 8, "coverage, two path figures and choices, each wide and narrow"
+    pictures = [
+        attributes
+        for tag, attributes in page.tags
+        if tag == "svg" and "aria-hidden" not in attributes and "replay" not in attributes.get("id", "")
+    ]
+    assert len(pictures) == 20, "Figures 2, 4, 5, 6a, 6b and 7 to 11, each wide and narrow"
     assert all(each["role"] == "img" and len(each["aria-label"]) > 40 for each in pictures)
     headings = [tag for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
     assert headings[0] == "h1"
@@ -246,4 +250,4 @@ def test_writing_a_page_uses_no_network(tiny_study, tmp_path, monkeypatch):
 
 
 def test_page_is_small(tiny_study):
-    assert Path(write_report(tiny_study)).stat().st_size < 500_000
+    assert Path(write_report(tiny_study)).stat().st_size < 1_000_000

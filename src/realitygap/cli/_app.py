@@ -8,8 +8,10 @@ import typer
 
 from realitygap._version import __version__
 
+from ._audit import audit_results
 from ._bench import bench
 from ._results import digest, report
+from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
 
@@ -44,6 +46,8 @@ def _root(
 app.command("run")(run)
 app.command("new-study")(new_study)
 app.command("report")(report)
+app.command("show")(show)
 app.command("digest")(digest)
+app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)
 app.command("bench")(bench)

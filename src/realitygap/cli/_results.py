@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ._browser import show_page
+
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder of results, such as results/paper.")]
 
 
@@ -15,16 +17,28 @@ def report(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The page. [default: DIR/report.html]")
     ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR2", help="A folder for every figure as SVG and PDF and every table as CSV."),
+    ] = None,
+    open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser.")] = False,
 ) -> None:
     """Write the report of a study: one page with settings, tables and figures, that needs no network.
 
     Example: realitygap report results/paper
 
-    In Python: realitygap.write_report("results/paper")
+    Example: realitygap report results/paper --figures figures
+
+    In Python: realitygap.write_report("results/paper", figures="figures")
     """
     from realitygap.report import write_report
 
-    typer.echo(f"Written: {write_report(folder, out)}")
+    path = write_report(folder, out, figures=figures)
+    typer.echo(f"Written: {path}")
+    if figures is not None:
+        typer.echo(f"Figures and tables: {figures}")
+    if open_page:
+        show_page(path)
 
 
 def digest(folder: Folder) -> None:

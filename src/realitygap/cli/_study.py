@@ -11,6 +11,8 @@ import typer
 
 from realitygap.errors import StudyError
 
+from ._browser import show_page
+
 if TYPE_CHECKING:
     from realitygap.study import Progress, StudyResult
 
@@ -36,6 +38,9 @@ def run(
         bool, typer.Option("--fresh", help="Delete the study that is in the folder and start anew.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    open_page: Annotated[
+        bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
+    ] = False,
 ) -> None:
     """Carry out a simulated study, or what is missing of it, and print a summary.
 
@@ -66,6 +71,12 @@ def run(
         )
         raise typer.Exit(130) from None
     _print_result(result, as_json=as_json)
+    if open_page:
+        from realitygap.report import write_report
+
+        path = write_report(result.folder)
+        typer.echo(f"Written: {path}", err=as_json)
+        show_page(path)
 
 
 def new_study(

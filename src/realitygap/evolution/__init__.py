@@ -9,6 +9,7 @@ from ._novelty import (
     largest_cell_distance,
     sorted_cells_distance,
 )
+from ._picture import network_picture
 from ._population import Population
 from ._random import random_key
 from ._settings import NAMED_SETTINGS, NeatSettings
@@ -28,6 +29,7 @@ __all__ = [
     "euclidean",
     "genome_from_record",
     "largest_cell_distance",
+    "network_picture",
     "random_key",
     "sorted_cells_distance",
 ]

@@ -146,6 +146,11 @@ class Genome:
             "connections": [asdict(connection) for connection in self.connections],
         }
 
+    def _repr_svg_(self) -> str:
+        from ._picture import network_picture
+
+        return network_picture(self).to_svg(300.0)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Genome):
             return NotImplemented

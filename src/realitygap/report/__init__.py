@@ -5,11 +5,44 @@ Only records are read; nothing here runs a study. Trials that are drawn are reco
 SVG with the caption that says what was drawn.
 """
 
+from realitygap.report._arena_figure import draw_arena_and_robot
+from realitygap.report._audit import (
+    Audit,
+    AuditedCondition,
+    AuditedPair,
+    DoubtfulValue,
+    audit_notes,
+    audit_results,
+)
+from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
+from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing
+from realitygap.report._effects import (
+    Interval,
+    a12,
+    bca_interval,
+    detectable_effect,
+    newcombe_interval,
+    runs_needed,
+)
+from realitygap.report._formats import save_drawing, save_picture
+from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
+from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
+from realitygap.report._paper_audit import Finding, audit_paper
 from realitygap.report._path_figure import draw_paths
+from realitygap.report._permutation import (
+    holm,
+    permutation_p,
+    runs_for_a_claim,
+    sign_flip_p,
+    smallest_p,
+)
+from realitygap.report._questions import Variety, chance_of_best, measure_variety
+from realitygap.report._show import save_arena, save_robot, save_view
+from realitygap.report._species_figure import draw_species
 from realitygap.report._statistics import (
     IntervalRanks,
     MedianInterval,
@@ -19,6 +52,7 @@ from realitygap.report._statistics import (
     quartiles,
 )
 from realitygap.report._summary import SUMMARY_SCHEMA, summarize
+from realitygap.report._trial_figure import draw_trial
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # the page
@@ -29,11 +63,37 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "SUMMARY_SCHEMA",
     "compare_choices",
     "Choice",
+    "compare_conditions",
+    "Comparison",
+    "retry_champions",
+    "Champions",
+    "measure_variety",
+    "Variety",
+    # small tables of anyone's
+    "audit_results",
+    "audit_notes",
+    "Audit",
+    "AuditedCondition",
+    "AuditedPair",
+    "DoubtfulValue",
+    "audit_paper",
+    "Finding",
     # figures
     "draw_coverage",
     "draw_paths",
+    "draw_arena_and_robot",
+    "draw_individuals",
+    "draw_better_individuals",
+    "draw_networks",
+    "draw_species",
+    "draw_trial",
     "draw_choices",
     "Drawing",
+    "save_drawing",
+    "save_picture",
+    "save_view",
+    "save_arena",
+    "save_robot",
     "WIDE",
     "NARROW",
     # statistics
@@ -43,4 +103,16 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "MedianInterval",
     "interval_ranks",
     "IntervalRanks",
+    "sign_flip_p",
+    "permutation_p",
+    "smallest_p",
+    "runs_for_a_claim",
+    "holm",
+    "a12",
+    "bca_interval",
+    "newcombe_interval",
+    "Interval",
+    "runs_needed",
+    "detectable_effect",
+    "chance_of_best",
 ]

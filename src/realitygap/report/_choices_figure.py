@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from realitygap.drawing import Ink
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    Ink,
     house_style,
     new_figure,
     place_axes,
@@ -142,7 +142,7 @@ def draw_tally_choices(tally: Tally, *, width: float = WIDE, name: str = "choice
     caption = _caption(tally, groups)
     with house_style():
         figure = _draw(groups, width)
-        return Drawing(to_svg(figure, name, _alt(groups)), caption, _alt(groups))
+        return Drawing(to_svg(figure, name, _alt(groups)), caption, _alt(groups), figure)
 
 
 # --- drawing ------------------------------------------------------------------------------------------------

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from realitygap.drawing import Ink
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    Ink,
     house_style,
     new_figure,
     place_axes,
@@ -89,7 +89,7 @@ def draw_tally_coverage(
     )
     with house_style():
         figure = _draw(panels, width)
-        return Drawing(to_svg(figure, name, alt), caption, alt)
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
 def _points_of(description: Mapping[str, Any]) -> Points:

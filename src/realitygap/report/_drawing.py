@@ -13,8 +13,10 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from realitygap.drawing import FONT, Ink
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,34 +30,12 @@ WIDE = 9.6
 NARROW = 3.7
 """Widths of a figure [in] on a desktop's page and on a phone's."""
 
-FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 _METRIC_FONT = "DejaVu Sans"
 """Comes with matplotlib, so that the layout is the same everywhere; wider than those in `FONT`."""
 
 
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """What a user's text may hold and XML may not."""
-
-
-class Ink:
-    """The colors of all figures: apart in lightness, and for color-blind eyes (after Okabe & Ito, 2008)."""
-
-    TEXT = "#1c1f24"
-    MUTED = "#5a626d"
-    RULE = "#d3d8de"
-    GROUND = "#fefefe"
-    OURS = "#0a4f8f"
-    BAND = "#a9c9e8"
-    RUN = "#6d7580"
-    PUBLISHED = "#b8480a"
-    REACH = "#c2182b"
-    VISITED = "#dfe9f3"
-    BODY = "#8d949e"
-
-    @classmethod
-    def names(cls) -> dict[str, str]:
-        """Color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
-        return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}
 
 
 _STYLE: dict[Any, Any] = {
@@ -100,11 +80,13 @@ class Drawing:
         svg: the picture as one `svg` element; nothing in it is fetched from elsewhere.
         caption: what is drawn, of how many runs, with which interval.
         alt: the same for those who cannot see it, in a sentence; it is in `svg` as well.
+        figure: what it was drawn as, for other formats.
     """
 
     svg: str
     caption: str
     alt: str
+    figure: Figure | None = field(default=None, repr=False, compare=False)
 
     def _repr_svg_(self) -> str:
         return self.svg

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
-import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,14 +14,20 @@ import polars as pl
 from pydantic import ValidationError
 
 from realitygap._version import __version__
-from realitygap.errors import RealityGapError, RecordError
+from realitygap.errors import RealityGapError
 from realitygap.records import RecordWarning, ResultsFolder, column_table
+from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
+from realitygap.report._export import export_page
+from realitygap.report._formats import write_whole
+from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_tally_paths
+from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
+from realitygap.report._statistics_section import statistics_content
 from realitygap.report._summary import summarize_tally
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.study import load_study, named_studies
@@ -47,56 +51,51 @@ _MOST_GAPS = 12
 
 @dataclass(frozen=True)
 class _FigureOnPage:
-    """A figure in two widths, of which the page shows the one that fits."""
+    """A figure in two widths, of which the page shows the one that fits; `drawing` is the wide one."""
 
     anchor: str
     title: str
     caption: str
     wide: str
     narrow: str
+    drawing: Drawing
 
 
-def write_report(folder: ResultsFolder | str | Path, out: str | Path | None = None) -> Path:
-    """Write the page of a study: one HTML file that needs no other file, no network and no script.
+def write_report(
+    folder: ResultsFolder | str | Path, out: str | Path | None = None, *, figures: str | Path | None = None
+) -> Path:
+    """Write the page of a study: one HTML file that needs no other file and no network.
 
     Args:
         folder: the results of a study, or the path to them. They are only read; trials that are drawn are
             recomputed.
         out: the file to write; `report.html` in the folder when not given. A file that is there gives way,
             and stays as it is until the new one is complete.
+        figures: a folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
+            Nothing but the page is written when not given.
 
     Returns:
         The path of the page.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the page
-            cannot be written.
+            or another file cannot be written.
     """
     with warnings.catch_warnings():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
         tally = read_tally(folder)
-        page = _render(tally)
+        content = _content(tally)
+        page = _render(content)
+        if figures is not None:
+            content["exported"] = export_page(Path(figures), tally, content, page)
+            page = _render(content)
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
-    _write_whole(path, page)
+    write_whole(path, page.encode("utf-8", "replace"))
     return path
 
 
-def _write_whole(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(text.encode("utf-8", "replace"))
-        temporary.replace(path)
-    except OSError as error:
-        raise RecordError(
-            f"Could not write {path}: {error.strerror or error}. Name another file or folder."
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-def _render(tally: Tally) -> str:
+def _render(content: Mapping[str, Any]) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -108,7 +107,7 @@ def _render(tally: Tally) -> str:
     )
     environment.filters["share"] = _share
     environment.filters["count"] = _count
-    return environment.get_template("report.html.jinja").render(_content(tally))
+    return environment.get_template("report.html.jinja").render(content)
 
 
 def _content(tally: Tally) -> dict[str, Any]:
@@ -132,6 +131,8 @@ def _content(tally: Tally) -> dict[str, Any]:
         "settings": settings_tables(tally.conditions),
         "summary": summary.to_dicts(),
         "measure": tally.measure,
+        "statistics": statistics_content(tally),
+        "audit": paper_audit_content(tally),
         "published_sources": _published_sources(tally),
         "n_published": max((len(values) for values in summary["published"].drop_nulls()), default=0),
         "interval_notes": _interval_notes(summary),
@@ -139,8 +140,13 @@ def _content(tally: Tally) -> dict[str, Any]:
         "coverage": _coverage_figure(tally),
         "paths": _path_figures(tally),
         "choices": _choices_figure(tally),
+        "gallery": _gallery.content(
+            tally, (WIDE, NARROW), lambda anchor, title, drawn: _on_page(anchor, title, *drawn)
+        ),
+        "replay": replay_content(tally),
         "command": _command(tally),
         "columns": column_table(),
+        "exported": None,
     }
 
 
@@ -150,7 +156,8 @@ def _content(tally: Tally) -> dict[str, Any]:
 def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> _FigureOnPage:
     from markupsafe import Markup
 
-    return _FigureOnPage(anchor, title, wide.caption, Markup(inline(wide.svg)), Markup(inline(narrow.svg)))
+    pictures = (Markup(inline(wide.svg)), Markup(inline(narrow.svg)))
+    return _FigureOnPage(anchor, title, wide.caption, *pictures, wide)
 
 
 def _coverage_figure(tally: Tally) -> _FigureOnPage:

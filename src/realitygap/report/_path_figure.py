@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap.drawing import Ink
 from realitygap.errors import RealityGapError
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    Ink,
     house_style,
     new_figure,
     place_axes,
@@ -37,11 +37,11 @@ _MOST_PANELS = 11
 
 
 @dataclass(frozen=True)
-class _Path:
-    """The best trial of a generation.
+class TracedPath:
+    """A trial that is drawn.
 
     Attributes:
-        generation: which.
+        generation, individual: which.
         coverage: its coverage [0..1], by the tally's measure.
         cells: cells along its line, columns * row + column.
         poses: (t + 1, 3) x, y [m], heading [rad]; None where the trial cannot be recomputed.
@@ -49,6 +49,7 @@ class _Path:
     """
 
     generation: int
+    individual: int
     coverage: float
     cells: tuple[int, ...]
     poses: npt.NDArray[np.float64] | None
@@ -101,7 +102,7 @@ def draw_tally_paths(
     )
     with house_style():
         figure = _draw(paths, resolved.arena.arena(), resolved.jyro.body, label_of(described), width)
-        return Drawing(to_svg(figure, name, alt), caption, alt)
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:
@@ -117,12 +118,12 @@ def typical_replicate(tally: Tally, condition: str) -> int:
     return int(tally.replicates(condition)[np.argmax(bests == middle)])
 
 
-def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[_Path], str]:
+def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[TracedPath], str]:
     """The best trial of each generation shown, and why trials could not be recomputed (empty: they could)."""
     column = f"coverage_{tally.measure}"
     rows = tally.folder.read(condition.name, [replicate])
     if rows.is_empty():
-        raise ValueError(f"Condition {condition.name!r} has no run {replicate} in {tally.folder.path}.")
+        raise ValueError(no_such_run(tally, condition.name, replicate))
     best = rows.filter(pl.col(column) == pl.col(column).max().over("generation")).unique(
         "generation", keep="first", maintain_order=True
     )
@@ -130,8 +131,22 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
     shown = np.unique(
         np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
     )
+    return trace_paths(condition, best[shown], column)
+
+
+def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
+    """What to say of a run that is not there."""
+    there = [int(run) for run in tally.replicates(condition)]
+    has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
+    if there and there != list(range(there[0], there[-1] + 1)):
+        has += f", {len(there)} of them"
+    return f"Condition {condition!r} has no run {replicate} in {tally.folder.path}: {has}."
+
+
+def trace_paths(condition: Condition, rows: pl.DataFrame, column: str) -> tuple[list[TracedPath], str]:
+    """The trials of these rows, and why some could not be recomputed (empty: they could)."""
     paths, problem = [], ""
-    for row in best[shown].iter_rows(named=True):
+    for row in rows.iter_rows(named=True):
         poses = stalled = None
         try:
             trajectory = replay(condition, row)
@@ -139,17 +154,19 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
         except (RealityGapError, ValueError) as error:
             # another version's genome or numbers; the cells visited are in the row
             problem = str(error)
-        paths.append(_Path(row["generation"], row[column], tuple(row["cells"]), poses, stalled))
+        paths.append(
+            TracedPath(row["generation"], row["individual"], row[column], tuple(row["cells"]), poses, stalled)
+        )
     return paths, problem
 
 
 # --- drawing ------------------------------------------------------------------------------------------------
 
 
-def _draw(paths: list[_Path], arena: Arena, body: Body, label: str, width: float) -> Figure:
+def _draw(paths: list[TracedPath], arena: Arena, body: Body, label: str, width: float) -> Figure:
     n_columns = 3 if width >= 6 else 2
     n_rows = math.ceil((len(paths) + 1) / n_columns)
-    x_range, y_range = _extent(arena)
+    x_range, y_range = arena_extent(arena)
     gap, text_height = 0.2, 0.36
     panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
     panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
@@ -159,22 +176,24 @@ def _draw(paths: list[_Path], arena: Arena, body: Body, label: str, width: float
         x = 0.02 + column * (panel_width + gap)
         axes = place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
         if index < len(paths):
-            _draw_arena(axes, arena, x_range, y_range)
-            _draw_path(axes, paths[index], arena, body)
+            draw_arena(axes, arena, x_range, y_range)
+            draw_path(axes, paths[index], arena, body)
             _write_below(axes, paths[index], arena, label, panel_width)
         else:
-            _draw_legend(axes, paths, small=width < 6)
+            draw_path_legend(axes, paths, small=width < 6)
     return figure
 
 
-def _extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
+def arena_extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Left and right, lower and upper end of what is drawn of an arena [m]."""
     walls = np.array(arena.walls)
     margin = 0.012
     xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
     return (xs.min() - margin, xs.max() + margin), (ys.min() - margin, ys.max() + margin)
 
 
-def _draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: tuple[float, float]) -> None:
+def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: tuple[float, float]) -> None:
+    """Walls, reachable cells and their border."""
     axes.set_axis_off()
     axes.set_xlim(*x_range)
     axes.set_ylim(*y_range)
@@ -202,7 +221,8 @@ def _draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range:
         axes.plot([x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3)
 
 
-def _draw_path(axes: Axes, path: _Path, arena: Arena, body: Body) -> None:
+def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
+    """One trial: cells, path, start, end, and where it was blocked."""
     from matplotlib.patches import Rectangle
 
     grid = arena.grid
@@ -210,7 +230,7 @@ def _draw_path(axes: Axes, path: _Path, arena: Arena, body: Body) -> None:
         row, column = divmod(cell, grid.columns)
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_patch(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
-    outline = _outline(body, arena.start)
+    outline = body_outline(body, arena.start)
     axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
     axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
     if path.poses is None or path.stalled is None:
@@ -235,7 +255,7 @@ def _draw_path(axes: Axes, path: _Path, arena: Arena, body: Body) -> None:
     )
 
 
-def _outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
+def body_outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
     """(b + 1, 2) the body's corners at a pose [m], closed."""
     corners = np.array([*body.corners, body.corners[0]])
     sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
@@ -244,7 +264,7 @@ def _outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
     return placed
 
 
-def _write_below(axes: Axes, path: _Path, arena: Arena, label: str, width: float) -> None:
+def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str, width: float) -> None:
     n_cells = arena.grid.n_cells
     figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
     axes.annotate(
@@ -275,7 +295,8 @@ def _write_below(axes: Axes, path: _Path, arena: Arena, label: str, width: float
     )
 
 
-def _draw_legend(axes: Axes, paths: list[_Path], *, small: bool) -> None:
+def draw_path_legend(axes: Axes, paths: list[TracedPath], *, small: bool) -> None:
+    """What the marks of `draw_path` mean."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -343,7 +364,7 @@ def _caption(
     tally: Tally,
     condition: Mapping[str, Any],
     replicate: int,
-    paths: list[_Path],
+    paths: list[TracedPath],
     *,
     typical: bool,
     problem: str,

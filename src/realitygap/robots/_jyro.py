@@ -7,7 +7,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors
+from realitygap.drawing import Picture
+from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
 
 STEP_S = 0.1  # one step of Jyro, one command [s]
 
@@ -86,3 +87,10 @@ class JyroPlatform(BaseModel):
     def body_radius(self) -> float:
         """Distance of the farthest corner from the center [m]."""
         return max(math.hypot(forward, left) for forward, left in self.body.corners)
+
+    def picture(self) -> Picture:
+        """The robot from above, to scale, with its dimensions."""
+        return robot_picture(f"jyro ({self.label})", self.body, self.sensors)
+
+    def _repr_svg_(self) -> str:
+        return self.picture().to_svg(300.0)

@@ -36,3 +36,12 @@ class CoverageTask(BaseModel):
         if self.bias_input == "with-novelty":
             return selection == "novelty"
         return self.bias_input == "always"
+
+    def input_names(self, selection: str) -> tuple[str, ...]:
+        """What the network's inputs are, in order."""
+        return ("obstacle", "stall", "time", *(("bias",) if self.has_bias_input(selection) else ()))
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """What the network's outputs are, in order."""
+        return ("move", "turn")

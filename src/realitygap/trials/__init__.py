@@ -9,6 +9,7 @@ from ._jyro import (
     trace_genome,
     try_genomes,
 )
+from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "TrialBatch",
     "jyro_rules",
     "jyro_scene",
+    "retry_genomes",
     "simulate_case",
     "simulate_file",
     "trace_genome",

@@ -125,6 +125,11 @@ class Trajectory:
     coverage_ends: float
     cells: tuple[int, ...]
 
+    def _repr_svg_(self) -> str:
+        from ._picture import path_picture
+
+        return path_picture(self).to_svg(360.0)
+
 
 @dataclass(frozen=True)
 class NoiseKey:

@@ -10,6 +10,7 @@ from ._arena import (
     paper_arena,
 )
 from ._case import Case
+from ._pictures import arena_picture, robot_picture
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._settings import ArenaSettings
 
@@ -24,6 +25,8 @@ __all__ = [
     "Grid",
     "Pose",
     "RangeSensors",
+    "arena_picture",
     "is_inside",
     "paper_arena",
+    "robot_picture",
 ]

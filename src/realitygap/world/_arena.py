@@ -61,6 +61,11 @@ class Arena:
         """The arena as plain values."""
         return asdict(self) | {"start": tuple(self.start)}
 
+    def _repr_svg_(self) -> str:
+        from ._pictures import arena_picture
+
+        return arena_picture(self).to_svg()
+
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Arena:
         """The arena that `to_dict` described."""

@@ -1,0 +1,94 @@
+"""Tables of an audit for the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from realitygap.report import Audit, Interval
+
+_PROBLEMS = {"impossible": "no k/{n}", "cut": "cut, not rounded", "raised": "raised, not rounded"}
+
+
+def conditions_table(audit: Audit, title: str) -> Table:
+    """One row a condition."""
+    table = _table(title)
+    _columns(table, ["condition"], ["runs", "mean", "sd", "median", "its 95 % interval"])
+    for each in audit.conditions:
+        median = (
+            "too few runs"
+            if each.median_low is None or each.median_high is None
+            else f"{each.median_low:.3g} to {each.median_high:.3g}"
+        )
+        deviation = "-" if each.deviation is None else f"{each.deviation:.3g}"
+        _row(
+            table, each.condition, f"{each.n:,}", f"{each.mean:.3g}", deviation, f"{each.median:.3g}", median
+        )
+    return table
+
+
+def doubtful_table(audit: Audit) -> Table:
+    """One row a value that is not the rounded share that it should be."""
+    n = audit.denominator or 1
+    table = _table(f"Values that are not k/{n}, rounded")
+    _columns(table, ["line", "condition", "run", "value", "problem", "nearest"], [])
+    for each in audit.doubtful:
+        digits = len(each.text.partition(".")[2]) + 1
+        _row(
+            table,
+            str(each.line),
+            each.condition,
+            each.run,
+            each.text,
+            _PROBLEMS[each.problem].format(n=n),
+            f"{each.nearest}/{n} = {each.nearest / n:.{digits}f}",
+        )
+    return table
+
+
+def pairs_table(audit: Audit) -> Table:
+    """One row for each two conditions."""
+    table = _table("Each two conditions")
+    table.caption = Text(
+        "A12: how likely a run of the first is above one of the second, [95 % interval]; p by permutation, "
+        "Holm's over all pairs; least p: the smallest that so many runs can give; finds: the smallest "
+        "difference found in 80 of 100 studies, in standard deviations"
+    )
+    table.caption_justify = "left"
+    _columns(table, ["pair"], ["A12", "p", "Holm", "least p", "finds"])
+    table.add_column("what may be said", min_width=14)
+    for each in audit.pairs:
+        _row(
+            table,
+            f"{each.one} -\n{each.other}",
+            f"{each.a12:.2f}\n{_interval(each.a12_interval)}",
+            f"{each.p:.2g}",
+            f"{each.p_holm:.2g}",
+            f"{each.smallest_p:.2g}",
+            "-" if each.detectable is None else f"{each.detectable:.1f}",
+            each.verdict,
+        )
+    return table
+
+
+def _interval(interval: Interval | None) -> str:
+    return "[none]" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
+
+
+def _table(title: str) -> Table:
+    return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+
+
+def _columns(table: Table, words: list[str], numbers: list[str]) -> None:
+    for name in words:
+        table.add_column(name)
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+
+
+def _row(table: Table, *cells: str) -> None:
+    table.add_row(*(Text(cell) for cell in cells))

@@ -1,0 +1,108 @@
+"""`realitygap show`: one run, trial, network, arena or robot as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from realitygap.errors import RealityGapError, StudyError
+
+if TYPE_CHECKING:
+    from realitygap.report._show import Subject
+
+
+def show(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="[WHAT] DIR", help="A folder of results; or network, species, arena or robot."
+        ),
+    ],
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="", help="After network and species, the folder; after arena, paper; after robot, jyro."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="FILE", help="Ends in .svg, .pdf, .png or, for a trial, .gif."),
+    ] = None,
+    condition: Annotated[str | None, typer.Option(help="Of which. [default: the first]")] = None,
+    replicate: Annotated[int | None, typer.Option(help="Which run. [default: the typical one]")] = None,
+    generation: Annotated[int | None, typer.Option(help="Of a trial or network.")] = None,
+    individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
+) -> None:
+    """Draw a run, one trial, a network, species, an arena or a robot into a file.
+
+    A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
+    commands. FILE.gif shows a trial in motion (without --generation, the run's best). Trials are recomputed from their
+    rows. A file that is there gives way once the new one is complete.
+
+    Example: realitygap show results/paper --condition coverage-50 --replicate 3 -o run.svg
+
+    Example: realitygap show results/paper --generation 4 --individual 2 -o trial.gif
+
+    Example: realitygap show network results/paper --condition novelty-50 -o network.pdf
+
+    Example: realitygap show species results/paper -o species.png
+
+    Example: realitygap show arena -o arena.svg
+
+    Example: realitygap show robot jyro -o robot.svg
+
+    In Python: realitygap.report.save_view("results/paper", "run.svg", condition="coverage-50", replicate=3)
+
+    In Python: realitygap.report.save_view("results/paper", "network.pdf", subject="network")
+
+    In Python: realitygap.report.save_arena("arena.svg"), realitygap.report.save_robot("robot.svg")
+    """
+    if out is None:
+        raise StudyError("Where to? Name a file with -o, such as -o run.svg.")
+    from realitygap.report import save_arena, save_robot, save_view
+
+    numbers = (replicate, generation, individual)
+    try:
+        if what in ("arena", "robot"):
+            _refuse(what, condition, *numbers)
+            save = save_arena if what == "arena" else save_robot
+            path = save(out) if name is None else save(out, name)
+        else:
+            subject, folder = _subject(what, name, out)
+            path = save_view(
+                folder,
+                out,
+                subject=subject,
+                condition=condition,
+                replicate=replicate,
+                generation=generation,
+                individual=individual,
+            )
+    except ValueError as error:
+        raise RealityGapError(str(error)) from error
+    typer.echo(f"Written: {path}")
+
+
+def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
+    """What to show of which folder."""
+    subjects: dict[str, Subject] = {"network": "network", "species": "species"}
+    if what in subjects:
+        if name is None:
+            raise StudyError(
+                f"Of which results? Name a folder: realitygap show {what} results/paper -o {out}"
+            )
+        return subjects[what], name
+    if name is not None:
+        raise StudyError(
+            f"Cannot show {what!r} of {name!r}. Expected network, species, arena or robot first, or only a folder."
+        )
+    return "run", what
+
+
+def _refuse(what: str, *given: object) -> None:
+    names = ("--condition", "--replicate", "--generation", "--individual")
+    surplus = [name for name, value in zip(names, given, strict=True) if value is not None]
+    if surplus:
+        raise StudyError(f"Of no meaning for {what}: {', '.join(surplus)}. Leave that out.")

@@ -1,0 +1,11 @@
+"""Plain shapes to SVG, without matplotlib: how arenas, robots, networks and paths show themselves.
+
+It lies below `world`, because it knows nothing but points, colors and text. What has a picture (an `Arena`, a
+`JyroPlatform`, a `Genome`, a `Trajectory`) says so as a `Picture` of shapes, which notebooks show; the report draws the
+same shapes into its figures, and matplotlib is imported only there.
+"""
+
+from ._ink import Ink
+from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
+
+__all__ = ["FONT", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text"]

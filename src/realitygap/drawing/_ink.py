@@ -1,0 +1,35 @@
+"""The colors of all pictures."""
+
+from __future__ import annotations
+
+
+class Ink:
+    """The colors of all figures: apart in lightness, and for color-blind eyes (after Okabe & Ito, 2008).
+
+    The eight pens are never told apart by color alone: each has a pattern of dashes and a number as well.
+    """
+
+    TEXT = "#1c1f24"
+    MUTED = "#5a626d"
+    RULE = "#d3d8de"
+    GROUND = "#fefefe"
+    OURS = "#0a4f8f"
+    BAND = "#a9c9e8"
+    RUN = "#6d7580"
+    PUBLISHED = "#b8480a"
+    REACH = "#c2182b"
+    VISITED = "#dfe9f3"
+    BODY = "#8d949e"
+    PEN0 = "#16191d"
+    PEN1 = "#0072b2"
+    PEN2 = "#c94f00"
+    PEN3 = "#00805c"
+    PEN4 = "#b0508c"
+    PEN5 = "#a67a00"
+    PEN6 = "#3d9bd6"
+    PEN7 = "#7a1f4d"
+
+    @classmethod
+    def names(cls) -> dict[str, str]:
+        """Color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
+        return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}

@@ -1,0 +1,412 @@
+"""What a small table of results can show, and what it cannot."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from realitygap.errors import TableError
+from realitygap.report._effects import (
+    POWER,
+    USUAL_EFFECTS,
+    Interval,
+    a12,
+    a12_of_effect,
+    bca_interval,
+    detectable_effect,
+    difference_of_means,
+    effect_of_a12,
+    newcombe_interval,
+    runs_needed,
+    share_above,
+)
+from realitygap.report._permutation import ALPHA, holm, permutation_p, runs_for_a_claim, smallest_p
+from realitygap.report._statistics import SMALLEST_N, median_interval
+
+COLUMNS = ("condition", "run", "value")
+_MOST_MISTAKES = 20
+_LONGEST_NUMBER = 40
+
+
+@dataclass(frozen=True)
+class DoubtfulValue:
+    """A value that is not the rounded share that it should be.
+
+    Attributes:
+        line: in the file, the header being line 1; 0 where there is no file.
+        condition: its condition.
+        run: its run, as written.
+        text: the value as written.
+        problem: `impossible`: no k/N comes near; `cut`: k/N without its further digits, and not rounded;
+            `raised`: k/N rounded up where it should go down.
+        nearest: the nearest k, out of N.
+    """
+
+    line: int
+    condition: str
+    run: str
+    text: str
+    problem: str
+    nearest: int
+
+
+@dataclass(frozen=True)
+class AuditedCondition:
+    """One condition of the table.
+
+    Attributes:
+        condition: its name.
+        n: runs.
+        mean: of its values.
+        median: of its values.
+        deviation: standard deviation; None with one run.
+        median_low, median_high: the 95 % interval of the median; None below 6 runs, which cannot give one.
+    """
+
+    condition: str
+    n: int
+    mean: float
+    median: float
+    deviation: float | None
+    median_low: float | None
+    median_high: float | None
+
+
+@dataclass(frozen=True)
+class AuditedPair:
+    """Two conditions of the table, of independent runs.
+
+    Attributes:
+        one: a condition, and
+        other: another.
+        n: runs of `one`.
+        n_other: runs of `other`.
+        difference: mean of `one` less mean of `other`.
+        difference_interval: BCa; None below 10 runs.
+        a12: how likely a run of `one` is above a run of `other`, ties counting half.
+        a12_interval: BCa; Newcombe's below 10 runs; None where not even p < 0.05 is possible.
+        p: two-sided, of a permutation test of the difference of means.
+        p_holm: corrected for all pairs of the table.
+        smallest_p: the smallest that so many runs can give, whatever they are.
+        can_claim: whether the corrected p can be below 0.05 at all.
+        runs_for_a_claim: the fewest runs a condition with which it can.
+        detectable: the smallest difference that so many runs find in 80 of 100 studies [standard deviations].
+        detectable_a12: the same as A12.
+    """
+
+    one: str
+    other: str
+    n: int
+    n_other: int
+    difference: float
+    difference_interval: Interval | None
+    a12: float
+    a12_interval: Interval | None
+    p: float
+    p_holm: float
+    smallest_p: float
+    can_claim: bool
+    runs_for_a_claim: int
+    detectable: float | None
+    detectable_a12: float | None
+
+    @property
+    def verdict(self) -> str:
+        """What may be said, in words."""
+        if not self.can_claim:
+            return f"no claim possible; {self.runs_for_a_claim} runs each at least"
+        if self.p_holm < ALPHA:
+            higher, lower = (self.one, self.other) if self.difference > 0 else (self.other, self.one)
+            return f"{higher} above {lower}"
+        return "not shown"
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What `audit_results` finds.
+
+    Attributes:
+        conditions: in the order of the file.
+        denominator: what values were checked against; None: they were not.
+        doubtful: values that are no k/N, or not rounded.
+        pairs: each two conditions.
+        runs_needed: runs a condition that find a small, medium and large effect in 80 of 100 studies.
+    """
+
+    conditions: list[AuditedCondition]
+    denominator: int | None
+    doubtful: list[DoubtfulValue]
+    pairs: list[AuditedPair]
+    runs_needed: dict[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain values; each pair has its `verdict`."""
+        found = asdict(self)
+        for plain, pair in zip(found["pairs"], self.pairs, strict=True):
+            plain["verdict"] = pair.verdict
+        return found
+
+
+@dataclass(frozen=True)
+class _Row:
+    line: int
+    condition: str
+    run: str
+    text: str
+
+    @property
+    def value(self) -> float:
+        return float(self.text)
+
+
+def audit_results(table: str | Path, *, denominator: int | None = None) -> Audit:
+    """What a small table of results can show, and what it cannot.
+
+    Runs are taken as independent. Every two conditions are compared by a permutation test of the difference
+    of their means, corrected by Holm over all pairs. Detectable effects and numbers of runs are those of a t
+    test at the 5 % level with 80 % power, which assumes normal values with the same spread in both.
+
+    Args:
+        table: a CSV file with the columns condition, run and value; others are not looked at.
+        denominator: N, where values must be k/N, such as a share of N cells.
+
+    Returns:
+        The audit.
+
+    Raises:
+        TableError: the file cannot be read, or its columns or rows are not as expected; all rows that are
+            wrong are named at once.
+        ValueError: `denominator` is below 1.
+    """
+    if denominator is not None and denominator < 1:
+        raise ValueError(f"denominator is {denominator}, expected 1 or more.")
+    return _audit(_read(Path(table)), denominator)
+
+
+def _audit(rows: Sequence[_Row], denominator: int | None) -> Audit:
+    names = list(dict.fromkeys(row.condition for row in rows))
+    values = {name: np.array([row.value for row in rows if row.condition == name]) for name in names}
+    doubtful = []
+    for row in rows if denominator is not None else ():
+        found = doubt(row.text, denominator or 1)
+        if found is not None:
+            doubtful.append(DoubtfulValue(row.line, row.condition, row.run, row.text, *found))
+    return Audit(
+        conditions=[_condition(name, values[name]) for name in names],
+        denominator=denominator,
+        doubtful=doubtful,
+        pairs=compare_samples(values),
+        runs_needed={
+            name: runs_needed(effect_of_a12(share), paired=False) or 0
+            for name, share in USUAL_EFFECTS.items()
+        },
+    )
+
+
+def _condition(name: str, values: npt.NDArray[np.float64]) -> AuditedCondition:
+    interval = median_interval(values)
+    return AuditedCondition(
+        name,
+        len(values),
+        float(values.mean()),
+        float(np.median(values)),
+        float(values.std(ddof=1)) if len(values) > 1 else None,
+        interval.low if interval else None,
+        interval.high if interval else None,
+    )
+
+
+def compare_samples(values: dict[str, npt.NDArray[np.float64]]) -> list[AuditedPair]:
+    """Every two of the conditions, of independent runs, in the order given."""
+    names = list(itertools.combinations(values, 2))
+    raw = np.array([permutation_p(values[one], values[other]) for one, other in names])
+    floors = np.array([smallest_p(len(values[one]), len(values[other])) for one, other in names])
+    corrected, best = holm(raw), holm(floors)
+    pairs = []
+    for k, (name, other_name) in enumerate(names):
+        one, other = values[name], values[other_name]
+        share = a12(one, other)
+        interval = bca_interval(share_above, one, other, paired=False)
+        if interval is None and floors[k] < ALPHA:
+            interval = newcombe_interval(share, len(one), len(other))
+        effect = detectable_effect(min(len(one), len(other)), paired=False)
+        pairs.append(
+            AuditedPair(
+                one=name,
+                other=other_name,
+                n=len(one),
+                n_other=len(other),
+                difference=float(one.mean() - other.mean()),
+                difference_interval=bca_interval(difference_of_means, one, other, paired=False),
+                a12=share,
+                a12_interval=interval,
+                p=float(raw[k]),
+                p_holm=float(corrected[k]),
+                smallest_p=float(floors[k]),
+                can_claim=bool(best[k] < ALPHA),
+                runs_for_a_claim=runs_for_a_claim(len(names), paired=False),
+                detectable=effect,
+                detectable_a12=None if effect is None else a12_of_effect(effect),
+            )
+        )
+    return pairs
+
+
+def doubt(text: str, denominator: int) -> tuple[str, int] | None:
+    """What is wrong with a value that should be k/N, and the nearest k; None where nothing is.
+
+    Args:
+        text: the value as written; its digits after the point decide how exact it claims to be.
+        denominator: N.
+    """
+    written = Decimal(text)
+    value = Fraction(written)
+    exponent = written.as_tuple().exponent
+    unit = Fraction(10) ** int(exponent)
+    nearest = min(max(round(value * denominator), 0), denominator)
+    share = Fraction(nearest, denominator)
+    if abs(value - share) <= unit / 2:
+        return None
+    if 0 < share - value < unit:
+        return "cut", nearest
+    if 0 < value - share < unit:
+        return "raised", nearest
+    return "impossible", nearest
+
+
+# --- reading ------------------------------------------------------------------------------------------------
+
+
+def _read(path: Path) -> list[_Row]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, skipinitialspace=True, strict=True)
+            lines = [(reader.line_num, line) for line in reader if any(cell.strip() for cell in line)]
+    except UnicodeDecodeError as error:
+        raise TableError(
+            f"{path}: not a text file (byte {error.start} is not UTF-8). Give a CSV file."
+        ) from None
+    except OSError as error:
+        raise TableError(f"{path}: cannot be read ({error.strerror}). Give a CSV file.") from None
+    except csv.Error as error:
+        raise TableError(f"{path}: not a CSV file ({error}).") from None
+    if not lines:
+        raise TableError(
+            f"{path}: is empty. Expected a line with {', '.join(COLUMNS)}, and a line for each run."
+        )
+    places = _places(path, lines[0][1])
+    rows, mistakes = [], []
+    for number, cells in lines[1:]:
+        texts = [cells[place].strip() if place < len(cells) else "" for place in places]
+        row = _Row(number, *texts)
+        problem = _problem(row)
+        if problem:
+            mistakes.append(f"line {number}: {problem}")
+        else:
+            rows.append(row)
+    mistakes += _doubles(rows)
+    if mistakes:
+        more = f"; and {len(mistakes) - _MOST_MISTAKES} more" if len(mistakes) > _MOST_MISTAKES else ""
+        raise TableError(f"{path}: {'; '.join(mistakes[:_MOST_MISTAKES])}{more}.")
+    if not rows:
+        raise TableError(f"{path}: has no line below {','.join(COLUMNS)}. Expected one for each run.")
+    if len({row.condition for row in rows}) == 1:
+        raise TableError(
+            f"{path}: has one condition only ({rows[0].condition!r}). Expected at least two, to be compared."
+        )
+    return rows
+
+
+def _places(path: Path, header: Sequence[str]) -> list[int]:
+    found = [name.strip().lower() for name in header]
+    missing = [name for name in COLUMNS if name not in found]
+    if missing:
+        listed = ", ".join(repr(name.strip()) for name in header)
+        raise TableError(
+            f"{path}: has no column {' and no column '.join(missing)}. Expected {', '.join(COLUMNS)} in the first "
+            f"line, which has {listed}."
+        )
+    twice = [name for name in COLUMNS if found.count(name) > 1]
+    if twice:
+        raise TableError(f"{path}: has two columns {twice[0]!r}. Keep one of them.")
+    return [found.index(name) for name in COLUMNS]
+
+
+def _problem(row: _Row) -> str:
+    if not row.condition:
+        return "no condition"
+    if not row.run:
+        return "no run"
+    if not row.text:
+        return "no value"
+    try:
+        is_number = (
+            len(row.text) <= _LONGEST_NUMBER and math.isfinite(float(row.text)) and "_" not in row.text
+        )
+    except ValueError:
+        is_number = False
+    # float() takes a little more than Decimal() does
+    if not is_number or not row.text.isascii():
+        return f"the value {row.text[:_LONGEST_NUMBER]!r} is not a number"
+    return ""
+
+
+def _doubles(rows: Sequence[_Row]) -> list[str]:
+    seen: dict[tuple[str, str], int] = {}
+    mistakes = []
+    for row in rows:
+        first = seen.setdefault((row.condition, row.run), row.line)
+        if first != row.line:
+            mistakes.append(
+                f"line {row.line}: condition {row.condition!r} has run {row.run!r} already, in line {first}"
+            )
+    return mistakes
+
+
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def audit_notes(audit: Audit) -> list[str]:
+    """What must be said with the tables, in sentences."""
+    notes = []
+    if audit.denominator is not None:
+        n = sum(each.n for each in audit.conditions)
+        notes.append(
+            f"{len(audit.doubtful)} of {n} values are no k/{audit.denominator} as rounded."
+            if audit.doubtful
+            else f"All {n} values are k/{audit.denominator}, as rounded."
+        )
+    refused = [pair for pair in audit.pairs if not pair.can_claim]
+    if refused:
+        worst = max(refused, key=lambda pair: pair.smallest_p)
+        notes.append(
+            f"{worst.n} runs against {worst.n_other} give no p below {worst.smallest_p:.2g}, whatever they are"
+            + (
+                f", and over {len(audit.pairs)} pairs (Holm) none below "
+                f"{min(1.0, worst.smallest_p * len(audit.pairs)):.2g}"
+                if len(audit.pairs) > 1
+                else ""
+            )
+            + f". From {worst.runs_for_a_claim} runs each on, a difference could be shown."
+        )
+    few = [each.condition for each in audit.conditions if each.median_low is None]
+    if few:
+        notes.append(f"Fewer than {SMALLEST_N} runs give no 95 % interval of the median: {', '.join(few)}.")
+    needed = ", ".join(
+        f"{n} for a {name} effect (A12 {USUAL_EFFECTS[name]})" for name, n in audit.runs_needed.items()
+    )
+    notes.append(
+        f"Runs of each condition that find an effect in {100 * POWER:.0f} of 100 studies (t test at 5 %, two "
+        f"conditions, normal values with one spread): {needed}."
+    )
+    return notes

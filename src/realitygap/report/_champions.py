@@ -1,0 +1,149 @@
+"""The best network of each run, tried again on fresh noise: how much of its score was luck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+from pydantic import ValidationError
+
+from realitygap.errors import RecordError
+from realitygap.records import ResultsFolder
+from realitygap.report._effects import Interval, bca_interval, difference_of_means, mean_interval
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.runs import Condition, genome_of
+from realitygap.trials import NoiseKey, retry_genomes
+
+FRESH_TRIALS = 20
+"""How often each champion is tried again: repeats 1 to 20 of its trial, of which the study ran number 0."""
+
+MOST_RUNS = 100
+"""Runs of a condition whose champions are tried again, and whose behaviors are compared: the first ones."""
+
+
+@dataclass(frozen=True)
+class Champions:
+    """The best networks of the runs of a condition, as recorded and on fresh noise.
+
+    Attributes:
+        condition: its name.
+        label: SIM, TWIN, EMULATED or REAL.
+        reported: (n,) coverage of each champion in its run, the best of all its trials [0..1].
+        fresh: (n, 20) coverage of the same networks on fresh noise.
+        problem: why there are none; empty where there are.
+    """
+
+    condition: str
+    label: str
+    reported: npt.NDArray[np.float64]
+    fresh: npt.NDArray[np.float64]
+    problem: str = ""
+
+    @property
+    def n(self) -> int:
+        """How many champions were tried again."""
+        return len(self.reported)
+
+    @property
+    def expected(self) -> npt.NDArray[np.float64]:
+        """(n,) mean coverage of each champion on fresh noise."""
+        return np.asarray(self.fresh.mean(axis=1))
+
+    @property
+    def luck(self) -> float:
+        """Mean of what champions lose when they are tried again."""
+        return float((self.reported - self.expected).mean())
+
+    @property
+    def luck_interval(self) -> Interval | None:
+        """The BCa interval of `luck`; None below 10 champions."""
+        return bca_interval(difference_of_means, self.reported, self.expected, paired=True)
+
+    @property
+    def expected_interval(self) -> Interval | None:
+        """The BCa interval of the mean on fresh noise; None below 10 champions."""
+        return mean_interval(self.expected)
+
+
+def retry_champions(folder: ResultsFolder | str | Path) -> list[Champions]:
+    """Try the best network of each run 20 times on fresh noise, for up to 100 runs a condition.
+
+    The best of 40 noisy trials is above what its network does on average. Only the mean on fresh noise says
+    what was evolved.
+
+    Args:
+        folder: the results of a study, or the path to them.
+
+    Returns:
+        One for each condition with runs. Where trials cannot be recomputed, `problem` says why.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    return retry_tally(read_tally(folder))
+
+
+def retry_tally(tally: Tally) -> list[Champions]:
+    """As `retry_champions`, of what was read already."""
+    with_runs = set(tally.runs["condition"])
+    return [_retry(tally, each) for each in tally.conditions if each["name"] in with_runs]
+
+
+def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
+    name, label = described["name"], label_of(described)
+    try:
+        condition = Condition.from_settings(name, dict(settings_of(described)))
+        rows = _champion_rows(tally, name)
+        reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
+    except ValidationError:
+        none = np.empty(0)
+        return Champions(
+            name, label, none, none.reshape(0, FRESH_TRIALS), "its settings are another version’s"
+        )
+    except (RecordError, ValueError) as error:
+        none = np.empty(0)
+        return Champions(name, label, none, none.reshape(0, FRESH_TRIALS), str(error))
+    return Champions(name, label, reported, fresh)
+
+
+def _champion_rows(tally: Tally, condition: str) -> pl.DataFrame:
+    """The best individual of each of the first runs, the first of several alike."""
+    column = f"coverage_{tally.measure}"
+    replicates = [int(run) for run in tally.replicates(condition)[:MOST_RUNS]]
+    rows = tally.folder.read(
+        condition, replicates, ["replicate", "generation", "individual", column, "genome", "key"]
+    )
+    best = rows.filter(pl.col(column) == pl.col(column).max().over("replicate"))
+    return best.unique("replicate", keep="first", maintain_order=True)
+
+
+def _try_again(
+    condition: Condition, rows: pl.DataFrame, column: str
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    if (rows["key"] != condition.key).any():
+        raise RecordError("its rows were not drawn with the key of its settings")
+    keys = [
+        NoiseKey(key, replicate, generation, individual)
+        for key, replicate, generation, individual in rows.select(
+            "key", "replicate", "generation", "individual"
+        ).iter_rows()
+    ]
+    genomes = [genome_of(condition, row) for row in rows.iter_rows(named=True)]
+    batch = retry_genomes(
+        condition.jyro,
+        condition.arena.arena(),
+        genomes,
+        noise=condition.noise,
+        noise_keys=keys,
+        repeats=range(FRESH_TRIALS + 1),
+    )
+    coverage: npt.NDArray[np.float64] = getattr(batch, column).reshape(len(genomes), -1)
+    reported = rows[column].to_numpy()
+    if not np.array_equal(coverage[:, 0], reported):
+        raise RecordError("its trials come out otherwise when run again; another version computed them")
+    return reported, coverage[:, 1:]

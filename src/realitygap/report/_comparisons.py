@@ -1,0 +1,401 @@
+"""Conditions against each other: how much, how sure, and what so many runs cannot say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from realitygap.records import ResultsFolder
+from realitygap.report._effects import (
+    BCA_SMALLEST_N,
+    RESAMPLES,
+    Interval,
+    a12,
+    bca_interval,
+    detectable_effect,
+    difference_of_means,
+    newcombe_interval,
+    runs_needed,
+    share_above,
+)
+from realitygap.report._permutation import (
+    ALPHA,
+    MONTE_CARLO,
+    MOST_ENUMERATED,
+    holm,
+    permutation_p,
+    runs_for_a_claim,
+    sign_flip_p,
+    smallest_p,
+)
+from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+
+_MOST_RUNS_NAMED = 100_000
+
+Reason = Literal["noise", "selection", "baseline"]
+"""Why two conditions are compared: they differ in nothing else, or one names the other as its baseline."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two conditions on the best coverage of a run.
+
+    Attributes:
+        one: a condition, and
+        other: the one it is compared with.
+        reason: why these two.
+        label: SIM, TWIN, EMULATED or REAL; both where they differ.
+        n: runs of `one`; `paired`: pairs.
+        n_other: runs of `other`.
+        paired: whether the two draw the same random numbers run by run, so that runs are compared in pairs.
+        difference: mean of `one` less mean of `other` [share of the reachable cells].
+        difference_interval: its BCa interval; None where n is too small.
+        a12: how likely a run of `one` is above a run of `other` [0..1].
+        a12_interval: BCa, or Newcombe's where n is too small for it; None where n cannot give p < 0.05 either.
+        p: two-sided, of a permutation test of the difference.
+        p_holm: corrected for all comparisons of the study.
+        best_p: the smallest that `p_holm` can be with so many runs.
+        runs_for_a_claim: the fewest runs with which `p_holm` can be below 0.05.
+        detectable: the smallest difference that n runs find in 80 of 100 studies, at 5 % divided by the number
+            of comparisons; None without spread.
+        runs_for_difference: runs with which the observed difference would be found so often; None above a
+            million.
+    """
+
+    one: str
+    other: str
+    reason: Reason
+    label: str
+    n: int
+    n_other: int
+    paired: bool
+    difference: float
+    difference_interval: Interval | None
+    a12: float
+    a12_interval: Interval | None
+    p: float
+    p_holm: float
+    best_p: float
+    runs_for_a_claim: int
+    detectable: float | None
+    runs_for_difference: int | None
+
+    @property
+    def can_claim(self) -> bool:
+        """Whether so many runs could show any difference at all."""
+        return self.best_p < ALPHA
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the difference is claimed."""
+        return self.p_holm < ALPHA
+
+    @property
+    def verdict(self) -> str:
+        """What may be said, in words."""
+        if not self.can_claim:
+            return (
+                f"no claim possible: with n = {min(self.n, self.n_other)} corrected p cannot be below "
+                f"{p_in_words(self.best_p)}; {self.runs_for_a_claim} runs at least"
+            )
+        if self.is_shown:
+            higher, lower = (self.one, self.other) if self.difference > 0 else (self.other, self.one)
+            return f"{higher} above {lower}"
+        if self.detectable is None:
+            return "not shown"
+        runs = self.runs_for_difference
+        needed = (
+            f"{runs:,}" if runs is not None and runs <= _MOST_RUNS_NAMED else f"over {_MOST_RUNS_NAMED:,}"
+        )
+        return f"not shown; n finds {self.detectable:.3f} in 80 %, this difference takes {needed} runs"
+
+
+def compare_conditions(folder: ResultsFolder | str | Path) -> list[Comparison]:
+    """Conditions of a study in pairs, on the best coverage of each run.
+
+    Compared are conditions that differ in the noise level alone, in the selection alone, and every condition
+    with its baseline. The test is a permutation test of the difference of means: signs are flipped where the
+    conditions draw the same random numbers run by run, else runs are relabeled. It is exact for any
+    distribution and any n, and tests the very difference that is shown with it.
+
+    Args:
+        folder: the results of a study, or the path to them.
+
+    Returns:
+        The comparisons: across noise, across selections, against baselines. Empty where nothing compares.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    return compare_tally(read_tally(folder))
+
+
+def compare_tally(tally: Tally) -> list[Comparison]:
+    """As `compare_conditions`, of what was read already."""
+    parts = []
+    for one, other, reason in _pairs(tally):
+        values = paired_values(tally, one["name"], other["name"])
+        if min(len(values.one), len(values.other)):
+            parts.append((one, other, reason, values))
+    raw = np.array([values.p() for *_, values in parts])
+    floors = np.array([values.smallest_p() for *_, values in parts])
+    corrected, best = holm(raw), holm(floors)
+    return [
+        _comparison(*part, len(parts), float(raw[k]), float(corrected[k]), float(best[k]))
+        for k, part in enumerate(parts)
+    ]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Best coverages of two conditions; in pairs, value by value, where `paired`."""
+
+    one: npt.NDArray[np.float64]
+    other: npt.NDArray[np.float64]
+    paired: bool
+
+    def p(self) -> float:
+        """Two-sided p of the difference of means, by permutation."""
+        return sign_flip_p(self.one - self.other) if self.paired else permutation_p(self.one, self.other)
+
+    def smallest_p(self) -> float:
+        """The smallest that `p` can be with so many runs."""
+        if self.paired:
+            return smallest_p(len(self.one))
+        exact = smallest_p(len(self.one), len(self.other))
+        # more relabelings than are listed: p comes from those drawn
+        return max(exact, 2 / (MONTE_CARLO + 1)) if exact < 2 / MOST_ENUMERATED else exact
+
+    def spread(self) -> float:
+        """Standard deviation of a difference, or of a run (pooled); NaN with fewer than two."""
+        if len(self.one) < 2 or len(self.other) < 2:
+            return math.nan
+        if self.paired:
+            return float((self.one - self.other).std(ddof=1))
+        n, m = len(self.one), len(self.other)
+        pooled = ((n - 1) * self.one.var(ddof=1) + (m - 1) * self.other.var(ddof=1)) / (n + m - 2)
+        return math.sqrt(float(pooled))
+
+
+def paired_values(tally: Tally, one: str, other: str) -> Samples:
+    """The runs of two conditions, in pairs where they draw the same random numbers: those that both have."""
+    values = [tally.run_bests(name, tally.measure) for name in (one, other)]
+    if not _is_paired(tally, one, other):
+        return Samples(values[0], values[1], paired=False)
+    _, in_one, in_other = np.intersect1d(
+        tally.replicates(one), tally.replicates(other), assume_unique=True, return_indices=True
+    )
+    return Samples(values[0][in_one], values[1][in_other], paired=True)
+
+
+def _is_paired(tally: Tally, one: str, other: str) -> bool:
+    settings = [settings_of(tally.condition(name)) for name in (one, other)]
+    if any("pair" not in each for each in settings):
+        return tally.description.get("pair") is True
+    return all(each["pair"] is True for each in settings) and settings[0].get("seed") == settings[1].get(
+        "seed"
+    )
+
+
+def same_but_for(key: str, conditions: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+    """Conditions in groups that differ in one setting alone; groups of one are left out."""
+    groups: list[tuple[dict[str, Any], list[Mapping[str, Any]]]] = []
+    for condition in conditions:
+        settings = settings_of(condition)
+        if key not in settings:
+            continue
+        rest = {name: value for name, value in settings.items() if name != key}
+        for known, members in groups:
+            if known == rest:
+                if all(settings_of(each)[key] != settings[key] for each in members):
+                    members.append(condition)
+                break
+        else:
+            groups.append((rest, [condition]))
+    return [members for _, members in groups if len(members) > 1]
+
+
+def _pairs(tally: Tally) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any], Reason]]:
+    """Which conditions are compared, each two once."""
+    seen: set[frozenset[str]] = set()
+    for one, other, reason in _all_pairs(tally.conditions):
+        both = frozenset((one["name"], other["name"]))
+        if len(both) == 2 and both not in seen:
+            seen.add(both)
+            yield one, other, reason
+
+
+def _all_pairs(
+    conditions: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any], Reason]]:
+    reasons: tuple[Reason, ...] = ("noise", "selection")
+    for reason in reasons:
+        for group in same_but_for(reason, conditions):
+            for later in range(1, len(group)):
+                for earlier in range(later):
+                    yield group[later], group[earlier], reason
+    names = {condition["name"]: condition for condition in conditions}
+    for condition in conditions:
+        if condition.get("baseline") in names:
+            yield condition, names[condition["baseline"]], "baseline"
+
+
+def _comparison(
+    one: Mapping[str, Any],
+    other: Mapping[str, Any],
+    reason: Reason,
+    samples: Samples,
+    n_comparisons: int,
+    p: float,
+    p_holm: float,
+    best_p: float,
+) -> Comparison:
+    n, m, paired = len(samples.one), len(samples.other), samples.paired
+    share = a12(samples.one, samples.other)
+    interval = bca_interval(share_above, samples.one, samples.other, paired=paired)
+    spread = samples.spread()
+    # Bonferroni's level is the strictest that Holm can ask for
+    alpha = ALPHA / n_comparisons
+    effect = detectable_effect(min(n, m), paired=paired, alpha=alpha)
+    difference = float(samples.one.mean() - samples.other.mean())
+    has_spread = math.isfinite(spread) and spread > 0
+    return Comparison(
+        one=one["name"],
+        other=other["name"],
+        reason=reason,
+        label="/".join(dict.fromkeys((label_of(one), label_of(other)))),
+        n=n,
+        n_other=m,
+        paired=paired,
+        difference=difference,
+        difference_interval=bca_interval(difference_of_means, samples.one, samples.other, paired=paired),
+        a12=share,
+        a12_interval=interval
+        if interval or samples.smallest_p() >= ALPHA
+        else newcombe_interval(share, n, m),
+        p=p,
+        p_holm=p_holm,
+        best_p=best_p,
+        runs_for_a_claim=runs_for_a_claim(n_comparisons, paired=paired),
+        detectable=effect * spread if effect is not None and has_spread else None,
+        runs_for_difference=runs_needed(difference / spread, paired=paired, alpha=alpha)
+        if has_spread
+        else None,
+    )
+
+
+# --- on the page --------------------------------------------------------------------------------------------
+
+_REASONS: dict[Reason, str] = {
+    "noise": "Noise levels, with one selection",
+    "selection": "Selections, at one noise level",
+    "baseline": "Against the baseline",
+}
+
+
+def comparisons_content(comparisons: Sequence[Comparison]) -> dict[str, Any] | None:
+    """What the page shows of the comparisons; None where there are none."""
+    if not comparisons:
+        return None
+    return {
+        "groups": [
+            (_REASONS[reason], [_row(each) for each in comparisons if each.reason == reason])
+            for reason in _REASONS
+            if any(each.reason == reason for each in comparisons)
+        ],
+        "n_comparisons": len(comparisons),
+        "n_shown": sum(each.is_shown for each in comparisons),
+        "n_refused": sum(not each.can_claim for each in comparisons),
+        "labels": ", ".join(dict.fromkeys(each.label for each in comparisons)),
+        "test": _test_in_words(comparisons),
+        "notes": _notes(comparisons),
+    }
+
+
+def _row(comparison: Comparison) -> dict[str, str]:
+    return {
+        "one": comparison.one,
+        "other": comparison.other,
+        "n": f"{comparison.n:,}"
+        if comparison.n == comparison.n_other
+        else f"{comparison.n:,}; {comparison.n_other:,}",
+        "difference": signed(comparison.difference),
+        "difference_interval": span(comparison.difference_interval, signs=True),
+        "a12": f"{comparison.a12:.2f}",
+        "a12_interval": span(comparison.a12_interval, digits=2)
+        + (" *" if comparison.a12_interval and comparison.a12_interval.method == "Newcombe" else ""),
+        "p": p_in_words(comparison.p),
+        "p_holm": p_in_words(comparison.p_holm),
+        "verdict": comparison.verdict,
+        "strong": "strong" if comparison.is_shown else "",
+    }
+
+
+def _test_in_words(comparisons: Sequence[Comparison]) -> str:
+    paired = [each.paired for each in comparisons]
+    flips = (
+        "signs of the differences are flipped run by run, since both conditions draw the same random numbers "
+        "in runs of the same number, and all 2ⁿ patterns are counted"
+    )
+    labels = (
+        "runs are relabeled, every way up to ten runs against ten, else 9,999 ways drawn with a fixed seed"
+    )
+    if all(paired):
+        return flips
+    return f"where conditions are paired, {flips}; where not, {labels}" if any(paired) else labels
+
+
+def _notes(comparisons: Sequence[Comparison]) -> list[str]:
+    notes = []
+    sizes = {(each.n, each.n_other, each.paired) for each in comparisons if not each.can_claim}
+    for n, m, paired in sorted(sizes)[:3]:
+        floor = smallest_p(n) if paired else smallest_p(n, m)
+        runs = f"{n:,} pairs" if paired else f"{n:,} runs against {m:,}"
+        notes.append(
+            f"The smallest p that {runs} can give is {p_in_words(floor)}, and corrected for {len(comparisons)} "
+            f"comparisons {p_in_words(min(1.0, floor * len(comparisons)))}: whatever comes out, it is no "
+            f"evidence at the level of {ALPHA}."
+        )
+    if any(each.difference_interval is None for each in comparisons):
+        notes.append(
+            f"A dash: no interval. Below n = {BCA_SMALLEST_N} resamples of so few runs vary too little, and "
+            "where all resamples are alike there is nothing to go by."
+        )
+    if any(each.a12_interval and each.a12_interval.method == "Newcombe" for each in comparisons):
+        notes.append("Marked *: Newcombe’s interval, which needs no resampling.")
+    return notes
+
+
+INTERVAL_NAME = f"{100 * CONFIDENCE:.0f} % BCa interval from {RESAMPLES:,} resamples"
+
+
+def signed(value: float, digits: int = 3) -> str:
+    """A number with its sign, and a true minus."""
+    text = f"{value:+.{digits}f}".replace("-", "−")
+    return text.replace("−", "±").replace("+", "±") if float(f"{value:.{digits}f}") == 0 else text
+
+
+def span(interval: Interval | None, digits: int = 3, *, signs: bool = False) -> str:
+    """Bounds in words; a dash where there are none."""
+    if interval is None:
+        return "–"
+    if signs:
+        return f"{signed(interval.low, digits)} to {signed(interval.high, digits)}"
+    return f"{interval.low:.{digits}f}–{interval.high:.{digits}f}"
+
+
+def p_in_words(p: float) -> str:
+    """A p value as it is printed: three decimals, or a power of ten; below 10⁻⁹ exactness is of no use."""
+    if p >= 0.001:
+        return f"{p:.3f}" if p < 0.9995 else "1"
+    if p < 1e-9:
+        return "< 10⁻⁹"
+    digits, exponent = f"{p:.0e}".split("e")
+    return f"{digits}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

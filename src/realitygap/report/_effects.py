@@ -1,0 +1,319 @@
+"""How large a difference is, with an interval, and how many runs it takes to see one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import optimize, stats
+
+from realitygap.report._permutation import ALPHA, SEED
+from realitygap.report._statistics import CONFIDENCE
+
+Values = npt.NDArray[np.float64]
+Statistic = Callable[[Values, Values, Values], Values]
+"""From values (u,), and how often each occurs in b samples of one (b, u) and of the other (b, u), to (b,)."""
+
+BCA_SMALLEST_N = 10
+"""Fewer runs give no bootstrap interval: resamples of so few values vary too little, and it would be too short."""
+
+RESAMPLES = 1_999
+POWER = 0.8
+"""How often a real difference shall be found, where it is said how many runs that takes."""
+
+USUAL_EFFECTS = {"small": 0.56, "medium": 0.64, "large": 0.71}
+"""A12 of what is called a small, medium and large effect (Vargha & Delaney 2000, Table 1)."""
+
+NORMAL_MEAN_DISTANCE = math.sqrt(2 / math.pi)
+"""Mean distance from the median of a normal distribution [standard deviations]."""
+
+MOST_RUNS = 1_000_000
+_BLOCK = 4_000_000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Bounds of an effect.
+
+    Attributes:
+        low: lower bound, in the unit of the effect.
+        high: upper bound.
+        method: `BCa`, a bootstrap; `Newcombe`, by formula.
+    """
+
+    low: float
+    high: float
+    method: Literal["BCa", "Newcombe"]
+
+
+def a12(one: Values, other: Values) -> float:
+    """How likely a run of one condition is above a run of the other; ties count half [0..1].
+
+    Args:
+        one: (n,) and
+        other: (m,) values in any order, n, m >= 1.
+
+    Source: Vargha & Delaney (2000), Journal of Educational and Behavioral Statistics 25(2).
+    """
+    if len(one) == 0 or len(other) == 0:
+        raise ValueError("one and other need at least one value each.")
+    ordered = np.sort(other)
+    below = np.searchsorted(ordered, one, "left") + np.searchsorted(ordered, one, "right")
+    return float(below.sum() / (2 * len(one) * len(other)))
+
+
+def difference_of_means(values: Values, one: Values, other: Values) -> Values:
+    """(b,) mean of one less mean of the other."""
+    return np.asarray(one @ values / one.sum(axis=1) - other @ values / other.sum(axis=1))
+
+
+def share_above(values: Values, one: Values, other: Values) -> Values:
+    """(b,) A12 of samples given as counts over values in ascending order."""
+    up_to = np.cumsum(other, axis=1) - other / 2
+    return np.asarray((one * up_to).sum(axis=1) / (one.sum(axis=1) * other.sum(axis=1)))
+
+
+def ratio_of_spreads(values: Values, one: Values, other: Values) -> Values:
+    """(b,) standard deviation of one over that of the other; NaN where the other has none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = _deviations(values, one) / _deviations(values, other)
+    return np.where(np.isfinite(ratio), ratio, np.nan)
+
+
+def robust_spread(values: Values) -> float:
+    """Mean distance from the median, in standard deviations of a normal distribution with as much.
+
+    Source: the scale of Brown & Forsythe (1974), Journal of the American Statistical Association 69(346).
+    """
+    return float(np.abs(values - np.median(values)).mean()) / NORMAL_MEAN_DISTANCE
+
+
+def ratio_of_robust_spreads(values: Values, one: Values, other: Values) -> Values:
+    """(b,) robust spread of one over that of the other; NaN where the other has none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = _distances(values, one) / _distances(values, other)
+    return np.where(np.isfinite(ratio), ratio, np.nan)
+
+
+def _distances(values: Values, counts: Values) -> Values:
+    """(b,) mean distance from the median; between two middle values every point gives the same."""
+    n = counts.sum(axis=1)
+    median = values[(np.cumsum(counts, axis=1) >= n[:, None] / 2).argmax(axis=1)]
+    return np.asarray((counts * np.abs(values - median[:, None])).sum(axis=1) / n)
+
+
+def _deviations(values: Values, counts: Values) -> Values:
+    n = counts.sum(axis=1)
+    mean = counts @ values / n
+    squares = counts @ (values * values) - n * mean * mean
+    # what rounding leaves of a sample without spread
+    squares = np.where(squares > 1e-12 * n, squares, 0.0)
+    return np.asarray(np.sqrt(squares / np.maximum(n - 1, 1)))
+
+
+def bca_interval(
+    statistic: Statistic,
+    one: Values,
+    other: Values,
+    *,
+    paired: bool,
+    confidence: float = CONFIDENCE,
+    n_resamples: int = RESAMPLES,
+) -> Interval | None:
+    """The bootstrap interval of an effect, corrected for bias and skewness.
+
+    Args:
+        statistic: of two samples, given as counts over their values.
+        one: (n,) and
+        other: (m,) values; in pairs where `paired`, which are then resampled together.
+        paired: whether value k of the two belongs together.
+        confidence: between 0 and 1.
+        n_resamples: drawn with a fixed seed.
+
+    Returns:
+        The interval; None below 10 runs, or where all resamples give the same.
+
+    Raises:
+        ValueError: `paired` with samples of different size.
+
+    Source: Efron (1987), Journal of the American Statistical Association 82(397); two samples as
+    `scipy.stats.bootstrap`, which draws the same resamples. Differs: they are kept as counts, and what
+    is equal but for rounding counts as a tie.
+    """
+    if paired and len(one) != len(other):
+        raise ValueError(f"Pairs need samples of one size, these have {len(one)} and {len(other)} values.")
+    if min(len(one), len(other)) < BCA_SMALLEST_N:
+        return None
+    values, codes = np.unique(np.concatenate([one, other]), return_inverse=True)
+    codes_one, codes_other = codes[: len(one)], codes[len(one) :]
+    counts = [np.bincount(part, minlength=len(values)).astype(float) for part in (codes_one, codes_other)]
+    observed = float(statistic(values, counts[0][None], counts[1][None])[0])
+    resampled = _resample(statistic, values, codes_one, codes_other, paired, n_resamples)
+    if not np.isfinite(resampled).all() or np.ptp(resampled) == 0:
+        return None
+    ties = 1e-12 * max(1.0, abs(observed))
+    below = ((resampled < observed - ties).sum() + (resampled <= observed + ties).sum()) / (2 * n_resamples)
+    bias = stats.norm.ppf(below)
+    skewness = _acceleration(statistic, values, codes_one, codes_other, counts, paired)
+    tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
+    shifted = bias + stats.norm.ppf(tails)
+    bounds = np.quantile(resampled, stats.norm.cdf(bias + shifted / (1 - skewness * shifted)))
+    if not np.isfinite(bounds).all():
+        return None
+    return Interval(float(bounds[0]), float(bounds[1]), "BCa")
+
+
+def mean_interval(values: Values) -> Interval | None:
+    """The BCa interval of a mean; None below 10 values or where all are equal."""
+    return bca_interval(_first_mean, values, values, paired=True)
+
+
+def _first_mean(values: Values, one: Values, _: Values) -> Values:
+    return np.asarray(one @ values / one.sum(axis=1))
+
+
+def _counts(codes: npt.NDArray[np.int64], n_values: int) -> Values:
+    """(b, u) how often each value occurs in each row of (b, n) codes."""
+    b = len(codes)
+    places = codes + n_values * np.arange(b)[:, None]
+    return np.bincount(places.ravel(), minlength=b * n_values).reshape(b, n_values).astype(float)
+
+
+def _draw(rng: np.random.Generator, codes: npt.NDArray[np.int64], b: int) -> npt.NDArray[np.int64]:
+    return np.asarray(rng.integers(0, len(codes), (b, len(codes))))
+
+
+def _resample(
+    statistic: Statistic,
+    values: Values,
+    one: npt.NDArray[np.int64],
+    other: npt.NDArray[np.int64],
+    paired: bool,
+    n_resamples: int,
+) -> Values:
+    rng = np.random.default_rng(SEED)
+    block = max(1, _BLOCK // max(len(one), len(other), len(values)))
+    found = []
+    for first in range(0, n_resamples, block):
+        b = min(block, n_resamples - first)
+        rows = _draw(rng, one, b)
+        others = rows if paired else _draw(rng, other, b)
+        found.append(statistic(values, _counts(one[rows], len(values)), _counts(other[others], len(values))))
+    return np.concatenate(found)
+
+
+def _acceleration(
+    statistic: Statistic,
+    values: Values,
+    one: npt.NDArray[np.int64],
+    other: npt.NDArray[np.int64],
+    counts: list[Values],
+    paired: bool,
+) -> float:
+    """Efron's acceleration, from leaving out one value (or pair) at a time."""
+    drops_one = counts[0] - np.eye(len(values))
+    drops_other = counts[1] - np.eye(len(values))
+    if paired:
+        pairs, inverse = np.unique(np.stack([one, other]), axis=1, return_inverse=True)
+        left_out = statistic(values, drops_one[pairs[0]], drops_other[pairs[1]])[inverse.ravel()]
+        influences = [(len(one) - 1) * (left_out.mean() - left_out)]
+    else:
+        first = statistic(values, drops_one[one], np.repeat(counts[1][None], len(one), 0))
+        second = statistic(values, np.repeat(counts[0][None], len(other), 0), drops_other[other])
+        influences = [(len(part) - 1) * (part.mean() - part) for part in (first, second)]
+    cubes = sum(float((part**3).sum()) / len(part) ** 3 for part in influences)
+    squares = sum(float((part**2).sum()) / len(part) ** 2 for part in influences)
+    return cubes / (6 * squares**1.5) if squares > 0 else 0.0
+
+
+def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDENCE) -> Interval:
+    """An interval of A12 for few runs: no resampling, and it has a width also where all runs are above.
+
+    Args:
+        share: A12 as observed [0..1].
+        n: runs of one condition.
+        m: of the other.
+        confidence: between 0 and 1.
+
+    Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
+    """
+    z = stats.norm.ppf((1 + confidence) / 2)
+    others = (n + m) / 2 - 1
+
+    def excess(at: float) -> float:
+        variance = at * (1 - at) * (1 + others * ((1 - at) / (2 - at) + at / (1 + at))) / (n * m)
+        return float((at - share) ** 2 - z * z * variance)
+
+    # at 0 and 1 the share itself is a root too, which is not the one that is meant
+    low = 0.0 if share <= 0 else optimize.brentq(excess, 0.0, min(share, 1 - 1e-9))
+    high = 1.0 if share >= 1 else optimize.brentq(excess, max(share, 1e-9), 1.0)
+    return Interval(float(low), float(high), "Newcombe")
+
+
+def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> int | None:
+    """Runs a condition with which a t test finds a difference of `effect` standard deviations so often.
+
+    Args:
+        effect: difference of means over the standard deviation of a run (`paired`: of a difference).
+        paired: whether runs come in pairs.
+        alpha: two-sided level.
+        power: how often it is found.
+
+    Returns:
+        The number, at least 2; None above a million.
+
+    Source: Cohen (1988), chapter 2, by the noncentral t distribution. It assumes normal values; the
+    permutation tests here need about as many.
+    """
+    low, high = 1, 2
+    while _power(effect, high, paired, alpha) < power:
+        low, high = high, 2 * high
+        if low > MOST_RUNS:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _power(effect, middle, paired, alpha) < power:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> float | None:
+    """The smallest difference [standard deviations] that n runs a condition find so often; None below 2.
+
+    Source: as `runs_needed`.
+    """
+    if n < 2:
+        return None
+    high = 1.0
+    while _power(high, n, paired, alpha) < power:
+        high *= 2
+    return float(optimize.brentq(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high))
+
+
+def _power(effect: float, n: int, paired: bool, alpha: float) -> float:
+    freedom = n - 1 if paired else 2 * n - 2
+    center = abs(effect) * math.sqrt(n if paired else n / 2)
+    critical = float(stats.t.ppf(1 - alpha / 2, freedom))
+    found = float(stats.nct.sf(critical, freedom, center))
+    if not math.isfinite(found):
+        # so far out the noncentral distribution cannot be computed, and a normal one will do
+        found = float(stats.norm.sf(critical - center))
+    # a difference found with the wrong sign; beyond 3 it is less than one in 10 million
+    wrong = float(stats.nct.cdf(-critical, freedom, center)) if center < 3 else 0.0
+    return found + (wrong if math.isfinite(wrong) else 0.0)
+
+
+def effect_of_a12(share: float) -> float:
+    """The difference of means [standard deviations] of two normal conditions with this A12."""
+    return float(math.sqrt(2) * stats.norm.ppf(share))
+
+
+def a12_of_effect(effect: float) -> float:
+    """A12 of two normal conditions whose means differ by so many standard deviations."""
+    return float(stats.norm.cdf(effect / math.sqrt(2)))

@@ -1,0 +1,252 @@
+"""The page's figures and tables as files of their own."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any, Protocol
+
+import polars as pl
+
+from realitygap.errors import RecordError
+from realitygap.report._drawing import Drawing
+from realitygap.report._formats import drawing_bytes, write_whole
+from realitygap.report._species_figure import SpeciesCounts
+from realitygap.report._structures import structures_frame
+from realitygap.report._tally import Tally
+
+_NOTES = "figures.txt"
+"""What is in each file."""
+
+
+class PlacedFigure(Protocol):
+    """A figure with its title, as on the page."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def drawing(self) -> Drawing: ...
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written.
+
+    Attributes:
+        folder: where.
+        figures: names without ending; each is there as SVG and as PDF.
+        tables: names of the CSV files that hold the page's tables as shown.
+        data: names of those that hold numbers behind figures, in full precision.
+    """
+
+    folder: Path
+    figures: tuple[str, ...]
+    tables: tuple[str, ...]
+    data: tuple[str, ...]
+
+
+def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: str) -> Exported:
+    """Write every figure as SVG and PDF and every table as CSV, each file whole or not at all.
+
+    Args:
+        folder: where; made when it is not there. Files of other names in it stay.
+        tally: the study.
+        content: what the page shows.
+        page: as HTML; its tables are written as they are shown.
+
+    Raises:
+        RecordError: the folder or a file cannot be written.
+    """
+    if folder.resolve() == (tally.folder.path / "trials").resolve():
+        raise RecordError(f"{folder} holds the rows of the study and nothing else. Name another folder.")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordError(
+            f"Could not make the folder {folder}: {error.strerror or error}. Name another one."
+        ) from error
+    notes = []
+    figures = []
+    for figure in sorted(_figures(list(content.values())), key=_number):
+        name = _slug(figure.title)
+        for ending in (".svg", ".pdf"):
+            write_whole(folder / (name + ending), drawing_bytes(figure.drawing, ending, figure.title))
+        figures.append(name)
+        notes.append(f"{name}.svg, {name}.pdf\n    {figure.title}. {figure.drawing.caption}")
+    tables = []
+    for name, caption, rows in tables_of(page):
+        write_whole(folder / f"{name}.csv", _csv(rows))
+        tables.append(f"{name}.csv")
+        notes.append(f"{name}.csv\n    {caption}")
+    data = []
+    for name, caption, frame in _frames(tally, content):
+        write_whole(folder / f"{name}.csv", frame.write_csv().encode("utf-8"))
+        data.append(f"{name}.csv")
+        notes.append(f"{name}.csv\n    {caption}")
+    about = f"Figures and tables of {content['title']}, digest {content['digest']}, realitygap {content['version']}."
+    text = "\n\n".join([about, *notes]) + "\n"
+    write_whole(folder / _NOTES, text.encode("utf-8", "replace"))
+    return Exported(folder, tuple(figures), tuple(tables), tuple(data))
+
+
+def _figures(values: Any) -> Iterator[PlacedFigure]:
+    """All figures in the page's content, in its order."""
+    for value in values:
+        if isinstance(getattr(value, "drawing", None), Drawing):
+            yield value
+        elif isinstance(value, list):
+            yield from _figures(value)
+        elif isinstance(value, Mapping):
+            yield from _figures(list(value.values()))
+
+
+def _number(figure: PlacedFigure) -> tuple[int, str]:
+    digits = re.search(r"\d+", figure.title)
+    return (int(digits[0]) if digits else 1000, figure.title)
+
+
+def _frames(tally: Tally, content: Mapping[str, Any]) -> Iterator[tuple[str, str, pl.DataFrame]]:
+    yield (
+        "data-coverage-by-generation",
+        "Behind Figure 4: the highest coverage of each generation of each run, along the line and by ends of steps.",
+        tally.best,
+    )
+    yield "data-coverage-by-run", "Behind Table 2: the highest coverage of each run.", tally.runs
+    gallery = content["gallery"]
+    structures = structures_frame(gallery["structure_groups"])
+    yield "data-structures", "All structures of the networks in the last generations.", structures
+    species: SpeciesCounts = gallery["species_counts"]
+    yield (
+        "data-species",
+        "Behind Figure 11: the number of species in each generation of each run.",
+        species.counts,
+    )
+
+
+def _slug(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "figure"
+
+
+def _csv(rows: list[list[str]]) -> bytes:
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue().encode("utf-8", "replace")
+
+
+# --- tables of the page -------------------------------------------------------------------------------------
+
+
+def tables_of(page: str) -> list[tuple[str, str, list[list[str]]]]:
+    """Name, caption and rows of each table of a page, as shown; one row of headings, cells over many repeated."""
+    reader = _TableReader()
+    reader.feed(page)
+    reader.close()
+    found = []
+    for table in reader.tables:
+        if not table.caption or table.n_head == 0:
+            continue  # filled in by a script, and empty without
+        number = re.match(r"Table (\d+\w*)\.", table.caption)
+        name = f"table-{number[1]}" if number else _slug(table.id.removeprefix("caption-") or "table")
+        name = {"common": "settings", "differ": "settings-by-condition"}.get(name, name)
+        found.append((name, table.caption, table.rows()))
+    return found
+
+
+class _Table:
+    """A table while it is read."""
+
+    def __init__(self) -> None:
+        self.id = ""
+        self.caption = ""
+        self.cells: dict[tuple[int, int], str] = {}
+        self.n_head = 0
+        self.row = -1
+        self.column = 0
+
+    def place(self, text: str, across: int, down: int) -> None:
+        """Put a cell into the next free places of the row, as often as it spans."""
+        while (self.row, self.column) in self.cells:
+            self.column += 1
+        for row in range(self.row, self.row + down):
+            for column in range(self.column, self.column + across):
+                self.cells[row, column] = text
+        self.column += across
+
+    def rows(self) -> list[list[str]]:
+        """The rows, the first one holding the headings of each column from above to below."""
+        n_columns = max((column for _, column in self.cells), default=-1) + 1
+        lines = [
+            [self.cells.get((row, column), "") for column in range(n_columns)] for row in range(self.row + 1)
+        ]
+        head = [
+            ": ".join(dict.fromkeys(filter(None, parts))) for parts in zip(*lines[: self.n_head], strict=True)
+        ]
+        # several columns of one name, such as interval, belong to the one before that has a name of its own
+        own = [text for text in head if head.count(text) == 1]
+        named, last = [], ""
+        for text in head:
+            last = text if text in own else last
+            named.append(text if text == last else f"{last}: {text}")
+        # a row that is one cell across the table is a heading within it
+        body = [
+            [line[0]] + [""] * (n_columns - 1) if n_columns > 1 and len(set(line)) == 1 else line
+            for line in lines[self.n_head :]
+        ]
+        return [named, *body]
+
+
+class _TableReader(HTMLParser):
+    """The tables of a page whose tags close in order."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tables: list[_Table] = []
+        self._open: _Table | None = None
+        self._text: list[str] | None = None
+        self._span = (1, 1)
+        self._in_head = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if tag == "table":
+            self._open = _Table()
+            self.tables.append(self._open)
+        if self._open is None:
+            return
+        if tag == "thead":
+            self._in_head = True
+        elif tag == "tr":
+            self._open.row += 1
+            self._open.column = 0
+            self._open.n_head += self._in_head
+        elif tag in ("td", "th", "caption"):
+            self._text = []
+            self._span = (int(values.get("colspan") or 1), int(values.get("rowspan") or 1))
+            if tag == "caption":
+                self._open.id = values.get("id") or ""
+
+    def handle_endtag(self, tag: str) -> None:
+        table = self._open
+        if table is None:
+            return
+        if tag == "table":
+            self._open = None
+        elif tag == "thead":
+            self._in_head = False
+        elif tag in ("td", "th", "caption") and self._text is not None:
+            text = " ".join("".join(self._text).split())
+            self._text = None
+            if tag == "caption":
+                table.caption = text
+            else:
+                # a program reads the plain minus, and nothing where nothing is
+                table.place("" if text == "–" else text.replace("−", "-"), *self._span)
+
+    def handle_data(self, data: str) -> None:
+        if self._text is not None:
+            self._text.append(data)

@@ -1,0 +1,160 @@
+"""Drawings as files: SVG, PDF and PNG, each written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import os
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+from realitygap.drawing import Ink, Picture
+from realitygap.errors import RecordError, did_you_mean
+from realitygap.report._drawing import Drawing, house_style, to_svg
+from realitygap.report._shapes_drawing import figure_of
+
+ENDINGS = (".gif", ".pdf", ".png", ".svg")
+"""What a picture's file name may end in; `.gif` only for a trial, which moves."""
+
+_DOTS = 200
+"""Of a PNG, per inch."""
+
+_LETTERS = 16.5
+"""Of a caption, per inch, at most."""
+
+_PICTURE_WIDTH = 6.4
+"""Of an arena, a robot or a network by itself [in]."""
+
+
+def check_ending(path: Path, endings: tuple[str, ...] = ENDINGS) -> str:
+    """The ending of a picture's file, in small letters.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    ending = path.suffix.lower()
+    if ending not in endings:
+        hint = (
+            "only one trial can move: give a folder of results, without network or species"
+            if ending == ".gif"
+            else did_you_mean(ending, endings)
+        )
+        raise ValueError(
+            f"{path} ends in {ending or 'nothing'}, expected {', '.join(endings[:-1])} or {endings[-1]}. "
+            + hint[:1].upper()
+            + hint[1:]
+        )
+    return ending
+
+
+def save_drawing(drawing: Drawing, path: str | Path, *, title: str = "realitygap") -> Path:
+    """Write a figure to a file; one that is there gives way once the new one is complete.
+
+    Args:
+        drawing: from one of the `draw_...` functions.
+        path: ends in .svg, .pdf or .png.
+        title: of the document.
+
+    Returns:
+        The path.
+
+    Raises:
+        RecordError: the file cannot be written.
+        ValueError: another ending.
+    """
+    path = Path(path)
+    write_whole(path, drawing_bytes(drawing, check_ending(path, (".pdf", ".png", ".svg")), title))
+    return path
+
+
+def save_picture(picture: Picture, path: str | Path) -> Path:
+    """Write an arena's, a robot's or a network's picture to a file; see `save_drawing`."""
+    path = Path(path)
+    ending = check_ending(path, (".pdf", ".png", ".svg"))
+    if ending == ".svg":
+        write_whole(path, picture.to_svg().encode("utf-8"))
+        return path
+    with house_style():
+        figure = figure_of(picture, _PICTURE_WIDTH)
+        drawing = Drawing("", "", picture.description, figure)
+    write_whole(path, drawing_bytes(drawing, ending, picture.title))
+    return path
+
+
+def captioned(drawing: Drawing, name: str) -> Drawing:
+    """The drawing with its caption as text below, for a file that stands alone; ids in it begin with `name`.
+
+    Everything in the figure must belong to axes; its figure is changed.
+    """
+    figure = drawing.figure
+    if figure is None:
+        raise ValueError("The drawing was made without its figure, so that nothing can be written below it.")
+    width, height = figure.get_size_inches()
+    lines = textwrap.wrap(drawing.caption, int(width * _LETTERS))
+    room = 0.14 + 0.155 * len(lines)
+    figure.set_size_inches(width, height + room)
+    for axes in figure.axes:
+        box = axes.get_position()
+        scale = height / (height + room)
+        axes.set_position((box.x0, 1 - (1 - box.y0) * scale, box.width, box.height * scale))
+    with house_style():
+        for k, line in enumerate(lines):
+            y = (room - 0.1 - 0.155 * k) / (height + room)
+            figure.text(0.05 / width, y, line, fontsize=7.5, color=Ink.MUTED, va="top")
+        return replace(drawing, svg=to_svg(figure, name, drawing.alt))
+
+
+def drawing_bytes(drawing: Drawing, ending: str, title: str) -> bytes:
+    """A figure in the format of a file's ending; the same figure gives the same bytes."""
+    if ending == ".svg":
+        return standalone_svg(drawing, title).encode("utf-8")
+    if drawing.figure is None:
+        raise ValueError("The drawing was made without its figure, so that it has no other form than SVG.")
+    buffer = io.BytesIO()
+    with house_style():
+        if ending == ".pdf":
+            about = {"Title": title, "Subject": drawing.alt, "Creator": "realitygap", "CreationDate": None}
+            drawing.figure.savefig(buffer, format="pdf", metadata=about, facecolor=Ink.GROUND)
+        else:
+            drawing.figure.savefig(
+                buffer,
+                format="png",
+                dpi=_DOTS,
+                metadata={"Title": title, "Description": drawing.alt, "Software": "realitygap"},
+                facecolor=Ink.GROUND,
+            )
+    return buffer.getvalue()
+
+
+def standalone_svg(drawing: Drawing, title: str) -> str:
+    """A figure as a document of its own: with title, description, and a ground to stand on."""
+    start, rest = drawing.svg.split(">", 1)
+    about = f"<title>{_text(title)}</title><desc>{_text(drawing.alt)}</desc>"
+    ground = f'<rect width="100%" height="100%" fill="{Ink.GROUND}" />'
+    return f"{start}>{about}{ground}{rest}"
+
+
+def _text(text: str) -> str:
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    return html.escape(printable, quote=False)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file beside its place and rename it into place.
+
+    Raises:
+        RecordError: it cannot be written; a file that was there is as it was.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        temporary.write_bytes(data)
+        temporary.replace(path)
+    except OSError as error:
+        raise RecordError(
+            f"Could not write {path}: {error.strerror or error}. Name another file or folder."
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)

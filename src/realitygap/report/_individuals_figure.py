@@ -1,0 +1,461 @@
+"""Figures 5 and 8: all individuals of each generation of one run, and Figure 9: the better ones."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.drawing import Ink
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._path_figure import (
+    TracedPath,
+    arena_extent,
+    body_outline,
+    draw_arena,
+    draw_path,
+    draw_path_legend,
+    no_such_run,
+    trace_paths,
+    typical_replicate,
+)
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.runs import Condition
+from realitygap.world import Arena, Body
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_PENS: tuple[tuple[str, tuple[float, ...]], ...] = (
+    (Ink.PEN0, ()),
+    (Ink.PEN1, (6, 1.5)),
+    (Ink.PEN2, (1.3, 1.5)),
+    (Ink.PEN3, (5, 1.5, 1.3, 1.5)),
+    (Ink.PEN4, (3, 1.6)),
+    (Ink.PEN5, (7, 1.5, 1.3, 1.5, 1.3, 1.5)),
+    (Ink.PEN6, (2, 1)),
+    (Ink.PEN7, (9, 2.5)),
+)
+"""Color and dashes [pt] of eight pens; a ninth individual takes the first pen again."""
+
+_MOST_PANELS = 11
+"""Generations shown at most, evenly spread; with the legend they fill rows of two and of three."""
+
+_MOST_PATHS = 16
+"""Individuals drawn in a panel at most; more would hide each other."""
+
+_N_BETTER = 5
+"""Individuals in Figure 9."""
+
+
+def draw_individuals(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    width: float = WIDE,
+) -> Drawing:
+    """All individuals of each generation of one run, a pen each, as the paper's Figures 5 and 8.
+
+    Args:
+        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        condition: of which; the first one when not given.
+        replicate: which run; when not given the typical one, as in `draw_paths`.
+        width: of the figure [in]; it decides how many panels stand side by side.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition or run.
+    """
+    tally = read_tally(folder)
+    name = condition or tally.runs["condition"][0]
+    (drawing,) = draw_tally_individuals(tally, name, replicate, widths=[width])
+    return drawing
+
+
+def draw_tally_individuals(
+    tally: Tally,
+    condition: str,
+    replicate: int | None = None,
+    *,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "individuals",
+) -> list[Drawing]:
+    """As `draw_individuals`, of what was read already, in several widths; ids begin with `name`.
+
+    Raises:
+        ValueError: there is no such condition or run, or its settings are not those of this version.
+    """
+    described = tally.condition(condition)
+    resolved = Condition.from_settings(condition, dict(settings_of(described)))
+    typical = replicate is None
+    replicate = typical_replicate(tally, condition) if replicate is None else replicate
+    column = f"coverage_{tally.measure}"
+    rows = _rows_of(tally, condition, replicate)
+    n_generations, population = int(rows["generation"].n_unique()), int(rows["individual"].n_unique())
+    shown = np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS)).round().astype(int).tolist()
+    rows = rows.filter(pl.col("generation").is_in(shown), pl.col("individual") < _MOST_PATHS)
+    paths, problem = trace_paths(resolved, rows, column)
+    panels = [list(group) for _, group in itertools.groupby(paths, key=lambda path: path.generation)]
+    caption = _individuals_caption(
+        tally,
+        described,
+        replicate,
+        panels,
+        (n_generations, population),
+        _which(tally, condition, typical=typical),
+        problem,
+    )
+    alt = (
+        f"Paths of all individuals of each generation of run {replicate} of {condition}, in {len(panels)} panels. "
+        "Best coverage: "
+        + ", ".join(
+            f"generation {panel[0].generation} {max(path.coverage for path in panel):.3f}" for panel in panels
+        )
+        + "."
+    )
+    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            figure = _draw_generations(panels, arena, body, label, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
+
+
+def draw_better_individuals(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    width: float = WIDE,
+) -> Drawing:
+    """The individuals of highest coverage of one run, as the paper's Figure 9.
+
+    Args:
+        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        condition: of which; the first one when not given.
+        replicate: which run; when not given the typical one, as in `draw_paths`.
+        width: of the figure [in].
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition or run.
+    """
+    tally = read_tally(folder)
+    name = condition or tally.runs["condition"][0]
+    (drawing,) = draw_tally_better(tally, name, replicate, widths=[width])
+    return drawing
+
+
+def draw_tally_better(
+    tally: Tally,
+    condition: str,
+    replicate: int | None = None,
+    *,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "better",
+) -> list[Drawing]:
+    """As `draw_better_individuals`, of what was read already, in several widths.
+
+    Raises:
+        ValueError: there is no such condition or run, or its settings are not those of this version.
+    """
+    described = tally.condition(condition)
+    resolved = Condition.from_settings(condition, dict(settings_of(described)))
+    typical = replicate is None
+    replicate = typical_replicate(tally, condition) if replicate is None else replicate
+    column = f"coverage_{tally.measure}"
+    rows = _rows_of(tally, condition, replicate)
+    n_individuals = rows.height
+    best = (
+        rows.sort(column, descending=True, maintain_order=True)
+        .unique("cells", keep="first", maintain_order=True)
+        .head(_N_BETTER)
+    )
+    paths, problem = trace_paths(resolved, best, column)
+    caption = (
+        f"Condition {condition}, run {replicate}: the {len(paths)} individuals of highest coverage among all "
+        f"{n_individuals} of the run, best first, coverage counted {_counted(tally)}; of those that visit the same "
+        f"cells in the same order only the first is shown. {label_of(described)}, n = 1 run, no interval. "
+        f"{_which(tally, condition, typical=typical)} {_origin(problem)}"
+    )
+    alt = (
+        f"Paths of the {len(paths)} best individuals of run {replicate} of {condition}. Coverage: "
+        + ", ".join(
+            f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
+        )
+    )
+    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            figure, places = _panels(len(paths) + 1, arena, width)
+            for path, axes in zip(paths, places, strict=False):
+                draw_arena(axes, arena, *arena_extent(arena))
+                draw_path(axes, path, arena, body)
+                short = width < 6
+                _write_below(
+                    axes,
+                    f"gen {path.generation}, ind {path.individual}"
+                    if short
+                    else f"generation {path.generation}, individual {path.individual}",
+                    f"{path.coverage:.3f}"
+                    if short
+                    else f"{shorten(label, 12)}, coverage {path.coverage:.3f}",
+                )
+            draw_path_legend(places[-1], paths, small=width < 6)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt + "."), caption, alt + ".", figure))
+    return drawings
+
+
+def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:
+    rows = tally.folder.read(condition, [replicate])
+    if rows.is_empty():
+        raise ValueError(no_such_run(tally, condition, replicate))
+    return rows
+
+
+# --- drawing ------------------------------------------------------------------------------------------------
+
+
+def _panels(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
+    """A figure with room for n panels in rows of two or three, with a line of text below each."""
+    n_columns = 3 if width >= 6 else 2
+    x_range, y_range = arena_extent(arena)
+    gap, text_height = 0.2, 0.36
+    panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
+    panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
+    figure = new_figure(width, math.ceil(n / n_columns) * (panel_height + text_height))
+    places = []
+    for index in range(n):
+        row, column = divmod(index, n_columns)
+        x = 0.02 + column * (panel_width + gap)
+        places.append(
+            place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
+        )
+    return figure, places
+
+
+def _draw_generations(
+    panels: list[list[TracedPath]], arena: Arena, body: Body, label: str, width: float
+) -> Figure:
+    figure, places = _panels(len(panels) + 1, arena, width)
+    small = width < 6
+    for panel, axes in zip(panels, places, strict=False):
+        draw_arena(axes, arena, *arena_extent(arena))
+        _draw_pens(axes, panel, arena, body, small=small)
+        best = max(panel, key=lambda path: path.coverage)
+        _write_below(
+            axes,
+            f"generation {best.generation}",
+            f"best {best.coverage:.3f}"
+            if small
+            else f"{shorten(label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}",
+        )
+    n_pens = max((path.individual for panel in panels for path in panel), default=0) + 1
+    _draw_pen_legend(places[-1], n_pens, small=small)
+    return figure
+
+
+def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *, small: bool) -> None:
+    from matplotlib.patches import Rectangle
+
+    grid = arena.grid
+    for cell in sorted({cell for path in paths for cell in path.cells}):
+        row, column = divmod(cell, grid.columns)
+        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
+        axes.add_patch(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+    outline = body_outline(body, arena.start)
+    axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
+    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
+    drawn = [path for path in paths if path.poses is not None]
+    for path in drawn:
+        if path.poses is not None:
+            axes.plot(path.poses[:, 0], path.poses[:, 1], zorder=5, **_pen(path.individual, small=small))
+    if drawn:
+        _number_ends(axes, drawn, arena, small=small)
+
+
+def _pen(individual: int, *, small: bool) -> dict[str, Any]:
+    """How a pen draws: the first ones broad, so that they show beside those that lie over them."""
+    pen = individual % len(_PENS)
+    color, dash = _PENS[pen]
+    width = (2.7 - 0.25 * pen) * (0.75 if small else 1.0)
+    scaled = tuple(part * (0.7 if small else 0.9) * 1.6 / width for part in dash)
+    return {
+        "color": color,
+        "linewidth": width,
+        "linestyle": (0, scaled) if scaled else "solid",
+        "dash_capstyle": "butt",
+        "solid_joinstyle": "round",
+    }
+
+
+def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bool) -> None:
+    """The individual's number at the end of each path; those that would overlap are moved apart."""
+    radius = 3.5 if small else 4.6
+    (left, right), (bottom, top) = arena_extent(arena)
+    points = axes.bbox.width * 72 / axes.figure.dpi / (right - left)
+    ends = np.array([path.poses[-1, :2] for path in paths if path.poses is not None])
+    places = _moved_apart(ends, 2 * radius / points + 0.4 / points)
+    places[:, 0] = places[:, 0].clip(left + radius / points, right - radius / points)
+    places[:, 1] = places[:, 1].clip(bottom + radius / points, top - radius / points)
+    for path, end, place in zip(paths, ends, places, strict=True):
+        color = _PENS[path.individual % len(_PENS)][0]
+        if math.dist(end, place) * points > radius:
+            axes.plot([end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
+            axes.plot([end[0]], [end[1]], "o", color=color, markersize=2.0, zorder=8)
+        axes.plot(
+            [place[0]],
+            [place[1]],
+            "o",
+            color=color,
+            markerfacecolor=Ink.GROUND,
+            markersize=2 * radius - 0.8,
+            markeredgewidth=0.9,
+            zorder=9,
+        )
+        axes.annotate(
+            str(path.individual),
+            place,
+            (0, -0.15),
+            textcoords="offset points",
+            ha="center",
+            va="center_baseline",
+            fontsize=5.6 if small else 6.8,
+            weight="bold",
+            color=color,
+            zorder=10,
+        )
+
+
+def _moved_apart(ends: npt.NDArray[np.float64], least: float) -> npt.NDArray[np.float64]:
+    """(n, 2) places near the ends, in their unit, no two much nearer than `least`."""
+    places = ends.copy()
+    angles = 2.4 * np.arange(len(ends))  # the golden angle: where many ends are one, they leave all around
+    places += 0.02 * least * np.column_stack([np.cos(angles), np.sin(angles)])
+    for _ in range(120):
+        apart = places[:, None] - places[None]
+        distance = np.hypot(apart[..., 0], apart[..., 1])
+        np.fill_diagonal(distance, np.inf)
+        push = (least - distance).clip(min=0.0) / 2 / distance.clip(min=1e-9)
+        if not push.any():
+            break
+        places += (push[..., None] * apart).sum(axis=1) * 0.6
+    return places
+
+
+def _write_below(axes: Axes, left: str, right: str) -> None:
+    for x, text, align, weight, color in (
+        (0, left, "left", "bold", Ink.TEXT),
+        (1, right, "right", "normal", Ink.MUTED),
+    ):
+        axes.annotate(
+            text,
+            (x, 0),
+            (1 - 2 * x, -4),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="top",
+            fontsize=8.0,
+            weight=weight,
+            color=color,
+        )
+
+
+def _draw_pen_legend(axes: Axes, n_pens: int, *, small: bool) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    axes.set_axis_off()
+    n = min(n_pens, len(_PENS))
+    handles: list[Any] = []
+    for pen in range(n):
+        same = ", ".join(str(each) for each in range(pen, n_pens, len(_PENS)))
+        handles.append(Line2D([], [], label=f"individual {same}", **_pen(pen, small=small)))
+    handles += [
+        Line2D([], [], color=Ink.BODY, marker="s", markerfacecolor="none", linestyle="", markersize=6, label="start"),
+        Patch(facecolor=Ink.VISITED, label="cell that one visits" if not small else "visited cell"),
+    ]  # fmt: skip
+    axes.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 1.03),
+        ncols=2,
+        frameon=False,
+        fontsize=6.0 if small else 8.0,
+        handlelength=2.2 if small else 3.6,
+        borderaxespad=0.0,
+        columnspacing=0.8 if small else 1.4,
+        handletextpad=0.5,
+        labelspacing=0.35 if small else 0.7,
+    )
+
+
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def _individuals_caption(
+    tally: Tally,
+    described: Mapping[str, Any],
+    replicate: int,
+    panels: list[list[TracedPath]],
+    sizes: tuple[int, int],
+    which: str,
+    problem: str,
+) -> str:
+    name = described["name"]
+    n_generations, population = sizes
+    n_drawn = max(len(panel) for panel in panels)
+    who = (
+        f"all {population} individuals"
+        if n_drawn == population
+        else f"the first {n_drawn} of {population} individuals"
+    )
+    when = (
+        "every generation"
+        if len(panels) == n_generations
+        else f"{len(panels)} of {n_generations} generations"
+    )
+    return (
+        f"Condition {name}, run {replicate}: the paths of {who} of {when}, each with a pen of its own, its number at "
+        f"its end; ends that coincide are fanned out. Coverage is counted {_counted(tally)}. "
+        f"{label_of(described)}, n = 1 run, no interval. {which} {_origin(problem)}"
+    )
+
+
+def _counted(tally: Tally) -> str:
+    return "along the line driven" if tally.measure == "line" else "at the ends of steps"
+
+
+def _which(tally: Tally, condition: str, *, typical: bool) -> str:
+    n = len(tally.replicates(condition))
+    if n == 1:
+        return "It is the only run."
+    if not typical:
+        return "The run was chosen by number."
+    return f"It is the typical run and not a picked one: its best coverage is the median of the {n:,} runs."
+
+
+def _origin(problem: str) -> str:
+    if problem:
+        return f"Some paths are missing: the trials could not be recomputed. {problem}"
+    return "The paths were recomputed from the records and visit the cells recorded."

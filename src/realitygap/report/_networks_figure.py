@@ -1,0 +1,206 @@
+"""Figure 7: networks that evolved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+from pydantic import ValidationError
+
+from realitygap._version import __version__
+from realitygap.drawing import Ink, Picture
+from realitygap.errors import RealityGapError
+from realitygap.evolution import network_picture
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    house_style,
+    new_figure,
+    place_axes,
+    to_svg,
+)
+from realitygap.report._shapes_drawing import draw_picture
+from realitygap.report._structures import Structures, count_structures
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.runs import Condition, genome_of
+
+_MARKS = (
+    "A link is as broad as its weight is large; a positive one is unbroken and ends in an arrow, a negative one is "
+    "dashed and ends in a bar. Dotted and faint: disabled genes. h: hidden node."
+)
+
+_N_COMMON = 3
+"""Common structures drawn beside the first run's network."""
+
+
+def draw_networks(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> Drawing:
+    """Networks of the last generation: the first objective run's best, and the most common structures.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        width: of the figure [in]; in a narrow one the networks stand below each other.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: the settings are not those of this version.
+    """
+    tally = read_tally(folder)
+    (drawing,) = draw_tally_networks(tally, count_structures(tally), widths=[width])
+    return drawing
+
+
+def draw_tally_networks(
+    tally: Tally,
+    structures: Sequence[Structures],
+    *,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "networks",
+) -> list[Drawing]:
+    """As `draw_networks`, of what was read already, in several widths; ids begin with `name`.
+
+    Raises:
+        ValueError: the settings are not those of this version.
+    """
+    condition = _first_objective(tally)
+    group = next(each for each in structures if condition in each.conditions)
+    replicate = int(tally.replicates(condition)[0])
+    first = _best_of_last(tally, condition, replicate)
+    pictures: list[tuple[str, str, Picture]] = [
+        (
+            f"run {replicate}, generation {first['generation']}",
+            f"individual {first['individual']}, {first[f'coverage_{tally.measure}']:.3f}",
+            _picture(tally, first),
+        )
+    ]
+    for letter, structure in zip("ABC", group.found[:_N_COMMON], strict=False):
+        share = f"{100 * structure.n / group.n_networks:.1f} % of networks"
+        pictures.append((f"structure {letter}", share, _picture(tally, structure.example)))
+    caption = _caption(tally, condition, group)
+    alt = "Networks. " + " ".join(f"{title}: {picture.description}" for title, _, picture in pictures)
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            figure = _draw(pictures, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
+
+
+def draw_network(
+    condition: Condition, row: Mapping[str, Any], measure: str, *, name: str = "network"
+) -> Drawing:
+    """The network of a row of results.
+
+    Args:
+        condition: as resolved.
+        row: of its results, with the genome.
+        measure: the column of coverage that is shown.
+        name: what the ids in the drawing begin with.
+
+    Raises:
+        ValueError: the genome is not one of this version.
+    """
+    picture = picture_of(condition, row)
+    caption = f"{picture.title}. {_MARKS} {condition.label}, n = 1 network, no interval."
+    title = picture.title.removeprefix("Network of ")
+    text = f"{condition.label}, coverage {row[measure]:.3f}"
+    with house_style():
+        figure = _draw([(title, text, picture)], 5.9)
+        return Drawing(to_svg(figure, name, picture.description), caption, picture.description, figure)
+
+
+def _first_objective(tally: Tally) -> str:
+    """The condition that selects by coverage and has runs, of the least noise; else the first with runs."""
+    with_runs = set(tally.runs["condition"])
+    there = [each for each in tally.conditions if each["name"] in with_runs]
+    objective = [each for each in there if settings_of(each).get("selection") == "coverage"]
+    return str((objective or there)[0]["name"])
+
+
+def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, Any]:
+    rows = tally.folder.read(condition, [replicate])
+    last = rows.filter(pl.col("generation") == rows["generation"].max())
+    return last.row(int(last[f"coverage_{tally.measure}"].arg_max() or 0), named=True)
+
+
+def _picture(tally: Tally, row: Mapping[str, Any]) -> Picture:
+    settings = dict(settings_of(tally.condition(row["condition"])))
+    condition = Condition.from_settings(row["condition"], settings)
+    return picture_of(condition, row)
+
+
+def picture_of(condition: Condition, row: Mapping[str, Any]) -> Picture:
+    """The network of a row of results, its inputs and outputs by name.
+
+    Raises:
+        ValueError: the genome is not one of this version.
+    """
+    genome = genome_of(condition, row)
+    ids = {node.id for node in genome.nodes}
+    strange = [gene for gene in genome.connections if not {gene.source, gene.target} <= ids]
+    if strange:
+        raise ValueError(
+            f"The genome has a link from {strange[0].source} to {strange[0].target}, and no such node."
+        )
+    return network_picture(
+        genome,
+        condition.task.input_names(condition.selection),
+        condition.task.output_names,
+        title=f"Network of {row['condition']}, run {row['replicate']}, generation {row['generation']}, "
+        f"individual {row['individual']}",
+    )
+
+
+def _draw(pictures: list[tuple[str, str, Picture]], width: float) -> Any:
+    n_columns = 2 if width >= 6 else 1
+    gap, text_height = 0.3, 0.4
+    across = (width - gap * (n_columns - 1)) / n_columns
+    picture = pictures[0][2]
+    up = across * (picture.top - picture.bottom) / (picture.right - picture.left)
+    n_rows = -(-len(pictures) // n_columns)
+    figure = new_figure(width, n_rows * (up + text_height))
+    for index, (title, text, shown) in enumerate(pictures):
+        row, column = divmod(index, n_columns)
+        axes = place_axes(figure, column * (across + gap), row * (up + text_height) + 0.26, across, up)
+        draw_picture(axes, shown, scale=1.08 if n_columns == 2 else 0.95)
+        for x, words, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, text, "right", Ink.MUTED)):
+            axes.annotate(
+                words,
+                (x, 1.0),
+                (1 - 2 * x, 4),
+                xycoords="axes fraction",
+                textcoords="offset points",
+                ha=align,
+                va="bottom",
+                fontsize=8.0,
+                weight="bold" if x == 0.0 else "normal",
+                color=color,
+            )
+    return figure
+
+
+def _caption(tally: Tally, condition: str, group: Structures) -> str:
+    n_runs = sum(len(tally.replicates(name)) for name in group.conditions)
+    label = label_of(tally.condition(condition))
+    return (
+        f"First, the best individual of the last generation of the first run of condition {condition}, chosen by "
+        "number and not by its look; then the structures that are most common among the "
+        f"{group.n_networks:,} networks of the last generations of all conditions with that selection "
+        f"({group.selection}) and {len(group.inputs)} inputs, each drawn from the "
+        f"individual of highest coverage that has it. {_MARKS} {label}, n = {n_runs:,} runs, no interval."
+    )
+
+
+def content(tally: Tally, widths: Sequence[float]) -> tuple[list[Drawing] | str, list[Structures]]:
+    """The figure in these widths, or why it is missing, and the structures counted."""
+    structures = count_structures(tally)
+    try:
+        return draw_tally_networks(tally, structures, widths=widths, name="figure-7"), structures
+    except (ValidationError, ValueError, RealityGapError):
+        return (
+            f"Figure 7 is missing: this realitygap ({__version__}) cannot read the genomes. Use the version that ran "
+            "the study.",
+            structures,
+        )

@@ -1,0 +1,359 @@
+"""What the paper asks and could not answer: plateaus, spread, variety, and what chance does with three runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from realitygap.evolution import largest_cell_distance
+from realitygap.records import ResultsFolder
+from realitygap.report._champions import MOST_RUNS
+from realitygap.report._comparisons import paired_values, same_but_for
+from realitygap.report._effects import (
+    Interval,
+    bca_interval,
+    mean_interval,
+    ratio_of_robust_spreads,
+    ratio_of_spreads,
+    robust_spread,
+)
+from realitygap.report._permutation import SEED, lattice
+from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._tally import Tally, read_tally, settings_of
+from realitygap.world import ArenaSettings
+
+Values = npt.NDArray[np.float64]
+
+MOST_BEHAVIORS = 40
+"""Behaviors of a run that are compared two by two: all of a run of the paper's size, else as many drawn."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of n with its exact interval (Clopper & Pearson 1934)."""
+
+    count: int
+    n: int
+
+    @property
+    def value(self) -> float:
+        """Observed share [0..1]."""
+        return self.count / self.n
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its bounds, at least 95 %."""
+        bounds = stats.binomtest(self.count, self.n).proportion_ci(CONFIDENCE, method="exact")
+        return float(bounds.low), float(bounds.high)
+
+
+# --- plateaus -----------------------------------------------------------------------------------------------
+
+
+def plateau_length(n_generations: int) -> int:
+    """Generations without a better trial that make a plateau: half of a run, rounded down."""
+    return n_generations // 2
+
+
+def plateaus(tally: Tally, condition: str) -> Share | None:
+    """Runs whose best coverage so far does not rise in the last half of their generations.
+
+    Returns:
+        How many of how many; None with fewer than two generations.
+    """
+    bests = tally.generation_bests(condition, tally.measure)
+    n, generations = bests.shape
+    k = plateau_length(generations)
+    if n == 0 or k == 0:
+        return None
+    so_far = np.fmax.accumulate(bests, axis=1)
+    return Share(int((so_far[:, -1] == so_far[:, -1 - k]).sum()), n)
+
+
+# --- spread -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far the runs of a condition are apart, beside another condition.
+
+    Attributes:
+        condition: its name.
+        n: runs.
+        deviation: standard deviation [share of the reachable cells]; NaN with one run.
+        robust: mean distance from the median, in standard deviations of a normal distribution with as much;
+            a few extreme runs move it less.
+        reference: the condition that it is compared with; its own name where it is compared with none.
+        ratio: `deviation` over that of the reference; NaN where that is 0.
+        ratio_interval: BCa; None where n is too small.
+        robust_ratio: as `ratio`, of `robust`.
+        robust_interval: BCa, likewise.
+    """
+
+    condition: str
+    n: int
+    deviation: float
+    robust: float
+    reference: str
+    ratio: float
+    ratio_interval: Interval | None
+    robust_ratio: float
+    robust_interval: Interval | None
+
+
+def spreads(tally: Tally) -> list[Spread]:
+    """The spread of each condition with runs, against its baseline or the first of its selection."""
+    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    return [_spread(tally, each["name"], _reference(each, with_runs)) for each in with_runs]
+
+
+def _reference(condition: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> str:
+    names = [each["name"] for each in others]
+    if condition.get("baseline") in names:
+        return str(condition["baseline"])
+    for group in same_but_for("noise", others):
+        if any(each["name"] == condition["name"] for each in group):
+            return str(group[0]["name"])
+    return str(condition["name"])
+
+
+def _ratio(one: float, other: float) -> float:
+    return one / other if other > 0 else math.nan
+
+
+def _spread(tally: Tally, condition: str, reference: str) -> Spread:
+    own = tally.run_bests(condition, tally.measure)
+    samples = paired_values(tally, condition, reference)
+    ratio_interval = robust_interval = None
+    ratio = robust_ratio = math.nan
+    if reference != condition and min(len(samples.one), len(samples.other)) > 1:
+        ratio = _ratio(float(samples.one.std(ddof=1)), float(samples.other.std(ddof=1)))
+        robust_ratio = _ratio(robust_spread(samples.one), robust_spread(samples.other))
+        ratio_interval, robust_interval = (
+            bca_interval(statistic, samples.one, samples.other, paired=samples.paired)
+            for statistic in (ratio_of_spreads, ratio_of_robust_spreads)
+        )
+    return Spread(
+        condition,
+        len(own),
+        float(own.std(ddof=1)) if len(own) > 1 else math.nan,
+        robust_spread(own),
+        reference,
+        ratio,
+        ratio_interval,
+        robust_ratio,
+        robust_interval,
+    )
+
+
+# --- variety ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Variety:
+    """How different the behaviors of a run are, averaged over runs.
+
+    Attributes:
+        condition: its name.
+        sorted_cells: (n,) mean distance of two behaviors of a run, the paper's [cells].
+        jaccard: (n,) mean Jaccard distance of two behaviors: the share of cells visited by one of them
+            alone, of those visited by either [0..1].
+        n_behaviors: behaviors of a run that were compared, at most.
+    """
+
+    condition: str
+    sorted_cells: Values
+    jaccard: Values
+    n_behaviors: int
+
+    @property
+    def n(self) -> int:
+        """Runs."""
+        return len(self.jaccard)
+
+
+def measure_variety(folder: ResultsFolder | str | Path) -> list[Variety]:
+    """Mean distance between the behaviors of a run, for up to 100 runs a condition.
+
+    A behavior is the set of cells along the line driven. Of a run with more than 40, as many are drawn with a
+    fixed seed.
+
+    Args:
+        folder: the results of a study, or the path to them.
+
+    Returns:
+        One for each condition with runs.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+
+    Source: the distance of sorted cells, Rosenzweig & Remy, section 2.4 (by x, then y); Jaccard (1912).
+    """
+    return tally_variety(read_tally(folder))
+
+
+def tally_variety(tally: Tally) -> list[Variety]:
+    """As `measure_variety`, of what was read already."""
+    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    return [_variety(tally, each) for each in with_runs]
+
+
+def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
+    name = condition["name"]
+    replicates = [int(run) for run in tally.replicates(name)[:MOST_RUNS]]
+    rows = tally.folder.read(name, replicates, ["replicate", "cells"])
+    columns, lines = _grid(condition)
+    points = np.stack(np.divmod(np.arange(columns * lines), lines), axis=1).astype(float)
+    rng = np.random.default_rng(SEED)
+    sorted_cells, jaccard, most = [], [], 0
+    for part in rows.partition_by("replicate", maintain_order=True):
+        behaviors = part["cells"]
+        if len(behaviors) > MOST_BEHAVIORS:
+            behaviors = behaviors.gather(np.sort(rng.choice(len(behaviors), MOST_BEHAVIORS, replace=False)))
+        most = max(most, len(behaviors))
+        if len(behaviors) < 2:
+            continue
+        visited = np.zeros((len(behaviors), columns * lines), np.bool_)
+        lengths = behaviors.list.len().to_numpy()
+        row, column = np.divmod(behaviors.explode().drop_nulls().to_numpy().astype(np.int64), columns)
+        # cells are numbered row by row, and sorted by x, then y
+        visited[np.repeat(np.arange(len(behaviors)), lengths), column * lines + row] = True
+        sorted_cells.append(mean_sorted_distance(visited, points, largest_cell_distance(columns, lines)))
+        jaccard.append(mean_jaccard_distance(visited))
+    return Variety(name, np.array(sorted_cells), np.array(jaccard), most)
+
+
+def _grid(condition: Mapping[str, Any]) -> tuple[int, int]:
+    """Columns and rows of the arena's reachable cells; the paper's where the settings do not say."""
+    try:
+        grid = ArenaSettings.model_validate(settings_of(condition).get("arena", {})).arena().grid
+    except ValueError:
+        return 12, 6
+    return grid.columns, grid.rows
+
+
+def mean_sorted_distance(visited: npt.NDArray[np.bool_], points: Values, padding: float) -> float:
+    """Mean distance of sorted cells over all pairs of n behaviors [cells].
+
+    Args:
+        visited: (n, c) which cells each behavior visits, cells in the order in which they are sorted.
+        points: (c, 2) where they are [cells].
+        padding: distance for each cell without a counterpart.
+    """
+    lengths = visited.sum(axis=1)
+    width = max(int(lengths.max()), 1)
+    # the cells of each behavior first, in order, then places that are not used
+    order = np.argsort(~visited, axis=1, kind="stable")[:, :width]
+    one, other = np.triu_indices(len(visited), 1)
+    between = np.sqrt(((points[:, None] - points[None]) ** 2).sum(axis=2))
+    shorter = np.minimum(lengths[one], lengths[other])
+    distance = between[order[one], order[other]]
+    distance[np.arange(width) >= shorter[:, None]] = 0.0
+    unmatched = np.maximum(lengths[one], lengths[other]) - shorter
+    return float((distance.sum(axis=1) + padding * unmatched).mean())
+
+
+def mean_jaccard_distance(visited: npt.NDArray[np.bool_]) -> float:
+    """Mean Jaccard distance over all pairs of n behaviors [0..1]; two that visit nothing are equal."""
+    counts = visited.astype(np.float64)
+    lengths = counts.sum(axis=1)
+    both = counts @ counts.T
+    either = lengths[:, None] + lengths[None] - both
+    distance = 1.0 - np.divide(both, either, out=np.ones_like(both), where=either > 0)
+    return float(distance[np.triu_indices(len(visited), 1)].mean())
+
+
+# --- chance -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Chance:
+    """How often each of several conditions has the highest mean of so few runs.
+
+    Attributes:
+        conditions: names, one for each level.
+        n_runs: runs of each that are drawn.
+        best: (k,) how often each comes out best, when runs are drawn from those observed [0..1].
+        best_if_equal: the same when all levels have one distribution, that of all their runs together.
+    """
+
+    conditions: tuple[str, ...]
+    n_runs: int
+    best: Values
+    best_if_equal: float
+
+
+def chance_of_best(samples: Sequence[Values], n_runs: int) -> Values:
+    """How often each of k samples has the highest mean of `n_runs` values drawn from it, with replacement.
+
+    Args:
+        samples: k arrays of values that are multiples of one unit, as coverages are.
+        n_runs: values drawn from each, >= 1.
+
+    Returns:
+        (k,) adding up to 1; those with equal means share. Exact: distributions of sums are computed, and
+        nothing is drawn.
+
+    Raises:
+        ValueError: the values have no common unit.
+    """
+    whole = lattice(np.concatenate(samples))
+    if whole is None:
+        raise ValueError("The values are no multiples of 1/N for an N up to 256, as coverages are.")
+    parts = np.split(whole - whole.min(), np.cumsum([len(sample) for sample in samples])[:-1])
+    most = int(max(part.max() for part in parts))
+    sums = np.stack([_sum_distribution(part, most, n_runs) for part in parts])
+    below = np.cumsum(sums, axis=1) - sums
+    return np.array([_wins(sums, below, k) for k in range(len(sums))])
+
+
+def _sum_distribution(values: npt.NDArray[np.int64], most: int, n_runs: int) -> Values:
+    one = np.bincount(values, minlength=most + 1) / len(values)
+    total = np.ones(1)
+    for _ in range(n_runs):
+        total = np.convolve(total, one)
+    return total
+
+
+def _wins(sums: Values, below: Values, k: int) -> float:
+    """Probability that sample k is highest; where j others tie with it, it has 1 / (j + 1) of that."""
+    # ties[j]: that j of the others so far equal k's sum, and the rest are below it
+    ties = [np.ones(sums.shape[1])]
+    for other in range(len(sums)):
+        if other != k:
+            grown = [each * below[other] for each in ties] + [np.zeros(sums.shape[1])]
+            for j, each in enumerate(ties):
+                grown[j + 1] = grown[j + 1] + each * sums[other]
+            ties = grown
+    return float(sum((sums[k] * each).sum() / (j + 1) for j, each in enumerate(ties)))
+
+
+def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
+    """For each group of three or more noise levels with one selection: which is best of so few runs."""
+    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    found = []
+    for group in same_but_for("noise", with_runs):
+        if len(group) < 3:
+            continue
+        names = tuple(str(each["name"]) for each in group)
+        samples = [tally.run_bests(name, tally.measure) for name in names]
+        together = np.concatenate(samples)
+        if lattice(together) is not None:
+            equal = chance_of_best([together] * len(samples), n_runs)
+            found.append(Chance(names, n_runs, chance_of_best(samples, n_runs), float(equal[0])))
+    return found
+
+
+# --- means --------------------------------------------------------------------------------------------------
+
+
+def mean_with_interval(values: Values) -> tuple[float, Interval | None]:
+    """Mean and its BCa interval."""
+    return (float(values.mean()) if len(values) else math.nan), mean_interval(values)

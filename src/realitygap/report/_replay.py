@@ -1,0 +1,265 @@
+"""The replay: trials of the typical run of each condition, recomputed and packed for the page's script.
+
+Every number is rounded to a whole multiple of its unit in `UNITS`, so that what the page shows is within half a
+unit of what was computed. A trial is one run of bytes: columns of differences from one step to the next, each
+difference as a zigzag number of 7 bits a byte, so that a column that stands still costs a byte a step.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.errors import RealityGapError
+from realitygap.kernels._coverage import to_grid, visit, visit_line
+from realitygap.report._path_figure import typical_replicate
+from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.runs import Condition, replay
+from realitygap.trials import Trajectory
+from realitygap.world import Grid
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
+"""What numbers are rounded to: positions and readings [m], headings [rad], inputs and outputs of networks."""
+
+N_PENS = 8
+"""Trials shown at once."""
+
+MOST_STEPS = 105_000
+"""Steps embedded in a page, of all trials together: some 18 bytes each."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The trials of one run that are embedded, ready for JSON, and what to say of it.
+
+    Attributes:
+        data: what the script reads; None where no trial could be embedded.
+        n_embedded, n_trials: of the run.
+        note: what is missing and why; empty where nothing is.
+    """
+
+    name: str
+    replicate: int
+    data: dict[str, Any] | None
+    n_embedded: int
+    n_trials: int
+    note: str
+
+
+def content(tally: Tally) -> dict[str, Any]:
+    """What the template needs for the replay; trials that cannot be recomputed are left out, and it is said."""
+    from markupsafe import Markup
+
+    with_runs = set(tally.runs["condition"])
+    there = [condition for condition in tally.conditions if condition["name"] in with_runs]
+    room = MOST_STEPS // max(len(there), 1)
+    runs = [_pack_run(tally, condition, room) for condition in there]
+    packed = [run.data for run in runs if run.data is not None]
+    script = _template("replay.js")
+    return {
+        "css": Markup(_template("replay.css")),
+        "script": Markup(script),
+        "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        "data": _as_json({"units": UNITS, "pens": N_PENS, "measure": tally.measure, "conditions": packed}),
+        "there": bool(packed),
+        "n_pens": N_PENS,
+        "runs": runs,
+        "notes": _notes(runs),
+        "n_trials": sum(run.n_embedded for run in runs),
+        "n_runs": len(packed),
+        "same_number": len({run.n_embedded for run in runs if run.data is not None}) == 1,
+        "labels": sorted({label_of(condition) for condition in there}),
+    }
+
+
+def _notes(runs: Sequence[_Run]) -> list[str]:
+    """What is missing, each with the names of the conditions of which it is true."""
+    notes = dict.fromkeys(run.note for run in runs if run.note)
+    return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
+
+
+def _template(name: str) -> str:
+    return resources.files("realitygap.report").joinpath(f"templates/{name}").read_text(encoding="utf-8")
+
+
+def _as_json(values: Mapping[str, Any]) -> Markup:
+    """JSON that can stand in a script element: nothing in it ends the element, whatever the names are."""
+    from markupsafe import Markup
+
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+# --- one run ------------------------------------------------------------------------------------------------
+
+
+def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
+    name = described["name"]
+    replicate = typical_replicate(tally, name)
+    rows = tally.folder.read(name, [replicate])
+    try:
+        condition = Condition.from_settings(name, dict(settings_of(described)))
+        chosen = _choose(rows, room // (condition.jyro.steps + 1), f"coverage_{tally.measure}")
+        trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
+    except (RealityGapError, ValueError):
+        note = (
+            "its trials cannot be recomputed by this version of realitygap; use the one that ran the study."
+        )
+        return _Run(name, replicate, None, 0, rows.height, note)
+    if not trials:
+        note = f"a trial of {condition.jyro.steps:,} steps is too long to be embedded in a page."
+        return _Run(name, replicate, None, 0, rows.height, note)
+    note = ""
+    if len(trials) < rows.height:
+        note = (
+            f"{len(trials):,} of {rows.height:,} trials, those of the highest coverage in each generation; "
+            "more would make the page too large."
+        )
+    data = _scene(condition) | {
+        "name": name,
+        "run": replicate,
+        "label": label_of(described),
+        "total": rows.height,
+        "trials": trials,
+    }
+    return _Run(name, replicate, data, len(trials), rows.height, note)
+
+
+def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
+    """All rows where they fit; else the best few of each generation, of generations evenly spread if need be."""
+    if rows.height <= most:
+        return rows
+    generations = rows["generation"].unique().sort().to_numpy()
+    n_shown = min(len(generations), most)
+    if n_shown == 0:
+        return rows.clear()
+    shown = generations[np.unique(np.linspace(0, len(generations) - 1, n_shown).round().astype(int))]
+    rank = pl.col(column).rank("ordinal", descending=True).over("generation")
+    return rows.filter(pl.col("generation").is_in(shown.tolist()) & (rank <= most // n_shown))
+
+
+def _scene(condition: Condition) -> dict[str, Any]:
+    """Where and with what body and sensors; lengths in meters."""
+    arena, platform = condition.arena.arena(), condition.jyro
+    grid, mounts = arena.grid, platform.sensors.mounts
+    return {
+        "walls": [list(wall) for wall in arena.walls],
+        "grid": [grid.x, grid.y, grid.cell, grid.columns, grid.rows],
+        "body": [list(corner) for corner in platform.body.corners],
+        "mounts": [list(mount) for mount in mounts],
+        "sensors": _sensor_names([left for _, left, _ in mounts]),
+        "range": platform.sensor_range,
+        "steps": platform.steps,
+    }
+
+
+def _sensor_names(lefts: Sequence[float]) -> list[str]:
+    if len(lefts) == 3 and lefts[0] > lefts[1] > lefts[2]:
+        return ["left", "middle", "right"]
+    return [f"sensor {k}" for k in range(len(lefts))]
+
+
+def _pack_row(condition: Condition, row: Mapping[str, Any]) -> list[Any]:
+    """Generation, individual, cells along the line and at the ends of steps, the step's length and the bytes."""
+    trajectory = replay(condition, row)
+    grid = condition.arena.arena().grid
+    cells, steps, end_steps = first_visits(trajectory, grid)
+    packed = pack_trial(trajectory, cells, steps, end_steps)
+    return [
+        int(row["generation"]),
+        int(row["individual"]),
+        len(cells),
+        len(end_steps),
+        trajectory.step_s,
+        base64.b64encode(packed).decode(),
+    ]
+
+
+def first_visits(
+    trajectory: Trajectory, grid: Grid
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """When a trial comes to its cells, counted as the trial itself counts them.
+
+    Returns:
+        (n,) cells along the line in order of first visit, columns * row + column; (n,) the step at whose end
+        each has been visited, 0 for the start; (m,) the same of cells in which steps end.
+    """
+    shape = (grid.columns, grid.rows)
+    along, at_ends = np.zeros((2, grid.n_cells), np.bool_)
+    order, order_ends = np.zeros((2, grid.n_cells), np.uint8)
+    at = [
+        (to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell))
+        for x, y, _ in trajectory.poses.tolist()
+    ]
+    n, n_ends = [0] * len(at), [0] * len(at)
+    for step, (u, v) in enumerate(at):
+        column, row = int(np.floor(u)), int(np.floor(v))
+        if step == 0:
+            n[0] = visit(column, row, *shape, along, order, 0)
+            n_ends[0] = visit(column, row, *shape, at_ends, order_ends, 0)
+        elif trajectory.stalled[step]:
+            n[step], n_ends[step] = n[step - 1], n_ends[step - 1]
+        else:
+            u0, v0 = at[step - 1]
+            n[step] = visit_line(u0, v0, u, v, *shape, along, order, n[step - 1])
+            n_ends[step] = visit(column, row, *shape, at_ends, order_ends, n_ends[step - 1])
+    steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))
+    return order[: n[-1]].astype(np.int64), steps, end_steps
+
+
+def pack_trial(
+    trajectory: Trajectory,
+    cells: npt.NDArray[np.int64],
+    steps: npt.NDArray[np.int64],
+    end_steps: npt.NDArray[np.int64],
+) -> bytes:
+    """A trial as bytes, column after column; the page's script takes them apart in the same order.
+
+    Columns: x, y, heading, each sensor's reading (t + 1 numbers each); what the network saw, move, turn (t);
+    blocked or not (t + 1); cells, steps and end_steps as in `first_visits`.
+    """
+    lengths = np.column_stack([trajectory.poses[:, :2], trajectory.readings])
+    lengths = np.rint(lengths / UNITS["length"]).astype(np.int64)
+    headings = np.rint(trajectory.poses[:, 2] / UNITS["angle"]).astype(np.int64)
+    outputs = np.column_stack([trajectory.inputs[:, 0], trajectory.commands])
+    outputs = np.rint(outputs / UNITS["output"]).astype(np.int64)
+    columns = [
+        lengths[:, 0],
+        lengths[:, 1],
+        headings,
+        *lengths[:, 2:].T,
+        *outputs.T,
+        trajectory.stalled.astype(np.int64),
+        cells,
+        steps,
+        end_steps,
+    ]
+    return b"".join(_differences(column) for column in columns)
+
+
+def _differences(column: npt.NDArray[np.int64]) -> bytes:
+    differences = np.diff(column, prepend=0)
+    return bytes(_sevens(np.where(differences < 0, -2 * differences - 1, 2 * differences).tolist()))
+
+
+def _sevens(numbers: Iterable[int]) -> Iterable[int]:
+    """Numbers >= 0 as groups of 7 bits, the lowest first; all but the last of a number have the 8th bit set."""
+    for number in numbers:
+        while number > 127:
+            yield number & 127 | 128
+            number >>= 7
+        yield number

@@ -1,0 +1,96 @@
+"""The shapes of a `Picture` in a figure, so that it looks as it does by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realitygap.drawing import Disc, Ink, Line, Picture, Text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+from realitygap.report._drawing import new_figure, place_axes
+
+
+def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
+    """Draw a picture into axes of its proportions.
+
+    Args:
+        axes: emptied of all else.
+        picture: what to draw.
+        scale: of everything that is measured in points.
+    """
+    axes.set_axis_off()
+    axes.set_xlim(picture.left, picture.right)
+    axes.set_ylim(picture.bottom, picture.top)
+    for order, shape in enumerate(picture.shapes):
+        if isinstance(shape, Line):
+            _draw_line(axes, shape, order, scale)
+        elif isinstance(shape, Disc):
+            axes.plot(
+                [shape.x],
+                [shape.y],
+                "o",
+                color=shape.fill,
+                markeredgecolor=shape.color or shape.fill,
+                markeredgewidth=shape.width * scale if shape.color else 0.0,
+                markersize=2 * shape.radius * scale,
+                zorder=2 + order,
+                clip_on=False,
+            )
+        else:
+            _draw_text(axes, shape, order, scale)
+
+
+def figure_of(picture: Picture, width: float) -> Figure:
+    """A figure that holds nothing but a picture; call under `house_style`.
+
+    Args:
+        picture: what to draw.
+        width: of the figure [in].
+    """
+    height = width * (picture.top - picture.bottom) / (picture.right - picture.left)
+    figure = new_figure(width, height)
+    draw_picture(place_axes(figure, 0.0, 0.0, width, height), picture)
+    return figure
+
+
+def _draw_line(axes: Axes, line: Line, order: int, scale: float) -> None:
+    points = np.array([*line.points, line.points[0]] if line.closed else line.points)
+    if line.fill is not None:
+        axes.fill(points[:, 0], points[:, 1], color=line.fill, linewidth=0, zorder=2 + order, clip_on=False)
+    if line.color is not None:
+        dash = tuple(part / line.width for part in line.dash)
+        axes.plot(
+            points[:, 0],
+            points[:, 1],
+            color=line.color,
+            linewidth=line.width * scale,
+            linestyle=(0, dash) if dash else "solid",
+            dash_capstyle="butt",
+            solid_capstyle="projecting",
+            zorder=2 + order,
+            clip_on=False,
+        )
+
+
+def _draw_text(axes: Axes, text: Text, order: int, scale: float) -> None:
+    box = {"boxstyle": "square,pad=0.08", "facecolor": Ink.GROUND, "edgecolor": "none"} if text.halo else None
+    axes.annotate(
+        text.text,
+        (text.x, text.y),
+        (text.shift[0] * scale, text.shift[1] * scale),
+        textcoords="offset points",
+        ha={"start": "left", "middle": "center", "end": "right"}[text.anchor],
+        va="center",
+        rotation=90 if text.upright else 0,
+        fontsize=text.size * scale,
+        color=text.color,
+        weight="bold" if text.bold else "normal",
+        zorder=2 + order,
+        bbox=box,
+        annotation_clip=False,
+    )

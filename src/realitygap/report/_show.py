@@ -1,0 +1,125 @@
+"""What `realitygap show` shows: a run, a trial, a network, species, an arena or a robot, as a file."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from realitygap._version import __version__
+from realitygap.drawing import Picture
+from realitygap.errors import RecordError, did_you_mean
+from realitygap.records import RecordWarning, ResultsFolder
+from realitygap.report._drawing import Drawing
+from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
+from realitygap.report._networks_figure import draw_network
+from realitygap.report._path_figure import draw_tally_paths
+from realitygap.report._species_figure import count_species, draw_tally_species
+from realitygap.report._tally import read_tally
+from realitygap.report._trial_figure import animate_trial, choose_trial, draw_chosen_trial
+from realitygap.robots import JyroPlatform
+from realitygap.world import arena_picture, paper_arena
+
+Subject = Literal["run", "network", "species"]
+
+_STILL = (".pdf", ".png", ".svg")
+
+
+def save_view(
+    folder: ResultsFolder | str | Path,
+    out: str | Path,
+    *,
+    subject: Subject = "run",
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+) -> Path:
+    """Draw something of a study's results into a file, recomputed from its rows.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        out: ends in .svg, .pdf, .png or, for one trial, .gif; a file that is there gives way.
+        subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
+            network, that of one individual; species, their shares in one run and their number in all.
+        condition: of which; the first one when not given.
+        replicate: which run; when not given the typical one, and for species the one with most of them.
+        generation: of a trial or network; when not given that of the run's best trial, for a network the last one.
+        individual: of the generation; the one of highest coverage when not given.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, a trial comes out
+            otherwise than recorded, its settings are another version's, or the file cannot be written.
+        ValueError: there is no such condition, run, generation, individual or ending; the message says which there are.
+    """
+    out = Path(out)
+    ending = check_ending(out, (".gif", *_STILL) if subject == "run" else _STILL)
+    with warnings.catch_warnings():
+        if not isinstance(folder, ResultsFolder):
+            warnings.simplefilter("default", RecordWarning)
+        tally = read_tally(folder)
+    try:
+        if subject == "species":
+            if generation is not None or individual is not None:
+                raise ValueError(
+                    "Species are shown over all generations: leave out generation and individual."
+                )
+            (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate)
+            return _save(drawing, out, "Species")
+        if subject == "network":
+            trial = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
+            return _save(
+                draw_network(trial.condition, trial.row, trial.measure), out, f"Network of {trial.title}"
+            )
+        if generation is None and individual is None and ending != ".gif":
+            name = condition or str(tally.runs["condition"][0])
+            return _save(draw_tally_paths(tally, name, replicate), out, f"A run of {name}")
+        trial = choose_trial(tally, condition, replicate, generation, individual)
+        if ending == ".gif":
+            return animate_trial(trial, out)
+        return _save(draw_chosen_trial(trial), out, trial.title)
+    except ValidationError as error:
+        raise RecordError(
+            f"This realitygap ({__version__}) cannot read the settings of the condition: {error.errors()[0]['msg']}. "
+            "Use the version that ran the study."
+        ) from error
+
+
+def _save(drawing: Drawing, out: Path, title: str) -> Path:
+    return save_drawing(captioned(drawing, "figure"), out, title=title)
+
+
+def save_arena(out: str | Path, name: str = "paper") -> Path:
+    """Draw an arena, with the robot `jyro` at its start, into a file.
+
+    Args:
+        out: ends in .svg, .pdf or .png; a file that is there gives way.
+        name: paper.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        RecordError: the file cannot be written.
+        ValueError: there is no such arena or ending.
+    """
+    _check_name("arena", name, ["paper"])
+    robot = JyroPlatform()
+    return save_picture(arena_picture(paper_arena(), robot.body, robot.sensors), out)
+
+
+def save_robot(out: str | Path, name: str = "jyro") -> Path:
+    """Draw a robot with its dimensions into a file; see `save_arena`."""
+    _check_name("robot", name, ["jyro"])
+    picture: Picture = JyroPlatform().picture()
+    return save_picture(picture, out)
+
+
+def _check_name(what: str, name: str, known: list[str]) -> None:
+    if name not in known:
+        raise ValueError(f"Unknown {what} {name!r}. {did_you_mean(name, known)}")

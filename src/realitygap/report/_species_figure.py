@@ -1,0 +1,282 @@
+"""Species over time: their shares in one run, and how many there are in all runs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.drawing import Ink
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._path_figure import no_such_run
+from realitygap.report._structures import selection_of
+from realitygap.report._tally import Tally, label_of, read_tally
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
+_LINES = {
+    "coverage": (Ink.PEN1, "solid", "o"),
+    "novelty": (Ink.PEN2, (0, (5, 1.5)), "s"),
+    "random": (Ink.RUN, (0, (1.2, 1.4)), "^"),
+}
+"""Color, dashes and mark by selection."""
+
+_MOST_BARS = 12
+"""Generations up to which each has a bar and each share its species' number."""
+
+
+@dataclass(frozen=True)
+class SpeciesCounts:
+    """How many species there were.
+
+    Attributes:
+        counts: (rows) condition, replicate, generation, species: how many there were.
+    """
+
+    counts: pl.DataFrame
+
+    def mean_by_selection(self, tally: Tally) -> dict[str, npt.NDArray[np.float64]]:
+        """(g,) mean number of species in each generation, over all runs with a selection."""
+        selections = pl.DataFrame(
+            {
+                "condition": [each["name"] for each in tally.conditions],
+                "selection": [selection_of(each) for each in tally.conditions],
+            }
+        )
+        means = (
+            self.counts.join(selections, on="condition")
+            .group_by("selection", "generation")
+            .agg(pl.col("species").mean())
+            .sort("selection", "generation")
+        )
+        return {
+            str(key[0]): frame["species"].to_numpy()
+            for key, frame in means.group_by("selection", maintain_order=True)
+        }
+
+
+def count_species(tally: Tally) -> SpeciesCounts:
+    """The number of species in each generation of each run."""
+    parts = [
+        frame.group_by("condition", "replicate", "generation", maintain_order=True).agg(
+            pl.col("species").n_unique()
+        )
+        for frame in tally.folder.frames(columns=["condition", "replicate", "generation", "species"])
+    ]
+    return SpeciesCounts(pl.concat(parts))
+
+
+def draw_species(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    width: float = WIDE,
+) -> Drawing:
+    """The shares of the species in a run over its generations, and how many species all runs have.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        condition: of which; the first one that selects when not given.
+        replicate: which run; when not given the one with most species, the first of several alike.
+        width: of the figure [in].
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition or run.
+    """
+    tally = read_tally(folder)
+    (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate, widths=[width])
+    return drawing
+
+
+def draw_tally_species(
+    tally: Tally,
+    species: SpeciesCounts,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "species",
+) -> list[Drawing]:
+    """As `draw_species`, of what was read already, in several widths; ids begin with `name`.
+
+    Raises:
+        ValueError: there is no such condition or run.
+    """
+    condition = condition or tally.runs["condition"][0]
+    described = tally.condition(condition)
+    of_runs = species.counts.filter(pl.col("condition") == condition)
+    picked = replicate is None
+    if replicate is None:
+        most = of_runs.group_by("replicate", maintain_order=True).agg(pl.col("species").sum())
+        if most.is_empty():
+            raise ValueError(f"Condition {condition!r} has no runs yet.")
+        replicate = int(most["replicate"][int(most["species"].arg_max() or 0)])
+    rows = tally.folder.read(condition, [replicate], ["generation", "species"])
+    if rows.is_empty():
+        raise ValueError(no_such_run(tally, condition, replicate))
+    shares = _shares(rows)
+    means = species.mean_by_selection(tally)
+    n_runs = tally.runs.height
+    why = (
+        "picked because it has most species (the first of several alike): in a typical run there is little to see"
+        if picked
+        else "chosen by number"
+    )
+    labels = ", ".join(sorted({label_of(each) for each in tally.conditions}))
+    caption = (
+        f"Left (on a phone, above), condition {condition}, run {replicate}, {why}: the share of each species in the "
+        f"population of each generation, with the species’ numbers. {label_of(described)}, n = 1 run. Right "
+        f"(below), the mean number of species in each generation, over all runs with a selection. "
+        f"{labels}, n = {n_runs:,} runs, no interval."
+    )
+    alt = (
+        f"Species of run {replicate} of {condition}: {len(shares)} in all. Mean number of species in the last "
+        "generation: " + ", ".join(f"{each} {values[-1]:.2f}" for each, values in means.items()) + "."
+    )
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            is_wide = width >= 6
+            height = 2.25
+            figure = new_figure(width, height + 0.75 if is_wide else 2 * (height + 0.75) + 0.1)
+            across = 0.42 * width if is_wide else width - 0.55
+            left = place_axes(figure, 0.5, 0.3, across, height)
+            _draw_shares(left, shares, f"{shorten(condition, 28)}, run {replicate}", label_of(described))
+            right = place_axes(
+                figure,
+                0.57 * width if is_wide else 0.5,
+                0.3 if is_wide else height + 1.15,
+                (0.33 * width if is_wide else across - 0.75),
+                height,
+            )
+            _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
+
+
+def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:
+    """(g,) share of each species in each generation, by the species' number."""
+    n_generations = int(rows["generation"].max()) + 1  # type: ignore[arg-type]
+    sizes = np.bincount(rows["generation"].to_numpy(), minlength=n_generations)
+    return {
+        int(number): np.bincount(
+            rows.filter(pl.col("species") == number)["generation"].to_numpy(), minlength=n_generations
+        )
+        / sizes
+        for number in sorted(rows["species"].unique())
+    }
+
+
+def _draw_shares(axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], title: str, label: str) -> None:
+    n = len(next(iter(shares.values())))
+    few = n <= _MOST_BARS
+    floor = np.zeros(n)
+    for index, (number, share) in enumerate(shares.items()):
+        color = _PENS[index % len(_PENS)]
+        axes.bar(
+            np.arange(n),
+            share,
+            0.82 if few else 1.0,
+            floor,
+            color=color,
+            alpha=0.42,
+            linewidth=0.0,
+        )
+        if few:
+            axes.bar(np.arange(n), share, 0.82, floor, color="none", edgecolor=Ink.GROUND, linewidth=1.0)
+        labeled = np.flatnonzero(share > 0.06) if few else [int(share.argmax())]
+        for generation in labeled:
+            axes.annotate(
+                str(number),
+                (generation, floor[generation] + share[generation] / 2),
+                ha="center",
+                va="center",
+                fontsize=7.5,
+            )
+        floor = floor + share
+    axes.set_ylim(0, 1)
+    axes.set_xlim(-0.55, n - 0.45)
+    _label(axes, n, "share of the population", title, f"{label}, n = 1")
+
+
+def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]], label: str) -> None:
+    n = max(len(values) for values in means.values())
+    most = max(float(values.max()) for values in means.values())
+    top = max(1.5, 1.08 * most)
+    axes.set_ylim(0, top)
+    axes.set_xlim(-0.2, max(n - 1, 1))
+    places = _spread([float(values[-1]) for values in means.values()], 0.075 * top)
+    for (selection, values), place in zip(means.items(), places, strict=True):
+        color, dashes, mark = _LINES.get(selection, (Ink.PEN3, "solid", "D"))
+        axes.plot(
+            np.arange(len(values)),
+            values,
+            color=color,
+            linestyle=dashes,
+            marker=mark if n <= _MOST_BARS else None,
+            markersize=4.0,
+            linewidth=1.4,
+            clip_on=False,
+        )
+        axes.annotate(
+            shorten(selection, 12),
+            (len(values) - 1, values[-1]),
+            (1.03, place),
+            textcoords=("axes fraction", "data"),
+            ha="left",
+            va="center",
+            fontsize=8.0,
+            color=color,
+            annotation_clip=False,
+        )
+    axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
+    _label(axes, n, "mean number of species", "all runs", label)
+
+
+def _spread(values: list[float], least: float) -> list[float]:
+    """The values moved apart to at least `least`, in their order."""
+    order = sorted(range(len(values)), key=lambda k: values[k])
+    places = list(values)
+    for before, after in itertools.pairwise(order):
+        places[after] = max(places[after], places[before] + least)
+    return places
+
+
+def _label(axes: Axes, n: int, unit: str, title: str, label: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    axes.set_xlabel("generation", labelpad=2)
+    axes.set_ylabel(unit)
+    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
+        axes.annotate(
+            text,
+            (x, 1.0),
+            (0, 6),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=8.0,
+            weight="bold" if x == 0.0 else "normal",
+            color=color,
+        )

@@ -1,0 +1,339 @@
+"""The part of the page that compares conditions and answers what the paper asks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_tally
+from realitygap.report._comparisons import (
+    INTERVAL_NAME,
+    Comparison,
+    compare_tally,
+    comparisons_content,
+    same_but_for,
+    signed,
+    span,
+)
+from realitygap.report._effects import Interval, bca_interval, difference_of_means, mean_interval
+from realitygap.report._questions import (
+    MOST_BEHAVIORS,
+    Share,
+    Variety,
+    chances,
+    plateau_length,
+    plateaus,
+    spreads,
+    tally_variety,
+)
+from realitygap.report._tally import Tally, label_of, settings_of
+
+_SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
+
+
+def statistics_content(tally: Tally) -> dict[str, Any]:
+    """Everything that the template of the section shows."""
+    comparisons = compare_tally(tally)
+    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    return {
+        "interval": INTERVAL_NAME,
+        "labels": ", ".join(sorted({label_of(each) for each in with_runs})),
+        "comparisons": comparisons_content(comparisons),
+        "deception": _deception(tally, comparisons, with_runs),
+        "champions": _champions(tally, with_runs),
+        "spread": _spread(tally),
+        "variety": _variety(tally, with_runs),
+        "chance": _chance(tally),
+    }
+
+
+# --- deceptiveness ------------------------------------------------------------------------------------------
+
+
+def _deception(
+    tally: Tally, comparisons: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+) -> dict[str, Any] | None:
+    rows = []
+    generations = 0
+    for condition in conditions:
+        name = condition["name"]
+        share = plateaus(tally, name)
+        if share is None:
+            continue
+        generations = max(generations, tally.generation_bests(name, tally.measure).shape[1])
+        values = tally.run_bests(name, tally.measure)
+        rows.append(
+            {
+                "condition": name,
+                "n": share.n,
+                "mean": f"{values.mean():.3f}",
+                "interval": span(mean_interval(values)),
+                "plateaus": _percent(share),
+                "plateaus_interval": _percent_span(share),
+            }
+        )
+    if not rows:
+        return None
+    k = plateau_length(generations)
+    has_random = any(settings_of(each).get("selection") == "random" for each in conditions)
+    return {
+        "rows": rows,
+        "k": k,
+        "generations": generations,
+        "without_learning": f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
+        "sentences": _selection_sentences(comparisons, conditions),
+        "inputs_differ": _inputs_differ(conditions),
+    }
+
+
+def _inputs_differ(conditions: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether networks have one input more with novelty, so that two things change at once."""
+    return any(
+        settings_of(each).get("task", {}).get("bias_input") == "with-novelty"
+        and settings_of(each).get("selection") == "novelty"
+        for group in same_but_for("selection", conditions)
+        for each in group
+    )
+
+
+def _selection_sentences(
+    comparisons: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+) -> list[str]:
+    """For each group of conditions that differ in selection alone: who is above whom, and by how much."""
+    found = []
+    by_names = {(each.one, each.other): each for each in comparisons}
+    for group in same_but_for("selection", conditions):
+        names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
+        parts = []
+        for one, other in (("coverage", "random"), ("novelty", "coverage"), ("novelty", "random")):
+            if one in names and other in names:
+                parts.append(_apart(by_names, names, one, other))
+        if parts:
+            noise = settings_of(group[0]).get("noise")
+            level = f"{100 * noise:g} % noise" if isinstance(noise, int | float) else "this noise"
+            found.append(f"At {level}: {'; '.join(parts)}.")
+    return found
+
+
+def _apart(
+    by_names: Mapping[tuple[str, str], Comparison], names: Mapping[str, str], one: str, other: str
+) -> str:
+    pair = names[one], names[other]
+    turned = pair not in by_names
+    comparison = by_names.get((pair[1], pair[0]) if turned else pair)
+    words = _SELECTIONS[one], _SELECTIONS[other]
+    if comparison is None:
+        return f"{words[0]} and {words[1]} not compared"
+    difference = -comparison.difference if turned else comparison.difference
+    interval = comparison.difference_interval
+    if interval is not None and turned:
+        interval = Interval(-interval.high, -interval.low, interval.method)
+    within = f" ({span(interval, signs=True)})" if interval else ""
+    if comparison.is_shown:
+        where = "above" if difference > 0 else "below"
+        return f"{words[0]} {where} {words[1]} by {abs(difference):.3f}{within}"
+    why = "not shown to differ" if comparison.can_claim else "too few runs for a claim"
+    return f"{words[0]} less {words[1]} {signed(difference)}{within}, {why}"
+
+
+def _percent(share: Share) -> str:
+    return f"{100 * share.value:.0f} %"
+
+
+def _percent_span(share: Share) -> str:
+    low, high = share.interval
+    return f"{100 * low:.0f}–{100 * high:.0f} %"
+
+
+# --- champions ----------------------------------------------------------------------------------------------
+
+
+def _champions(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    found = retry_tally(tally)
+    references = _references("noise", conditions)
+    by_name = {each.condition: each for each in found}
+    problems = {each.problem for each in found if each.problem}
+    return {
+        "rows": [
+            _champion_row(each, by_name.get(references.get(each.condition, "")))
+            for each in found
+            if not each.problem
+        ],
+        "has_reference": bool(references),
+        "sentences": _noise_sentences(by_name, conditions),
+        "problem": None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
+        "missing": [each.condition for each in found if each.problem],
+        "fresh_trials": FRESH_TRIALS,
+        "most": MOST_RUNS,
+        "trials_a_run": _trials_a_run(tally),
+    }
+
+
+def _noise_sentences(by_name: Mapping[str, Champions], conditions: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What more noise seems to do to the reported best, and what it does on fresh noise."""
+    found = []
+    for group in same_but_for("noise", conditions):
+        # settings that could be used for trials have a number here
+        usable = [each for each in group if not by_name[each["name"]].problem]
+        if len(usable) < 2:
+            continue
+        ends = sorted(usable, key=lambda each: float(settings_of(each)["noise"]))
+        low, high = (by_name[each["name"]] for each in (ends[0], ends[-1]))
+        changes = []
+        for one, other in ((high.reported, low.reported), (high.expected, low.expected)):
+            interval = bca_interval(difference_of_means, one, other, paired=False)
+            within = f" ({span(interval, signs=True)})" if interval else ""
+            changes.append(f"{signed(float(one.mean() - other.mean()))}{within}")
+        found.append(
+            f"{high.condition} less {low.condition}: {changes[0]} as reported, {changes[1]} on fresh noise "
+            f"(n = {high.n:,} and {low.n:,})."
+        )
+    return found
+
+
+def _trials_a_run(tally: Tally) -> str:
+    counts = sorted(set(tally.best.group_by("condition", "replicate").agg(pl.col("trials").sum())["trials"]))
+    return f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
+
+
+def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """For each condition the first one of those that differ in `key` alone; the first itself is left out."""
+    return {
+        str(each["name"]): str(group[0]["name"])
+        for group in same_but_for(key, conditions)
+        for each in group[1:]
+    }
+
+
+def _champion_row(champions: Champions, reference: Champions | None) -> dict[str, str]:
+    difference = "–"
+    if reference is not None and not reference.problem:
+        n = min(champions.n, reference.n)
+        one, other = champions.expected[:n], reference.expected[:n]
+        interval = bca_interval(difference_of_means, one, other, paired=False)
+        within = f" ({span(interval, signs=True)})" if interval else ""
+        difference = f"{signed(float(one.mean() - other.mean()))}{within}"
+    return {
+        "condition": champions.condition,
+        "n": f"{champions.n:,}",
+        "reported": f"{champions.reported.mean():.3f}",
+        "expected": f"{champions.expected.mean():.3f}",
+        "expected_interval": span(champions.expected_interval),
+        "luck": signed(champions.luck),
+        "luck_interval": span(champions.luck_interval, signs=True),
+        "reference": difference,
+    }
+
+
+# --- spread -------------------------------------------------------------------------------------------------
+
+
+def _spread(tally: Tally) -> dict[str, Any]:
+    rows = []
+    for each in spreads(tally):
+        compared = each.reference != each.condition
+        rows.append(
+            {
+                "condition": each.condition,
+                "n": f"{each.n:,}",
+                "deviation": _number(each.deviation),
+                "robust": _number(each.robust),
+                "reference": each.reference if compared else "",
+                "ratio": _number(each.ratio, 2) if compared else "",
+                "ratio_interval": span(each.ratio_interval, 2) if compared else "",
+                "robust_ratio": _number(each.robust_ratio, 2) if compared else "",
+                "robust_interval": span(each.robust_interval, 2) if compared else "",
+            }
+        )
+    return {"rows": rows, "has_ratio": any(row["reference"] for row in rows)}
+
+
+def _number(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+# --- variety ------------------------------------------------------------------------------------------------
+
+
+def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    found = [each for each in tally_variety(tally) if each.n]
+    if not found:
+        return None
+    by_name = {each.condition: each for each in found}
+    objective: dict[str, str] = {}
+    for group in same_but_for("selection", conditions):
+        names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
+        if "coverage" in names:
+            objective |= {name: names["coverage"] for name in names.values() if name != names["coverage"]}
+    return {
+        "rows": [_variety_row(each, by_name.get(objective.get(each.condition, ""))) for each in found],
+        "has_objective": bool(objective),
+        "most_runs": MOST_RUNS,
+        "most_behaviors": MOST_BEHAVIORS,
+        "n_behaviors": max(each.n_behaviors for each in found),
+    }
+
+
+def _variety_row(variety: Variety, objective: Variety | None) -> dict[str, str]:
+    row = {"condition": variety.condition, "n": f"{variety.n:,}"}
+    for name, digits, own, other in (
+        ("sorted", 1, variety.sorted_cells, None if objective is None else objective.sorted_cells),
+        ("jaccard", 3, variety.jaccard, None if objective is None else objective.jaccard),
+    ):
+        row[name] = f"{own.mean():.{digits}f}"
+        row[f"{name}_interval"] = span(mean_interval(own), digits)
+        row[f"{name}_less"] = "" if other is None else _difference(own, other, digits)
+    return row
+
+
+def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], digits: int) -> str:
+    interval = bca_interval(difference_of_means, one, other, paired=False)
+    within = f" ({span(interval, digits, signs=True)})" if interval else ""
+    return f"{signed(float(one.mean() - other.mean()), digits)}{within}"
+
+
+# --- chance -------------------------------------------------------------------------------------------------
+
+
+def _chance(tally: Tally) -> dict[str, Any] | None:
+    few, more = chances(tally, 3), chances(tally, 100)
+    if not few:
+        return None
+    rows = []
+    for three, hundred in zip(few, more, strict=True):
+        for k, condition in enumerate(three.conditions):
+            rows.append(
+                {
+                    "condition": condition,
+                    "n": f"{len(tally.replicates(condition)):,}",
+                    "mean": f"{tally.run_bests(condition, tally.measure).mean():.3f}",
+                    "best": f"{100 * three.best[k]:.0f} %",
+                    "equal": f"{100 * three.best_if_equal:.0f} %",
+                    "hundred": f"{100 * hundred.best[k]:.0f} %",
+                }
+            )
+    return {"rows": rows, "sentence": _chance_sentence(tally), "n_groups": len(few)}
+
+
+def _chance_sentence(tally: Tally) -> str | None:
+    """How often 50 % comes out best of three levels, for objective and novelty search together."""
+    by_selection = {}
+    for each in chances(tally, 3):
+        settings = [settings_of(tally.condition(name)) for name in each.conditions]
+        middle = [k for k, part in enumerate(settings) if part.get("noise") == 0.5]
+        if middle:
+            by_selection[settings[0].get("selection")] = (each.best[middle[0]], each.best_if_equal)
+    if not {"coverage", "novelty"} <= set(by_selection):
+        return None
+    (objective, equal), (novelty, _) = by_selection["coverage"], by_selection["novelty"]
+    return (
+        f"“50 % noise is best” comes out of three runs a level in {100 * objective:.0f} % of studies of objective "
+        f"search and {100 * novelty:.0f} % of those of novelty search, and in both at once in "
+        f"{100 * objective * novelty:.0f} %. If noise made no difference at all it would be "
+        f"{100 * equal:.0f} % each, and both would agree on some level in {100 * equal:.0f} % of studies."
+    )

@@ -1,0 +1,348 @@
+"""One trial: its path, what the sensors read and what the network answered, as a figure or in motion."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from realitygap.drawing import Ink
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    Drawing,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._formats import write_whole
+from realitygap.report._path_figure import (
+    TracedPath,
+    arena_extent,
+    body_outline,
+    draw_arena,
+    draw_path,
+    no_such_run,
+    typical_replicate,
+)
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.runs import Condition, replay
+from realitygap.trials import Trajectory
+from realitygap.world import Pose
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH = 9.6
+"""Of the figure [in]."""
+
+_READINGS = ((Ink.PEN1, "solid"), (Ink.PEN0, (0, (5, 1.5))), (Ink.PEN2, (0, (1.3, 1.5))))
+_MOST_FRAMES = 300
+"""Of an animation; a longer trial shows every second step, or every third, and so on."""
+
+_DOTS = 80
+"""Of an animation, per inch."""
+
+
+@dataclass(frozen=True)
+class ChosenTrial:
+    """A row of results with what belongs to it.
+
+    Attributes:
+        condition: as resolved.
+        label: SIM, TWIN, EMULATED or REAL.
+        row: the row.
+        measure: the column of coverage that figures show.
+    """
+
+    condition: Condition
+    label: str
+    row: dict[str, Any]
+    measure: str
+
+    @property
+    def title(self) -> str:
+        """Which trial it is."""
+        row = self.row
+        return (
+            f"{row['condition']}, run {row['replicate']}, generation {row['generation']}, "
+            f"individual {row['individual']}"
+        )
+
+
+def choose_trial(
+    tally: Tally,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    *,
+    of_last: bool = False,
+) -> ChosenTrial:
+    """A trial by its numbers; of what is not given, the first condition, the typical run, its best trial.
+
+    Args:
+        tally: the study.
+        condition: of which.
+        replicate: which run.
+        generation: of the run; not given, the one with the run's best trial.
+        individual: of the generation.
+        of_last: take the best of the last generation where no generation is given.
+
+    Raises:
+        ValueError: there is none such; the message says which there are.
+    """
+    name = condition or str(tally.runs["condition"][0])
+    described = tally.condition(name)
+    replicate = typical_replicate(tally, name) if replicate is None else replicate
+    rows = tally.folder.read(name, [replicate])
+    if rows.is_empty():
+        raise ValueError(no_such_run(tally, name, replicate))
+    if individual is not None and generation is None:
+        raise ValueError(f"Individual {individual} of which generation? Name it too.")
+    last = int(rows["generation"].max())  # type: ignore[arg-type]
+    if generation is None and of_last:
+        generation = last
+    if generation is not None:
+        if not 0 <= generation <= last:
+            raise ValueError(
+                f"Run {replicate} of {name!r} has no generation {generation}: its generations are 0 to {last}."
+            )
+        rows = rows.filter(pl.col("generation") == generation)
+    if individual is not None:
+        if not 0 <= individual < rows.height:
+            raise ValueError(
+                f"Generation {generation} has no individual {individual}: its individuals are 0 to {rows.height - 1}."
+            )
+        rows = rows.filter(pl.col("individual") == individual)
+    measure = f"coverage_{tally.measure}"
+    row = rows.row(int(rows[measure].arg_max() or 0), named=True)
+    resolved = Condition.from_settings(name, dict(settings_of(described)))
+    return ChosenTrial(resolved, label_of(described), row, measure)
+
+
+def draw_trial(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+) -> Drawing:
+    """One trial, recomputed from its row: path, readings and commands.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        condition: of which; the first one when not given.
+        replicate: which run; the typical one when not given, as in `draw_paths`.
+        generation: of the run; that of its best trial when not given.
+        individual: of the generation; the one of highest coverage when not given.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the trial comes out
+            otherwise than recorded.
+        ValueError: there is no such trial.
+    """
+    return draw_chosen_trial(choose_trial(read_tally(folder), condition, replicate, generation, individual))
+
+
+def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
+    """As `draw_trial`, of a trial chosen already; `name` is what the ids in the drawing begin with."""
+    trajectory = replay(trial.condition, trial.row)
+    coverage = trial.row[trial.measure]
+    counted = "along the line driven" if trial.measure == "coverage_line" else "at the ends of steps"
+    n_steps, n_stalls = len(trajectory.commands), int(trajectory.stalled.sum())
+    caption = (
+        f"{trial.title}: {n_steps} steps of {trajectory.step_s:g} s, {n_stalls} of them blocked (×; gray stripes), "
+        f"coverage {coverage:.3f} {counted}. Dot: start; circle: end; shaded: cells visited. Readings are distances "
+        "without noise; obstacle is what the network saw, 1 being nearest, with noise. "
+        f"{trial.label}, n = 1 trial, no interval. Recomputed from the records."
+    )
+    alt = f"Path, readings and commands of one trial. {caption}"
+    with house_style():
+        figure = _draw(trial, trajectory)
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+
+
+def animate_trial(trial: ChosenTrial, path: str | Path) -> Path:
+    """Write a trial in motion as a GIF that lasts as long as the trial did, unless it has very many steps.
+
+    Args:
+        trial: which.
+        path: ends in .gif; a file that is there gives way once the new one is complete.
+
+    Returns:
+        The path.
+
+    Raises:
+        RecordError: the trial comes out otherwise than recorded, or the file cannot be written.
+    """
+    trajectory = replay(trial.condition, trial.row)
+    stride = math.ceil(len(trajectory.commands) / _MOST_FRAMES)
+    with house_style():
+        frames = _frames(trial, trajectory, stride)
+    buffer = io.BytesIO()
+    palette = frames[-1].quantize(64)
+    first, *others = [frame.quantize(palette=palette, dither=0) for frame in frames]
+    each = round(1000 * trajectory.step_s * stride)
+    first.save(
+        buffer,
+        format="GIF",
+        save_all=True,
+        append_images=others,
+        duration=[each] * (len(frames) - 1) + [max(1500, each)],
+        loop=0,
+        comment=f"realitygap: {trial.label}, {trial.title}",
+    )
+    write_whole(Path(path), buffer.getvalue())
+    return Path(path)
+
+
+# --- drawing ------------------------------------------------------------------------------------------------
+
+
+def _traced(trial: ChosenTrial, trajectory: Trajectory) -> TracedPath:
+    row = trial.row
+    return TracedPath(
+        row["generation"],
+        row["individual"],
+        row[trial.measure],
+        tuple(row["cells"]),
+        trajectory.poses,
+        trajectory.stalled,
+    )
+
+
+def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
+    arena = trial.condition.arena.arena()
+    x_range, y_range = arena_extent(arena)
+    across = 0.56 * _WIDTH
+    up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
+    head = 0.36
+    figure = new_figure(_WIDTH, up + head + 0.42)
+    field = place_axes(figure, 0.05, head, across, up)
+    draw_arena(field, arena, x_range, y_range)
+    draw_path(field, _traced(trial, trajectory), arena, trial.condition.jyro.body)
+    _head(field, trial)
+    left, gap = across + 0.65, 0.24
+    height = (up - 2 * gap) / 3
+    width = _WIDTH - left - 0.72
+    axes = [place_axes(figure, left, head + k * (height + gap), width, height) for k in range(3)]
+    times = trajectory.step_s * np.arange(len(trajectory.poses))
+    n_sensors = trajectory.readings.shape[1]
+    names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
+    _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
+    axes[0].set_ylim(0, 1.08 * trial.condition.jyro.sensors.max_range)
+    _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, ["obstacle"], "input")
+    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.task.output_names, "command")
+    axes[2].set_ylim(-1.1, 1.1)
+    for each in axes:
+        each.set_xlim(0, times[-1])
+        _stripes(each, times, trajectory)
+        if each is not axes[-1]:
+            each.set_xticklabels([])
+    axes[-1].set_xlabel("time [s]", labelpad=2)
+    return figure
+
+
+def _head(axes: Axes, trial: ChosenTrial) -> None:
+    for x, text, align, weight, color in (
+        (0.0, shorten(trial.title, 60), "left", "bold", Ink.TEXT),
+        (1.0, f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}", "right", "normal", Ink.MUTED),
+    ):  # fmt: skip
+        axes.annotate(
+            text,
+            (x, 1.0),
+            (0, 5),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=8.0,
+            weight=weight,
+            color=color,
+            annotation_clip=False,
+        )
+
+
+def _lines(axes: Axes, times: Any, rows: Any, names: Any, unit: str) -> None:
+    for (color, dashes), values, name in zip(_READINGS, rows, names, strict=False):
+        axes.plot(times, values, color=color, linestyle=dashes, linewidth=1.1, label=name, clip_on=False)
+    axes.set_ylabel(unit)
+    axes.legend(
+        loc="center left",
+        bbox_to_anchor=(1.01, 0.5),
+        frameon=False,
+        fontsize=7.0,
+        handlelength=1.6,
+        borderaxespad=0.0,
+        handletextpad=0.4,
+    )
+
+
+def _stripes(axes: Axes, times: Any, trajectory: Trajectory) -> None:
+    """The steps in which the robot was blocked."""
+    step = trajectory.step_s
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], trajectory.stalled.astype(np.int8), [0]])))
+    for start, end in edges.reshape(-1, 2):
+        axes.axvspan(times[start] - step, times[end - 1], color=Ink.RULE, alpha=0.6, linewidth=0, zorder=0)
+
+
+def _frames(trial: ChosenTrial, trajectory: Trajectory, stride: int) -> list[Any]:
+    """One picture a step: what stands still is drawn once, what moves over it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    arena = trial.condition.arena.arena()
+    body, sensors = trial.condition.jyro.body, trial.condition.jyro.sensors
+    x_range, y_range = arena_extent(arena)
+    width, head = 8.0, 0.3
+    up = (width - 0.1) * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
+    figure = new_figure(width, up + head + 0.05)
+    figure.set_facecolor(Ink.GROUND)
+    figure.set_dpi(_DOTS)
+    axes = place_axes(figure, 0.05, head, width - 0.1, up)
+    draw_arena(axes, arena, x_range, y_range)
+    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=4.0, zorder=7)
+    _head(axes, trial)
+    canvas: Any = FigureCanvasAgg(figure)  # parts of it carry no types
+    canvas.draw()
+    ground = canvas.copy_from_bbox(figure.bbox)
+    rays = [
+        axes.plot([], [], color=Ink.PUBLISHED, linewidth=1.2, linestyle=(0, (3, 1.5)), animated=True)[0]
+        for _ in sensors.mounts
+    ]
+    (line,) = axes.plot([], [], color=Ink.OURS, linewidth=2.0, animated=True)
+    (outline,) = axes.plot([], [], linewidth=1.8, animated=True)
+    clock = axes.text(0.5, 1.006, "", transform=axes.transAxes, ha="center", va="bottom", animated=True)
+    frames = []
+    last = len(trajectory.poses) - 1
+    for step in sorted({*range(0, last + 1, stride), last}):
+        x, y, heading = (float(value) for value in trajectory.poses[step])
+        stalled = bool(trajectory.stalled[step])
+        placed = body_outline(body, Pose(x, y, heading))
+        outline.set_data(placed[:, 0], placed[:, 1])
+        outline.set_color(Ink.REACH if stalled else Ink.TEXT)
+        outline.set_linestyle((0, (2, 1)) if stalled else "solid")
+        line.set_data(trajectory.poses[: step + 1, 0], trajectory.poses[: step + 1, 1])
+        for ray, (forward, left, direction), reading in zip(
+            rays, sensors.mounts, trajectory.readings[step], strict=True
+        ):
+            sine, cosine = math.sin(heading), math.cos(heading)
+            from_x, from_y = x + forward * cosine - left * sine, y + forward * sine + left * cosine
+            angle = heading + direction
+            ray.set_data(
+                [from_x, from_x + reading * math.cos(angle)], [from_y, from_y + reading * math.sin(angle)]
+            )
+        clock.set_text(f"{step * trajectory.step_s:.1f} s" + (", blocked" if stalled else ""))
+        canvas.restore_region(ground)
+        for artist in (*rays, line, outline, clock):
+            axes.draw_artist(artist)
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()))
+    return frames

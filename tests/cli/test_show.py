@@ -1,0 +1,131 @@
+"""`realitygap show` as a user meets it."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.errors import RealityGapError
+from realitygap.study import parse_study, run_study
+
+STUDY = """
+[study]
+name = "tiny"
+title = "Tiny"
+replicates = 3
+[neat]
+settings = "rosenzweig-remy"
+population = 4
+generations = 2
+[platform.jyro]
+steps = 20
+[[condition]]
+name = "coverage-50"
+noise = 0.5
+[[condition]]
+name = "novelty-50"
+selection = "novelty"
+noise = 0.5
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return str(run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder.path)
+
+
+def show(*words):
+    """What the command prints; its errors as they reach `main`, which prints them as one message."""
+    done = CliRunner().invoke(app, ["show", *map(str, words)])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.mark.parametrize("ending", ["svg", "pdf", "png"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["DIR", "--condition", "coverage-50", "--replicate", "2"],
+        ["DIR", "--condition", "novelty-50", "--generation", "1"],
+        ["DIR", "--replicate", "0", "--generation", "1", "--individual", "3"],
+        ["network", "DIR", "--condition", "novelty-50"],
+        ["species", "DIR"],
+        ["arena"],
+        ["arena", "paper"],
+        ["robot", "jyro"],
+    ],
+    ids=" ".join,
+)
+def test_everything_is_shown_in_every_format(results, tmp_path, words, ending):
+    path = tmp_path / f"picture.{ending}"
+    words = [results if word == "DIR" else word for word in words]
+    assert show(*words, "-o", path) == f"Written: {path}\n"
+    if ending == "png":
+        with Image.open(path) as image:
+            assert image.format == "PNG"
+            assert image.size[0] >= 1000
+    elif ending == "pdf":
+        assert path.read_bytes().startswith(b"%PDF-")
+    else:
+        root = ET.parse(path).getroot()
+        assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
+        ids = [each.get("id") for each in root.iter() if each.get("id")]
+        assert len(set(ids)) == len(ids)
+        if words[0] not in ("arena", "robot"):
+            assert "SIM" in "".join(root.itertext())
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_trial_moves_for_as_long_as_it_lasted(results, tmp_path):
+    path = tmp_path / "trial.gif"
+    words = ["--condition", "novelty-50", "--replicate", "1", "--generation", "1", "--individual", "2"]
+    show(results, *words, "-o", path)
+    with Image.open(path) as image:
+        assert image.format == "GIF"
+        assert image.n_frames == 21, "the start and 20 steps"
+        assert image.size == (640, 395)
+        assert image.info["duration"] == 100
+        assert image.info["comment"].endswith(b"novelty-50, run 1, generation 1, individual 2")
+
+
+def test_a_file_that_is_there_gives_way(results, tmp_path):
+    path = tmp_path / "run.svg"
+    path.write_text("old")
+    show(results, "-o", path)
+    assert path.read_text().startswith("<svg")
+    assert [each.name for each in tmp_path.iterdir()] == ["run.svg"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["DIR", "--condition", "coverage-5O", "-o", "a.svg"], "Did you mean 'coverage-50'?"),
+        (["DIR", "--replicate", "99", "-o", "a.svg"], "its runs are 0 to 2"),
+        (["DIR", "--replicate", "-1", "-o", "a.gif"], "its runs are 0 to 2"),
+        (["DIR", "--generation", "9", "-o", "a.svg"], "its generations are 0 to 1"),
+        (["DIR", "--individual", "1", "-o", "a.svg"], "of which generation?"),
+        (["DIR", "--generation", "1", "--individual", "4", "-o", "a.svg"], "its individuals are 0 to 3"),
+        (["DIR", "-o", "a.jpg"], "expected .gif, .pdf, .png or .svg"),
+        (["DIR", "-o", "a"], "ends in nothing"),
+        (["DIR"], "Name a file with -o"),
+        (["network", "DIR", "-o", "a.gif"], "Only one trial can move"),
+        (["species", "DIR", "--generation", "1", "-o", "a.svg"], "over all generations"),
+        (["network", "-o", "a.svg"], "Of which results?"),
+        (["netwrk", "DIR", "-o", "a.svg"], "Expected network, species, arena or robot first"),
+        (["arena", "papr", "-o", "a.svg"], "Did you mean 'paper'?"),
+        (["robot", "r2d2", "-o", "a.svg"], "Known: jyro."),
+        (["arena", "--condition", "x", "-o", "a.svg"], "Of no meaning for arena: --condition"),
+        (["nowhere", "-o", "a.svg"], "nowhere does not exist"),
+        (["DIR", "-o", "no/where/a.svg"], "Could not write no/where/a.svg"),
+    ],
+)
+def test_mistakes_are_one_message_and_leave_no_file(results, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RealityGapError) as caught:
+        show(*(results if word == "DIR" else word for word in words))
+    assert message in str(caught.value)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realitygap.errors import TableError
+from realitygap.report import audit_notes, audit_results
+from realitygap.report._audit import doubt
+from realitygap.report._paper_audit import TABLE_2, audit_paper, largest_of_uniform, steps_for, table_2
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "table-2.csv"
+
+
+def write(path: Path, *lines: str, header: str = "condition,run,value") -> Path:
+    path.write_text("\n".join([header, *lines]) + "\n", "utf-8")
+    return path
+
+
+def rows(**conditions) -> list[str]:
+    return [f"{name},{k},{value}" for name, values in conditions.items() for k, value in enumerate(values)]
+
+
+@pytest.fixture(scope="module")
+def audit():
+    return audit_results(EXAMPLE, denominator=72)
+
+
+def test_example_is_the_papers_table():
+    lines = [line.rsplit(",", 2) for line in EXAMPLE.read_text("utf-8").splitlines()[1:]]
+    assert lines == [[name, str(k), text] for name, texts in TABLE_2.items() for k, text in enumerate(texts)]
+
+
+def test_values_that_cannot_be_are_found(audit):
+    assert [(each.line, each.text, each.problem, each.nearest) for each in audit.doubtful] == [
+        (5, ".154", "impossible", 11),
+        (7, ".166", "cut", 12),
+        (9, ".432", "impossible", 31),
+        (11, ".180", "cut", 13),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (".153", None), ("0.1528", None), (".152", ("cut", 11)), (".154", ("impossible", 11)), ("1", None),
+        ("0", None), (".167", None), (".168", ("impossible", 12)), ("1.2", ("impossible", 72)),
+        ("-0.1", ("impossible", 0)), (".2", None), ("0.348", ("raised", 25)),
+    ],
+)  # fmt: skip
+def test_each_way_of_being_wrong_has_its_word(text, found):
+    assert doubt(text, 72) == found
+
+
+def test_half_way_may_go_either_way():
+    assert doubt("0.12", 8) is None
+    assert doubt("0.13", 8) is None
+
+
+def test_every_share_as_rounded_is_accepted():
+    for n in (7, 40, 72, 99):
+        for digits in (3, 4, 6):
+            assert not any(doubt(f"{k / n:.{digits}f}", n) for k in range(n + 1))
+
+
+def test_three_runs_against_three_show_nothing(audit):
+    assert len(audit.pairs) == 6
+    for pair in audit.pairs:
+        assert pair.smallest_p == pytest.approx(0.1)
+        assert pair.p >= 0.1
+        assert not pair.can_claim
+        assert pair.a12_interval is None
+        assert pair.difference_interval is None
+        assert pair.runs_for_a_claim == 5
+        assert pair.verdict == "no claim possible; 5 runs each at least"
+        assert pair.detectable > 3
+    first = audit.pairs[0]
+    assert (first.one, first.other, first.a12) == ("Physical robot", "10% Noise (Sim)", 1.0)
+    assert (first.p, first.p_holm) == (pytest.approx(0.1), pytest.approx(0.6))
+    assert audit.conditions[0].mean == pytest.approx(0.449)
+    assert {each.median_low for each in audit.conditions} == {None}
+    assert audit.runs_needed["large"] < audit.runs_needed["medium"] < audit.runs_needed["small"]
+
+
+def test_notes_say_what_cannot_be_said(audit):
+    notes = " ".join(audit_notes(audit))
+    assert "4 of 12 values are no k/72" in notes
+    assert "3 runs against 3 give no p below 0.1" in notes
+    assert "From 5 runs each on" in notes
+    assert "no 95 % interval of the median" in notes
+
+
+def test_enough_runs_show_what_is_there(tmp_path):
+    rng = np.random.default_rng(5)
+    low, high = rng.integers(10, 30, 12) / 72, rng.integers(40, 60, 12) / 72
+    audit = audit_results(write(tmp_path / "t.csv", *rows(low=low, high=high)))
+    (pair,) = audit.pairs
+    assert pair.verdict == "high above low"
+    assert pair.difference_interval.high < 0
+    assert pair.a12 == 0
+    assert pair.a12_interval.method == "Newcombe", "no resample differs where all runs are above"
+    assert audit.denominator is None
+    assert audit.doubtful == []
+    assert audit.conditions[0].median_low is not None
+
+
+def test_four_runs_have_newcombes_interval(tmp_path):
+    audit = audit_results(write(tmp_path / "t.csv", *rows(a=[1, 2, 3, 4], b=[5, 6, 7, 8])))
+    (pair,) = audit.pairs
+    assert pair.p == pytest.approx(2 / 70)
+    assert pair.a12_interval.method == "Newcombe"
+    assert pair.a12_interval.high < 0.5
+    assert pair.verdict == "b above a"
+
+
+def test_order_of_columns_other_columns_and_spaces_do_not_matter(tmp_path):
+    plain = audit_results(EXAMPLE)
+    lines = [f"  {run} , {value},note, {name}" for name, run, value in
+             (line.rsplit(",", 2) for line in EXAMPLE.read_text("utf-8").splitlines()[1:])]  # fmt: skip
+    path = tmp_path / "t.csv"
+    path.write_bytes(("﻿Run,Value,Note,Condition\r\n" + "\r\n".join(lines) + "\r\n\r\n").encode())
+    assert audit_results(path) == plain
+
+
+@pytest.mark.parametrize(
+    ("header", "lines", "texts"),
+    [
+        ("condition,value", ["a,1"], ["no column run", "'condition', 'value'"]),
+        ("a,b", ["1,2"], ["no column condition and no column run and no column value"]),
+        ("condition,run,value", [], ["no line below"]),
+        ("condition,run,value", ["a,0,1", "a,1,2"], ["one condition only ('a')"]),
+        ("condition,run,value", ["a,0,x", "a,1,nan", "b,0,", "b,1,1_0", "b,2,inf"],
+         ["line 2: the value 'x'", "line 3: the value 'nan'", "line 4: no value", "line 5", "line 6"]),
+        ("condition,run,value", ["a,0,1", "a,0,2", "b,0,3"], ["line 3", "has run '0' already, in line 2"]),
+        ("condition,run,value", [",0,1", "a,,1"], ["line 2: no condition", "line 3: no run"]),
+        ("condition,run,value,value", ["a,0,1,1"], ["two columns 'value'"]),
+    ],
+)  # fmt: skip
+def test_wrong_input_gets_one_message_with_everything(tmp_path, header, lines, texts):
+    path = write(tmp_path / "t.csv", *lines, header=header)
+    with pytest.raises(TableError) as error:
+        audit_results(path)
+    assert str(path) in str(error.value)
+    for text in texts:
+        assert text in str(error.value)
+
+
+def test_many_mistakes_are_counted(tmp_path):
+    with pytest.raises(TableError, match="and 10 more"):
+        audit_results(write(tmp_path / "t.csv", *rows(a=["x"] * 30)))
+
+
+def test_files_that_are_no_tables(tmp_path):
+    for name, content, text in (("e", b"", "is empty"), ("b", b"\xff\xfe\x00", "not a text file")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(TableError, match=text):
+            audit_results(tmp_path / name)
+    with pytest.raises(TableError, match="cannot be read"):
+        audit_results(tmp_path / "nowhere.csv")
+    with pytest.raises(ValueError, match="denominator is 0"):
+        audit_results(EXAMPLE, denominator=0)
+
+
+# --- the paper ----------------------------------------------------------------------------------------------
+
+
+def test_70_steps_and_the_count_that_gives_87():
+    found = audit_paper()[0]
+    assert "69.8: 70 steps" in found.found
+    assert "4 moves long" in found.found
+    assert "15.75" in found.found
+    assert "= 87.3" in found.found
+    from fractions import Fraction
+
+    assert round(steps_for(Fraction("13.75"), Fraction("19.7"))) == 70
+
+
+def test_every_point_of_the_audit_is_there():
+    text = " ".join(f"{each.section} {each.printed} {each.found} {each.bearing}" for each in audit_paper())
+    for part in (
+        "0.5 m = 19.69 in", "7.87 in", ".154 (11/72 = .1528)", ".432 (31/72 = .4306)", ".166 (12/72 = .1667)",
+        ".180 (13/72 = .1806)", "is 1/2 on average", "+0.05, +0.25, +0.40", "below 0.10", "corrected 0.60",
+        "Table 2.1", "Table 3.2", "Leyden", "Jakobi", "Two gaps", "bias input",
+    ):  # fmt: skip
+        assert part in text
+
+
+def test_largest_of_three_uniform_numbers_is_a_half_on_average():
+    assert largest_of_uniform(1) == 0
+    assert float(largest_of_uniform(3)) == 0.5
+    # 200,000 draws with a standard deviation of 0.39: off by more than 0.005 less than once in a million times
+    drawn = np.random.default_rng(3).uniform(-1, 1, (200_000, 3)).max(axis=1).mean()
+    assert drawn == pytest.approx(0.5, abs=0.005)
+
+
+def test_the_offset_is_that_of_the_simulated_sensors():
+    from realitygap.kernels._philox import make_stream
+    from realitygap.kernels._trial import largest_noisy_reading
+
+    readings = np.full(3, 0.1)
+    stream = make_stream(np.uint64(1), 0, 0, 0, 0, 1)
+    values = [largest_noisy_reading(readings, 0.2, 0.8, False, stream, step) for step in range(20_000)]
+    # 20,000 steps with a standard deviation of 0.31: off by more than 0.011 less than once in a million times
+    assert np.mean(values) - 0.5 == pytest.approx(0.8 * 0.5, abs=0.011)
+
+
+def test_table_2_as_numbers():
+    assert table_2()["Physical robot"].tolist() == [0.431, 0.583, 0.333]

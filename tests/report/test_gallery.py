@@ -1,0 +1,306 @@
+"""The figures that show a study: arena, all individuals, better ones, networks, species; and their export."""
+
+from __future__ import annotations
+
+import csv
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import polars as pl
+import pytest
+
+from realitygap.drawing import Disc, Line, Text
+from realitygap.errors import RecordError
+from realitygap.evolution import network_picture
+from realitygap.report import (
+    NARROW,
+    draw_arena_and_robot,
+    draw_better_individuals,
+    draw_individuals,
+    draw_networks,
+    draw_species,
+    draw_trial,
+    save_drawing,
+    write_report,
+)
+from realitygap.report._drawing import inline
+from realitygap.report._export import tables_of
+from realitygap.report._individuals_figure import _PENS, _moved_apart
+from realitygap.report._species_figure import count_species
+from realitygap.report._structures import _canonical, count_structures, structures_frame
+from realitygap.report._tally import read_tally
+from realitygap.robots import JyroPlatform
+from realitygap.runs import Condition, genome_of, replay
+from realitygap.world import arena_picture, paper_arena
+from tests.report.results import describe, random_runs, write_results
+
+ALL = [
+    draw_arena_and_robot,
+    draw_individuals,
+    draw_better_individuals,
+    draw_networks,
+    draw_species,
+    draw_trial,
+]
+
+
+def texts(svg: str) -> list[str]:
+    return ["".join(each.itertext()) for each in ET.fromstring(svg).iter() if each.tag.endswith("text")]
+
+
+def resolved(study, name: str) -> Condition:
+    described = next(each for each in study.description["conditions"] if each["name"] == name)
+    return Condition.from_settings(name, described["settings"])
+
+
+@pytest.mark.parametrize("draw", ALL)
+def test_every_figure_says_label_n_and_interval(tiny_study, draw):
+    drawing = draw(tiny_study)
+    assert "SIM" in drawing.caption
+    assert re.search(r"\bn (=|and)", drawing.caption)
+    assert "interval" in drawing.caption
+    assert len(drawing.alt) > 40
+
+
+@pytest.mark.parametrize("draw", ALL)
+def test_figures_are_sound_alone_and_on_a_page(tiny_study, draw):
+    drawing = draw(tiny_study)
+    root = ET.fromstring(drawing.svg)
+    ids = [each.get("id") for each in root.iter() if each.get("id")]
+    assert len(set(ids)) == len(ids)
+    page = inline(drawing.svg)
+    assert not re.findall(r"(?:fill|stroke): #\w+", page), "all colors are variables, for light and dark"
+    assert draw(tiny_study).svg == drawing.svg
+
+
+@pytest.mark.parametrize("draw", ALL[:-1])
+def test_narrow_figures_are_others(tiny_study, draw):
+    assert draw(tiny_study, width=NARROW).svg != draw(tiny_study).svg
+
+
+def test_all_individuals_of_all_generations_are_drawn(tiny_study):
+    drawing = draw_individuals(tiny_study, "novelty", 2)
+    drawn = texts(drawing.svg)
+    for individual in range(8):
+        assert drawn.count(str(individual)) == 3, "its number stands in each of three generations"
+        assert f"individual {individual}" in drawn
+    assert "all 8 individuals of every generation" in drawing.caption
+    for color, _ in _PENS:
+        assert f"stroke: {color}" in drawing.svg
+
+
+def test_each_pen_has_dashes_of_its_own():
+    assert len({dashes for _, dashes in _PENS}) == len({color for color, _ in _PENS}) == 8
+
+
+def test_best_of_each_generation_is_named(tiny_study):
+    rows = tiny_study.read("coverage", [1])
+    drawn = texts(draw_individuals(tiny_study, "coverage", 1).svg)
+    for generation in range(3):
+        best = rows.filter(pl.col("generation") == generation)["coverage_line"]
+        assert f"SIM, best: {best.arg_max()}, coverage {best.max():.3f}" in drawn
+
+
+def test_ends_that_coincide_are_moved_apart():
+    ends = np.zeros((8, 2))
+    places = _moved_apart(ends, 0.1)
+    distances = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))[~np.eye(8, dtype=bool)]
+    assert distances.min() > 0.085
+    apart = np.array([[0.0, 0.0], [1.0, 0.0]])
+    assert np.abs(_moved_apart(apart, 0.1) - apart).max() < 0.01
+
+
+def test_better_individuals_are_the_best_with_different_paths(tiny_study):
+    rows = tiny_study.read("novelty", [3]).sort("coverage_line", descending=True, maintain_order=True)
+    best = rows.unique("cells", keep="first", maintain_order=True).head(5)
+    drawn = texts(draw_better_individuals(tiny_study, "novelty", 3).svg)
+    for row in best.iter_rows(named=True):
+        assert f"generation {row['generation']}, individual {row['individual']}" in drawn
+
+
+def test_paths_that_cannot_be_recomputed_are_said_to_be_missing(tiny_study, no_replay):
+    for draw in (draw_individuals, draw_better_individuals):
+        assert "Some paths are missing" in draw(tiny_study).caption
+
+
+def test_unknown_condition_and_run_are_clear_errors(tiny_study):
+    for draw in (draw_individuals, draw_better_individuals, draw_species, draw_trial):
+        with pytest.raises(ValueError, match="Did you mean 'novelty'"):
+            draw(tiny_study, "noveltyy")
+        with pytest.raises(ValueError, match=r"has no run 99 .*its runs are 0 to 6"):
+            draw(tiny_study, "novelty", 99)
+
+
+def test_the_arena_is_drawn_to_scale_with_its_dimensions(tiny_study):
+    drawn = texts(draw_arena_and_robot(tiny_study).svg)
+    for text in (
+        "1.067 m (42 in)",
+        "0.61 m (24 in)",
+        "12 × 6 cells of 0.076 m (3 in)",
+        "0.18 m",
+        "0.16 m",
+        "sees 0.2 m",
+    ):
+        assert text in drawn
+    robot = JyroPlatform()
+    shapes = arena_picture(paper_arena(), robot.body, robot.sensors).shapes
+    lines = [shape.points for shape in shapes if isinstance(shape, Line)]
+    start = paper_arena().start
+    corners = {(round(start.x + x, 6), round(start.y + y, 6)) for x, y in robot.body.corners}
+    assert any({(round(x, 6), round(y, 6)) for x, y in points} == corners for points in lines)
+    rays = [
+        points for points in lines if len(points) == 2 and points[1][0] - points[0][0] == pytest.approx(0.2)
+    ]
+    assert sorted(round(points[0][1] - start.y, 6) for points in rays) == [-0.05, 0.0, 0.05]
+
+
+def test_a_network_has_a_disc_for_each_node_and_a_line_for_each_enabled_gene(tiny_study):
+    condition = resolved(tiny_study, "novelty")
+    rows = tiny_study.read("novelty").sort("nodes", descending=True)
+    for row in rows[[0, 1, 2, rows.height - 1]].iter_rows(named=True):
+        genome = genome_of(condition, row)
+        names = condition.task.input_names("novelty"), condition.task.output_names
+        picture = network_picture(genome, *names)
+        assert sum(isinstance(shape, Disc) for shape in picture.shapes) == len(genome.nodes)
+        weights = [s.text for s in picture.shapes if isinstance(s, Text) and s.text[0] in "+−"]
+        assert len(weights) == genome.n_enabled
+        n_positive = sum(gene.weight >= 0 for gene in genome.connections if gene.enabled)
+        assert sum(text[0] == "+" for text in weights) == n_positive
+        for name in ("obstacle", "stall", "time", "bias", "move", "turn"):
+            assert any(isinstance(s, Text) and s.text == name for s in picture.shapes)
+        fewer = network_picture(genome, *names, show_disabled=False)
+        n_disabled = len(genome.connections) - genome.n_enabled
+        assert len(picture.shapes) - len(fewer.shapes) == n_disabled
+        ET.fromstring(picture.to_svg())
+
+
+def test_names_of_inputs_must_be_as_many_as_inputs(tiny_study):
+    genome = genome_of(resolved(tiny_study, "coverage"), tiny_study.read("coverage", [0]).row(0, named=True))
+    with pytest.raises(ValueError, match="input_names has 2 names, expected 3"):
+        network_picture(genome, ["a", "b"])
+
+
+def test_structures_are_counted_once_each(tiny_study):
+    groups = count_structures(read_tally(tiny_study))
+    assert {group.selection: len(group.inputs) for group in groups} == {"coverage": 3, "novelty": 4}
+    by_selection = {group.selection: group for group in groups}
+    assert by_selection["novelty"].n_networks == 7 * 8
+    assert by_selection["coverage"].n_networks == 3 * 7 * 8
+    for group in groups:
+        assert sum(structure.n for structure in group.found) == group.n_networks
+        assert len({structure.links for structure in group.found}) == len(group.found)
+    assert by_selection["novelty"].found[0].words == "all direct links"
+    frame = structures_frame(groups)
+    assert frame["share"].sum() == pytest.approx(2.0)
+    assert frame.height == sum(len(group.found) for group in groups)
+
+
+def test_structure_does_not_depend_on_the_numbers_of_hidden_nodes():
+    names = {0: "in", 1: "out"}
+    one = _canonical(((0, 7), (7, 1), (0, 9), (9, 7)), names)
+    other = _canonical(((0, 9), (9, 1), (0, 7), (7, 9)), names)
+    assert one == other
+    assert one != _canonical(((0, 7), (7, 1), (0, 9), (9, 1)), names)
+
+
+def test_numbers_of_species_are_those_of_the_rows(tiny_study):
+    counts = count_species(read_tally(tiny_study)).counts
+    rows = tiny_study.read("turn", [4])
+    for generation in range(3):
+        expected = rows.filter(pl.col("generation") == generation)["species"].n_unique()
+        found = counts.filter(
+            pl.col("condition") == "turn", pl.col("replicate") == 4, pl.col("generation") == generation
+        )
+        assert found["species"].to_list() == [expected]
+
+
+def test_a_trial_shows_what_its_row_says(tiny_study):
+    drawing = draw_trial(tiny_study, "novelty", 1, 2, 5)
+    row = tiny_study.read("novelty", [1]).filter(pl.col("generation") == 2, pl.col("individual") == 5)
+    assert f"coverage {row['coverage_line'][0]:.3f}" in drawing.caption
+    assert f"{row['stalls'][0]} of them blocked" in drawing.caption
+    for text in ("left", "middle", "right", "obstacle", "move", "turn", "time [s]"):
+        assert text in texts(drawing.svg)
+    with pytest.raises(ValueError, match="its generations are 0 to 2"):
+        draw_trial(tiny_study, "novelty", 1, 3)
+    with pytest.raises(ValueError, match="its individuals are 0 to 7"):
+        draw_trial(tiny_study, "novelty", 1, 2, 8)
+
+
+def test_notebooks_show_arena_robot_genome_and_trajectory(tiny_study):
+    condition = resolved(tiny_study, "novelty")
+    row = tiny_study.read("novelty", [0]).row(3, named=True)
+    for thing in (paper_arena(), JyroPlatform(), genome_of(condition, row), replay(condition, row)):
+        root = ET.fromstring(thing._repr_svg_())
+        assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
+        assert all("".join(each.itertext()) for each in list(root)[:2])
+
+
+def test_rows_without_networks_have_a_page(out, no_replay):
+    folder = write_results(out, [describe("c")], {"c": random_runs(6)})
+    page = write_report(folder).read_text("utf-8")
+    assert "Figure 5." in page
+
+
+@pytest.mark.parametrize(
+    ("ending", "magic"), [(".svg", b"<svg"), (".pdf", b"%PDF-"), (".png", b"\x89PNG\r\n")]
+)
+def test_a_drawing_is_saved_by_its_ending_and_always_alike(tiny_study, tmp_path, ending, magic):
+    first = save_drawing(draw_species(tiny_study), tmp_path / f"a{ending}").read_bytes()
+    second = save_drawing(draw_species(tiny_study), tmp_path / f"b{ending}").read_bytes()
+    assert first.startswith(magic)
+    assert first == second
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
+    page = write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures").read_text("utf-8")
+    names = {each.name for each in (tmp_path / "figures").iterdir()}
+    for number in ("2", "4", "5", "6a", "6b", "7", "8", "9", "10", "11"):
+        assert {f"figure-{number}.svg", f"figure-{number}.pdf"} <= names
+        root = ET.fromstring((tmp_path / "figures" / f"figure-{number}.svg").read_bytes())
+        assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
+        assert (tmp_path / "figures" / f"figure-{number}.pdf").read_bytes().startswith(b"%PDF-")
+    tables = {f"{name}.csv" for name, _, _ in tables_of(page)}
+    assert tables <= names
+    assert {"table-1.csv", "table-2.csv", "structures.csv", "data-species.csv", "figures.txt"} <= names
+    for name in names - {"figures.txt"}:
+        assert name.rsplit(".", 1)[0] in page
+    with (tmp_path / "figures" / "table-2.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["Condition"] for row in rows] == ["coverage", "novelty", "turn", "ends"]
+    assert rows[0]["The paper: run 0"] == "0.154"
+
+
+def test_a_page_without_export_names_no_files(tiny_study, tmp_path):
+    assert "figures.txt" not in write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
+
+
+def test_export_spares_the_rows_and_says_what_is_wrong(tiny_study, tmp_path):
+    with pytest.raises(RecordError, match="holds the rows"):
+        write_report(tiny_study, tmp_path / "page.html", figures=tiny_study.path / "trials")
+    with pytest.raises(RecordError, match="Could not make the folder"):
+        write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "no" / "where")
+    assert not list(tmp_path.iterdir())
+
+
+def test_tables_of_a_page_have_one_heading_a_column():
+    page = (
+        '<table><caption id="caption-x">A table</caption><thead>'
+        '<tr><th rowspan="2">who</th><th colspan="2">how far</th><th>t</th><th>interval</th></tr>'
+        "<tr><th>line</th><th>ends</th><th></th><th></th></tr></thead>"
+        "<tbody><tr><th colspan='5'>group</th></tr><tr><th>a</th><td>−0.1</td><td>–</td><td>1</td><td>2</td></tr>"
+        "</tbody></table>"
+    )
+    assert tables_of(page) == [
+        (
+            "x",
+            "A table",
+            [
+                ["who", "how far: line", "how far: ends", "t", "interval"],
+                ["group", "", "", "", ""],
+                ["a", "-0.1", "", "1", "2"],
+            ],
+        )
+    ]

@@ -1,0 +1,541 @@
+"""The page in a real browser: Chromium as installed on the machine, driven by Playwright.
+
+Every test also fails on any message of the console and on any request but for the page itself.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from realitygap.report import _replay, write_report
+from realitygap.report._path_figure import typical_replicate
+from realitygap.report._tally import read_tally, settings_of
+from realitygap.runs import Condition, replay
+from realitygap.trials import Trajectory
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
+
+CHROMIUM = next(
+    filter(
+        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
+    ),
+    None,
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium or Chrome on the PATH")
+
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+DESKTOP, PHONE = (1280, 900), (390, 844)
+EVIL = "</script><img src=x onerror=alert(1)>\"'&,/@%"
+
+NUMBERS = "() => [...document.querySelectorAll('#replay-rows tr')].map(" + (
+    "row => [...row.querySelectorAll('td')].map(cell => cell.textContent))"
+)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def page_file(tiny_study, tmp_path_factory) -> Path:
+    return write_report(tiny_study, tmp_path_factory.mktemp("page") / "report.html")
+
+
+@pytest.fixture
+def show(browser, page_file) -> Iterator[Callable[..., Any]]:
+    """Shows the page, in a window of its own."""
+    contexts, complaints = [], []
+
+    def open_page(fragment: str = "", size=DESKTOP, file: Path | None = None, **options: Any) -> Any:
+        context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: (complaints.append(dialog.message), dialog.dismiss()))
+        context.on("request", lambda request: check_request(request.url))
+        page.goto((file or page_file).as_uri() + fragment)
+        return page
+
+    def check_request(url: str) -> None:
+        if not url.startswith(("file:", "data:")):
+            complaints.append(f"request: {url}")
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+@pytest.fixture(scope="module")
+def trials(tiny_study) -> Callable[[str, int, int], tuple[str, Trajectory]]:
+    """The part of a link that names a trial on the page, and the trial recomputed."""
+    tally = read_tally(tiny_study)
+
+    def trial(name: str, generation: int, individual: int) -> tuple[str, Trajectory]:
+        run = typical_replicate(tally, name)
+        row = next(
+            row
+            for row in tally.folder.read(name, [run]).iter_rows(named=True)
+            if (row["generation"], row["individual"]) == (generation, individual)
+        )
+        condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
+        return f"{name}/{run}/{generation}/{individual}", replay(condition, row)
+
+    return trial
+
+
+def step_of(page) -> int:
+    return int(re.search(r"step (\d+) of", page.locator("#replay-clock").text_content())[1])
+
+
+def robot_at(page, letter: str = "A") -> str:
+    return page.locator(f'.robot[data-pen="{letter}"]').get_attribute("transform")
+
+
+def numbers(page) -> list[list[float | str]]:
+    def value(text: str) -> float | str:
+        text = text.replace("−", "-")
+        return float(text) if re.fullmatch(r"-?\d+\.\d+", text) else text
+
+    return [[value(text) for text in row] for row in page.evaluate(NUMBERS)]
+
+
+def check_numbers(shown: list[float | str], trajectory: Trajectory, step: int) -> None:
+    """The numbers of a row of the table are those of the trial, within half a unit of what is shown."""
+    lengths = [*shown[:2], *shown[3:6]]
+    exact = [*trajectory.poses[step, :2], *trajectory.readings[step]]
+    assert np.abs(np.subtract(lengths, exact)).max() <= 0.5e-4 + 1e-9
+    assert abs(shown[2] - trajectory.poses[step, 2]) <= 0.5e-3 + 1e-9
+    if step < len(trajectory.commands):
+        answers = [trajectory.inputs[step, 0], *trajectory.commands[step]]
+        assert np.abs(np.subtract(shown[6:9], answers)).max() <= 0.5e-3 + 1e-9
+    else:
+        assert shown[6:9] == ["–"] * 3
+        assert shown[10:] == [round(trajectory.coverage_line, 3), round(trajectory.coverage_ends, 3)]
+    assert shown[9] == ("yes" if trajectory.stalled[step] else "no")
+
+
+# --- time ---------------------------------------------------------------------------------------------------
+
+
+def test_nothing_moves_by_itself_and_the_first_picture_is_a_whole_trial(show):
+    page = show()
+    before = robot_at(page)
+    page.wait_for_timeout(300)
+    assert robot_at(page) == before
+    assert step_of(page) == 30
+    assert page.locator("#replay-play").text_content().strip() == "Play"
+
+
+def test_play_moves_the_robot_and_pause_stops_it(show, trials):
+    name, _ = trials("coverage", 2, 0)
+    page = show(f"#replay={name}@0")
+    page.locator("#replay-play").click()
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value > 2")
+    page.locator("#replay-play").click()
+    step, pose = step_of(page), robot_at(page)
+    assert step > 2
+    page.wait_for_timeout(300)
+    assert (step_of(page), robot_at(page)) == (step, pose)
+
+
+def test_play_ends_at_the_end_and_begins_anew(show):
+    page = show()
+    page.locator("#replay-speed").select_option("8")
+    page.locator("#replay-play").click()
+    page.wait_for_function("() => document.querySelector('#replay-play-text').textContent == 'Play'")
+    assert step_of(page) == 30
+    assert page.locator("#replay-play").text_content().strip() == "Play"
+
+
+def test_scrub_jumps_and_buttons_step(show):
+    page = show()
+    page.locator("#replay-scrub").fill("12")
+    assert step_of(page) == 12
+    page.locator("#replay-next").click()
+    assert step_of(page) == 13
+    page.locator("#replay-back").click()
+    page.locator("#replay-back").click()
+    assert step_of(page) == 11
+    page.locator("#replay-last").click()
+    assert step_of(page) == 30
+    page.locator("#replay-next").click()
+    assert step_of(page) == 30
+    page.locator("#replay-first").click()
+    page.locator("#replay-back").click()
+    assert step_of(page) == 0
+    assert page.locator("#replay-scrub").get_attribute("aria-valuetext") == "0.0 seconds, step 0 of 30"
+
+
+def test_dragging_over_the_curve_goes_through_time(show):
+    page = show()
+    page.locator("#replay-chart").scroll_into_view_if_needed()
+    box = page.locator("#replay-chart").bounding_box()
+    page.mouse.move(box["x"] + 8, box["y"] + 30)
+    page.mouse.down()
+    assert step_of(page) == 0
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 30)
+    assert step_of(page) == 15
+    page.mouse.up()
+
+
+# --- numbers ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["coverage", "novelty", "turn", "ends"])
+def test_numbers_shown_are_those_recomputed(show, trials, name):
+    chosen = [trials(name, 2, individual) for individual in range(8)]
+    page = show(f"#replay={','.join(link for link, _ in chosen)}@0")
+    for step in (0, 1, 2, 7, 15, 29, 30):
+        page.locator("#replay-scrub").fill(str(step))
+        shown = numbers(page)
+        assert len(shown) == 8
+        for row, (_, trajectory) in zip(shown, chosen, strict=True):
+            check_numbers(row, trajectory, step)
+
+
+def test_robot_stands_where_its_numbers_say(show, trials):
+    name, trajectory = trials("turn", 1, 3)
+    page = show(f"#replay={name}@9")
+    x, y, heading = trajectory.poses[9]
+    arena = "document.querySelector('#replay-arena')"
+    width, height = page.evaluate(f"() => [{arena}.viewBox.baseVal.width, {arena}.viewBox.baseVal.height]")
+    assert (width, height) == pytest.approx((42 * 25.4 + 24, 24 * 25.4 + 24), abs=0.1)
+    found = [float(number) for number in re.findall(r"-?\d+\.\d+", robot_at(page))]
+    assert found[:2] == pytest.approx([1000 * x + 12, height - 12 - 1000 * y], abs=0.15)
+    assert found[2] == pytest.approx(-np.degrees(heading), abs=0.05)
+    corners = page.locator(".robot .body").get_attribute("points")
+    assert corners == "90.0,-80.0 90.0,80.0 -90.0,80.0 -90.0,-80.0", "0.18 x 0.16 m, in mm"
+    ends = [float(ray.get_attribute("x2")) for ray in page.locator(".robot .ray").all()]
+    assert ends == pytest.approx(90 + 1000 * trajectory.readings[9], abs=0.11)
+
+
+def test_a_blocked_step_is_marked_and_not_by_color_alone(show, trials):
+    for individual in range(8):
+        name, trajectory = trials("turn", 0, individual)
+        if trajectory.stalled.any():
+            break
+    page = show(f"#replay={name}@{trajectory.stalled.argmax()}")
+    assert page.locator(".robot.stalled").count() == 1
+    assert page.locator("#replay-arena text").first.text_content() == "A ×"
+    assert numbers(page)[0][9] == "yes"
+    assert "blocked" in page.locator("#replay-arena").get_attribute("aria-label")
+    assert page.locator(".blocked").get_attribute("d").startswith("M")
+
+
+def test_visited_cells_fill_up_to_those_of_the_trial(show, trials):
+    name, trajectory = trials("coverage", 2, 1)
+    page = show(f"#replay={name}@30")
+    assert page.locator(".visited").get_attribute("d").count("z") == len(trajectory.cells)
+    page.locator("#replay-first").click()
+    assert page.locator(".visited").get_attribute("d").count("z") == 1
+
+
+# --- several trials -----------------------------------------------------------------------------------------
+
+
+def test_several_at_once_differ_without_color(show):
+    page = show()
+    page.get_by_role("button", name="All of generation 1").click()
+    assert [row.get_attribute("data-pen") for row in page.locator(".robot").all()] == list("ABCDEFGH")
+    dashes = [trail.get_attribute("stroke-dasharray") for trail in page.locator("polyline.trail").all()]
+    assert len(set(dashes)) == 8
+    colors = page.evaluate(
+        "() => [...document.querySelectorAll('polyline.trail')].map(trail => getComputedStyle(trail).stroke)"
+    )
+    assert len(set(colors)) == 8
+    pressed = page.locator("#replay-matrix [aria-pressed=true]")
+    assert [button.text_content()[0] for button in pressed.all()] == list("ABCDEFGH")
+
+
+def test_trials_come_and_go_one_by_one(show):
+    page = show()
+    page.locator("#replay-clear").click()
+    assert page.locator(".robot").count() == 0
+    page.locator("#replay-play").click()
+    assert page.locator("#replay-status").text_content() == "Choose a trial first."
+    page.get_by_role("button", name="Generation 0, individual 4:").click()
+    page.get_by_role("button", name="Generation 2, individual 5:").click()
+    assert page.locator("#replay-rows tr").count() == 2
+    page.get_by_role("button", name="Remove A:").click()
+    assert page.locator("#replay-rows tr").count() == 1
+    assert page.locator(".robot").get_attribute("data-pen") == "B"
+    assert "A removed" in page.locator("#replay-status").text_content()
+
+
+def test_a_ninth_trial_is_refused_with_a_word(show):
+    page = show()
+    page.get_by_role("button", name="All of generation 0").click()
+    page.get_by_role("button", name="Generation 1, individual 0:").click()
+    assert page.locator("#replay-status").text_content() == "All 8 pens are in use. Remove a trial first."
+    assert page.locator("#replay-rows tr").count() == 8
+
+
+def test_conditions_can_be_compared(show):
+    page = show()
+    page.locator("#replay-across").click()
+    names = [name.split("/")[0] for name in page.locator("#replay-rows .trial").all_text_contents()]
+    assert names == ["coverage", "novelty", "turn", "ends"]
+    page.locator("#replay-condition").select_option(
+        label=page.locator("option", has_text="turn").text_content()
+    )
+    page.locator("#replay-bests").click()
+    names = page.locator("#replay-rows .trial").all_text_contents()
+    assert [re.sub(r"/\d+/(\d+)/\d+", r" \1", name) for name in names] == ["turn 0", "turn 1", "turn 2"]
+
+
+# --- links --------------------------------------------------------------------------------------------------
+
+
+def test_a_link_leads_to_what_was_seen(show, trials):
+    links = [trials("novelty", 1, 2)[0], trials("ends", 2, 7)[0]]
+    page = show(f"#replay={','.join(links)}@17")
+    assert page.locator("#replay-rows .trial").all_text_contents() == links
+    assert step_of(page) == 17
+    assert page.locator("#replay-link").get_attribute("href") == f"#replay={','.join(links)}@17"
+    assert page.locator("#replay-arena").bounding_box()["y"] < DESKTOP[1], "the replay is in view"
+    page.evaluate(f"location.hash = '#replay={links[1]}'")
+    page.wait_for_function("() => document.querySelectorAll('.robot').length == 1")
+    assert step_of(page) == 30
+
+
+@pytest.mark.parametrize(
+    "fragment", ["#replay=nothing/0/0/0", "#replay=%", "#replay=", "#replay=a@b@c,,", "#x"]
+)
+def test_a_link_that_leads_nowhere_leaves_the_page_as_it_is(show, fragment):
+    page = show(fragment)
+    assert page.locator(".robot").count() == 1
+    assert step_of(page) == 30
+    if "nothing" in fragment:
+        assert "Not on this page: nothing/0/0/0" in page.locator("#replay-status").text_content()
+
+
+# --- keyboard and accessibility -----------------------------------------------------------------------------
+
+
+def test_everything_works_by_keyboard(show):
+    page = show()
+    page.locator("#replay-stage").focus()
+    for key, step in [
+        ("Home", 0),
+        ("ArrowRight", 1),
+        ("Shift+ArrowRight", 11),
+        ("ArrowLeft", 10),
+        ("Shift+ArrowLeft", 0),
+        ("End", 30),
+    ]:
+        page.keyboard.press(key)
+        assert step_of(page) == step
+    page.keyboard.press("Home")
+    page.keyboard.press("Space")
+    assert page.locator("#replay-play").text_content().strip() == "Pause"
+    page.keyboard.press("Space")
+    assert page.locator("#replay-play").text_content().strip() == "Play"
+    page.keyboard.press("+")
+    assert page.locator("#replay-speed").input_value() == "2"
+    page.keyboard.press("-")
+    page.keyboard.press("-")
+    assert page.locator("#replay-speed").input_value() == "0.5"
+    page.locator("#replay-scrub").focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("ArrowRight")
+    assert step_of(page) == 1
+
+
+def test_tab_passes_through_and_focus_shows(show):
+    page = show()
+    page.locator("#replay-stage").focus()
+    visited = []
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        visited.append(
+            page.evaluate(
+                "() => { const at = document.activeElement; return ["
+                "at.id || at.closest('[id]').id, getComputedStyle(at).outlineStyle,"
+                "Boolean(at.closest('#replay-figure'))]; }"
+            )
+        )
+        if not visited[-1][2]:
+            break
+    assert not visited[-1][2], "focus leaves the replay"
+    inside = [each for each in visited if each[2]]
+    assert [name for name, _, _ in inside].count("replay-matrix") == 1, "one stop for all trials"
+    assert {"replay-scrub", "replay-play", "replay-speed", "replay-condition", "replay-link"} <= {
+        name for name, _, _ in inside
+    }
+    assert all(outline != "none" for _, outline, _ in inside)
+
+
+def test_arrows_lead_through_the_trials(show):
+    page = show()
+    page.locator("#replay-clear").click()
+    page.get_by_role("button", name="All of generation 0").focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown", "Enter"):
+        page.keyboard.press(key)
+    assert page.locator("#replay-rows .trial").text_content().endswith("/1/1")
+    assert page.evaluate("() => document.activeElement.getAttribute('aria-pressed')") == "true"
+    page.keyboard.press("End")
+    page.keyboard.press("Space")
+    assert page.locator("#replay-rows tr").count() == 2
+    assert page.locator("#replay-play").text_content().strip() == "Play"
+
+
+def test_every_control_and_picture_has_a_name(show):
+    page = show()
+    page.locator("#replay-across").click()
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll(
+            'button, input, select, svg:not([aria-hidden]), [role=group], [role=region]')]
+        .filter(each => !(each.getAttribute('aria-label') || each.textContent.trim() || each.labels?.length
+            || document.getElementById(each.getAttribute('aria-labelledby'))?.textContent.trim()))
+        .map(each => each.outerHTML.slice(0, 80))"""
+    )
+    assert nameless == []
+    ids = page.evaluate("() => [...document.querySelectorAll('[id]')].map(each => each.id)")
+    assert len(set(ids)) == len(ids)
+    assert "coverage" in page.locator("#replay-arena").get_attribute("aria-label")
+
+
+def luminance(color: str) -> float:
+    shares = [int(color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
+    return float(np.dot(linear, [0.2126, 0.7152, 0.0722]))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_contrast(show, scheme):
+    page = show(color_scheme=scheme)
+
+    def contrast(first: str, second: str) -> float:
+        style = "getComputedStyle(document.documentElement)"
+        colors = [
+            page.evaluate(f"() => {style}.getPropertyValue('--{name}').trim()") for name in (first, second)
+        ]
+        colors = [re.sub(r"^#(.)(.)(.)$", r"#\1\1\2\2\3\3", color) for color in colors]
+        low, high = sorted(map(luminance, colors))
+        return (high + 0.05) / (low + 0.05)
+
+    for ink in ("text", "muted", "link"):
+        for ground in ("page", "shade"):
+            assert contrast(ink, ground) >= 4.5, (ink, ground)
+    assert contrast("ink-text", "ink-band") >= 4.5, "numbers on the darkest trial"
+    assert contrast("page", "link") >= 4.5, "the play button"
+    assert contrast("ink-reach", "page") >= 4.5, "blocked"
+    for pen in range(8):
+        assert contrast(f"ink-pen{pen}", "page") >= 3.0, pen
+
+
+# --- sizes, schemes, print, motion, names -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE, (320, 640)])
+def test_the_page_is_not_wider_than_the_window(show, size):
+    page = show(size=size)
+    page.get_by_role("button", name="All of generation 0").click()
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
+    if size != DESKTOP:
+        boxes = [button.bounding_box() for button in page.locator("#replay-figure button:visible").all()]
+        assert all(box["width"] >= 24 and box["height"] >= 24 for box in boxes), "large enough for a finger"
+
+
+def test_touch_plays(show):
+    page = show(size=PHONE, has_touch=True, is_mobile=True)
+    page.locator("#replay-first").tap()
+    page.locator("#replay-play").tap()
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value > 0")
+    page.locator("#replay-play").tap()
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE[0]
+
+
+def test_dark_mode_is_dark(show):
+    colors = []
+    for scheme in ("light", "dark"):
+        page = show(color_scheme=scheme)
+        colors.append(
+            page.evaluate(
+                "() => ['.walls', '.trail'].map(name => getComputedStyle(document.querySelector(name)).stroke)"
+                ".concat(getComputedStyle(document.body).backgroundColor)"
+            )
+        )
+    assert all(light != dark for light, dark in zip(*colors, strict=True))
+
+
+def test_print_is_a_still(show):
+    page = show(color_scheme="dark")
+    page.emulate_media(media="print")
+    assert page.locator("#replay-arena").is_visible()
+    assert page.locator("#replay-rows").is_visible()
+    assert not page.locator("#replay-play").is_visible()
+    assert not page.locator("#replay-matrix").is_visible()
+    assert page.evaluate("() => getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert page.pdf()[:5] == b"%PDF-"
+
+
+def test_reduced_motion_goes_from_step_to_step(show, trials):
+    name, trajectory = trials("coverage", 2, 0)
+    page = show(f"#replay={name}@0", reduced_motion="reduce")
+    poses = []
+    page.evaluate(
+        """() => {
+            window.seen = new Set();
+            new MutationObserver(() => window.seen.add(document.querySelector('.robot').getAttribute('transform')))
+                .observe(document.querySelector('#replay-arena'), {subtree: true, attributes: true});
+        }"""
+    )
+    page.locator("#replay-play").click()
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value > 8")
+    page.locator("#replay-play").click()
+    poses = page.evaluate("() => [...window.seen]")
+    assert poses
+    steps = {(round(1000 * x + 12, 0), round(-np.degrees(heading))) for x, _, heading in trajectory.poses}
+    for pose in poses:
+        x, _, turn = (float(number) for number in re.findall(r"-?\d+\.\d+", pose))
+        assert any(abs(x - at) <= 0.7 and abs(turn - angle) <= 0.7 for at, angle in steps)
+
+
+def test_without_a_script_the_page_says_so(show):
+    page = show(java_script_enabled=False)
+    assert page.get_by_text("needs JavaScript, which does not run here").is_visible()
+    assert not page.locator("#replay-figure").is_visible()
+
+
+def test_hostile_names_stay_text(show, tiny_study, monkeypatch, tmp_path):
+    pack = _replay._pack_run
+
+    def rename(*arguments: Any) -> Any:
+        run = pack(*arguments)
+        run.data["name"] = run.data["label"] = EVIL + run.data["name"]
+        return run
+
+    monkeypatch.setattr(_replay, "_pack_run", rename)
+    page = show(file=write_report(tiny_study, tmp_path / "evil.html"))
+    page.locator("#replay-across").click()
+    assert page.locator("#replay-rows .trial").first.text_content().startswith(EVIL)
+    assert page.locator("img").count() == 0
+    link = page.locator("#replay-link").get_attribute("href")
+    before = page.locator("#replay-rows .trial").all_text_contents()
+    page.locator("#replay-clear").click()
+    page.evaluate("link => { location.hash = link; }", link)
+    page.wait_for_function("() => document.querySelectorAll('.robot').length == 4")
+    assert page.locator("#replay-rows .trial").all_text_contents() == before

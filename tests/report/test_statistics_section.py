@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from realitygap.report import write_report
+from realitygap.report._paper_audit import paper_audit_content
+from realitygap.report._statistics_section import statistics_content
+from realitygap.report._tally import read_tally
+from realitygap.study import load_study, run_study
+from tests.report.results import describe, random_runs, settings, write_results
+from tests.report.test_page import Page
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    """The paper's study with its own number of runs."""
+    return run_study(load_study("paper", replicates=3), tmp_path_factory.mktemp("paper")).folder
+
+
+@pytest.fixture(scope="module")
+def words(paper):
+    return Page(write_report(paper).read_text("utf-8")).words
+
+
+def test_three_runs_are_refused_and_what_would_do_is_named(words):
+    assert "0 of 18 comparisons show a difference; 18 have too few runs to show any" in words
+    assert "no claim possible: with n = 3 corrected p cannot be below 1; 10 runs at least" in words
+    assert "The smallest p that 3 pairs can give is 0.250" in words
+    assert "above coverage-10" not in words
+
+
+def test_every_table_says_sim_and_n(words, paper):
+    for number in range(3, 9):
+        caption = re.search(rf"Table {number} *\. .{{0,400}}", words)[0]
+        assert "SIM" in caption, caption
+    content = statistics_content(read_tally(paper))
+    assert content["labels"] == "SIM"
+    for part in ("deception", "champions", "spread", "variety", "chance"):
+        assert all(row["n"] in ("3", 3) for row in content[part]["rows"]), part
+        assert len(content[part]["rows"]) == 9
+
+
+def test_audit_is_for_the_papers_study_alone(words, tiny_study, paper):
+    assert "What does not add up in the paper" in words
+    assert "the first spreads 3.5 times as much" in words
+    assert paper_audit_content(read_tally(tiny_study)) is None
+    assert "The paper’s numbers" not in Page(write_report(tiny_study).read_text("utf-8")).words
+
+
+def test_chance_and_the_fourth_input_are_told(words):
+    assert "“50 % noise is best” comes out of three runs a level" in words
+    assert "Networks have a fourth, constant input with novelty" in words
+    assert "33 % each" in words
+
+
+def test_plateaus_are_defined(words):
+    assert "does not rise in its last 2 of 5 generations" in words
+    assert "in 60 % of runs" in words
+
+
+def test_intervals_come_with_enough_runs(out):
+    conditions = [
+        describe("a", settings=settings(noise=0.1) | {"pair": True, "seed": 1}),
+        describe("b", settings=settings(noise=0.5) | {"pair": True, "seed": 1}),
+    ]
+    folder = write_results(out, conditions, {"a": random_runs(12, seed=1), "b": random_runs(12, seed=2)})
+    content = statistics_content(read_tally(folder))
+    assert "BCa" in content["interval"]
+    row = content["comparisons"]["groups"][0][1][0]
+    assert " to " in row["difference_interval"]
+    assert "–" in row["a12_interval"]
+    assert "*" not in row["a12_interval"]
+    assert content["champions"]["problem"] == "its rows were not drawn with the key of its settings"
+
+
+def test_studies_of_every_shape_have_the_section(out):
+    for name, conditions, runs in (
+        ("one", [describe("c")], {"c": random_runs(1, 1, 1)}),
+        ("plain", ["c", "d"], {"c": random_runs(2), "d": random_runs(1)}),
+        ("partly", [describe("c"), describe("d", settings=settings(noise=0.5))], {"c": random_runs(2)}),
+    ):
+        content = statistics_content(read_tally(write_results(out / name, conditions, runs)))
+        assert content["comparisons"] is None
+        assert content["spread"]["rows"]
+
+
+def test_the_same_results_give_the_same_numbers(paper):
+    assert statistics_content(read_tally(paper)) == statistics_content(read_tally(paper))

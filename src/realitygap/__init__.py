@@ -62,7 +62,24 @@ __all__ = [
 ]
 
 
+_PACKAGES = {
+    "drawing",
+    "errors",
+    "evolution",
+    "records",
+    "report",
+    "robots",
+    "runs",
+    "study",
+    "tasks",
+    "trials",
+    "world",
+}
+
+
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f".{_HOME[name]}", __name__), name)

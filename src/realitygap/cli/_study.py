@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from realitygap.study import Progress, StudyResult
 
 
+# Below it a summary's numbers would be cut; a narrower terminal wraps the lines instead.
+NARROWEST = 78
+
+
 def run(
     study: Annotated[
         str, typer.Argument(metavar="STUDY", help="paper, paper-choices, or a study file (.toml).")
@@ -140,16 +144,19 @@ class _ProgressBar:
         self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
 
     def __enter__(self) -> _ProgressBar:
-        if not self._console.is_terminal:
-            self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
-        self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
     def show(self, progress: Progress) -> None:
-        """Show how far the study is."""
+        """Show how far the study is; nothing where nothing is missing."""
+        if progress.n_done == progress.n_runs and not self._progress.live.is_started:
+            return
+        if not self._progress.live.is_started:
+            if not self._console.is_terminal:
+                self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
+            self._progress.start()
         started = progress.n_computed > 0
         rate = (
             f"{progress.n_computed / progress.seconds:,.0f} runs/s"
@@ -188,6 +195,8 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
     from ._tables import summary_table
 
     console = Console()
+    if console.width < NARROWEST:
+        console = Console(width=NARROWEST)
     console.print(summary_table(summary, result.folder.description["title"]))
     if note := result.folder.description.get("note"):
         console.print(note, style="italic", highlight=False, markup=False)

@@ -26,7 +26,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
         title_style="bold",
         box=box.SIMPLE_HEAD,
     )
-    table.add_column("condition")
+    table.add_column("condition", overflow="fold")
     table.add_column("runs", justify="right", no_wrap=True)
     table.add_column("line", no_wrap=True)
     table.add_column("ends", no_wrap=True)
@@ -39,7 +39,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
             median, q25, q75, low, high = (
                 _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
             )
-            interval = f"[{low}, {high}]" if low != "-" else "[too few runs]"
+            interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
             cells.append(f"{median} {interval}\n{q25} to {q75}")
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))

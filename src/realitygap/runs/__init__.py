@@ -2,7 +2,7 @@
 
 from ._condition import NAME_PATTERN, Condition, Selection
 from ._replay import genome_of, replay
-from ._runs import frame_of, run_replicates, run_rows
+from ._runs import frame_of, prepare_kernels, run_replicates, run_rows
 
 __all__ = [
     "NAME_PATTERN",
@@ -10,6 +10,7 @@ __all__ = [
     "Selection",
     "frame_of",
     "genome_of",
+    "prepare_kernels",
     "replay",
     "run_replicates",
     "run_rows",

@@ -100,6 +100,12 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
         room, hidden_room = 2 * room, 2 * hidden_room
 
 
+def prepare_kernels() -> None:
+    """Compile, or load from disk, all that runs need, by a run that is as small as can be."""
+    least = Condition(name="least", jyro={"steps": 1}, neat={"population": 2, "generations": 1})
+    run_rows(least, 0, 1)
+
+
 def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
     """Carry out `n_runs` runs of a condition.
 

@@ -203,8 +203,8 @@ def _condition(
     try:
         condition = Condition.model_validate({**own, "seed": about.seed, "pair": about.pair, **merged})
     except ValidationError as error:
-        if not problems.lines:  # else a section that is wrong for all conditions was noted already
-            for problem in error.errors():
+        for problem in error.errors():
+            if not problem["loc"]:  # what is wrong within a section was noted there
                 problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
         return None, notes
     return condition, notes

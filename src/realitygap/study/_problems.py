@@ -72,7 +72,8 @@ def _explain(problem: Any, model: type[BaseModel]) -> str:
         hint = ""
         if isinstance(problem["input"], str):
             names = [name.strip(" '") for name in context["expected"].replace(" or ", ",").split(",")]
-            hint = f" {did_you_mean(problem['input'], names)}"
+            near = did_you_mean(problem["input"], names)
+            hint = f" {near}" if near.startswith("Did") else ""
         return f"expected {context['expected']}, came {came}.{hint}"
     if kind == "value_error":
         return f"{context['error']}, came {came}."

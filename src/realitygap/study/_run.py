@@ -13,7 +13,7 @@ from typing import Any
 
 from realitygap.errors import StudyError
 from realitygap.records import ResultsFolder
-from realitygap.runs import Condition, run_replicates
+from realitygap.runs import Condition, prepare_kernels, run_replicates
 
 from ._file import load_study
 from ._study import Study
@@ -114,6 +114,7 @@ def run_study(
         )
         progress = _Counter(study.n_runs, study.n_runs - n_missing, tell)
         if n_missing:
+            prepare_kernels()
             _compute(study, folder, missing, n_threads, chunk, progress)
         folder.append_log(
             {"event": "end", "computed_runs": progress.n_computed, "seconds": round(progress.seconds, 3)}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from realitygap._version import __version__
 from realitygap.runs import NAME_PATTERN, Condition
@@ -65,6 +65,16 @@ class Study(BaseModel):
     report: ReportSection
     conditions: tuple[Condition, ...]
     notes: tuple[ConditionNotes, ...]
+
+    @model_validator(mode="after")
+    def _conditions_share_the_seed(self) -> Self:
+        for condition in self.conditions:
+            if (condition.seed, condition.pair) != (self.about.seed, self.about.pair):
+                raise ValueError(
+                    f"condition {condition.name!r} has seed {condition.seed} and pair {condition.pair}, expected the "
+                    f"study's: {self.about.seed} and {self.about.pair}"
+                )
+        return self
 
     @property
     def n_runs(self) -> int:

@@ -96,12 +96,13 @@ def simulate_case(case: Case) -> SceneTrack:
     return SceneTrack(times, poses, stalls, commands, energies, parts)
 
 
-def simulate_file(case: Path, out: Path) -> tuple[Case, SceneTrack]:
+def simulate_file(case: str | Path, out: str | Path) -> tuple[Case, SceneTrack]:
     """Run the case in the JSON file `case` and write its track to `out`, a CSV file.
 
     Raises:
         CaseError: The case cannot be carried out as written, or `out` cannot be written.
     """
+    case, out = Path(case), Path(out)
     if case.exists() and out.exists() and case.samefile(out):
         raise CaseError(f"{out}: would overwrite the case itself. Name another file for the result.")
     described = Case.read(case)

@@ -9,6 +9,7 @@ import pytest
 
 from realitygap.errors import RecordError
 from realitygap.report import summarize, write_report
+from realitygap.study import run_study
 from tests.report.results import describe, random_runs, settings, write_results
 
 VOID = {"meta", "br", "hr", "img", "input", "link", "col"}
@@ -251,3 +252,8 @@ def test_writing_a_page_uses_no_network(tiny_study, tmp_path, monkeypatch):
 
 def test_page_is_small(tiny_study):
     assert Path(write_report(tiny_study)).stat().st_size < 1_000_000
+
+
+def test_the_study_s_remark_stands_under_its_summary(tmp_path):
+    page = write_report(run_study("paper", tmp_path / "r", replicates=1).folder).read_text("utf-8")
+    assert page.count("which does not say which search it reports") == 1

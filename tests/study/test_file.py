@@ -43,11 +43,12 @@ def test_paper_values_are_those_of_table_2():
     notes = dict(
         zip((c.name for c in load_study("paper").conditions), load_study("paper").notes, strict=True)
     )
+    assert "section 3.2 (novelty)" in load_study("paper").about.note
     table_2 = {10: [0.154, 0.222, 0.166], 50: [0.208, 0.432, 0.389], 80: [0.180, 0.333, 0.333]}
     for noise, values in table_2.items():
         assert notes[f"novelty-{noise}"].published == values
         assert notes[f"coverage-{noise}"].published == values
-        assert "section 3.2 points to novelty" in notes[f"coverage-{noise}"].published_source
+        assert notes[f"coverage-{noise}"].published_source == f"Table 2, {noise}% noise"
         assert notes[f"random-{noise}"].published is None
 
 

@@ -133,6 +133,7 @@ def _content(tally: Tally) -> dict[str, Any]:
         "measure": tally.measure,
         "statistics": statistics_content(tally),
         "audit": paper_audit_content(tally),
+        "note": description.get("note") or "",
         "published_sources": _published_sources(tally),
         "n_published": max((len(values) for values in summary["published"].drop_nulls()), default=0),
         "interval_notes": _interval_notes(summary),

@@ -36,9 +36,12 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:.*",
-        r"(Any|Callable|Iterator|Iterable|Literal|Mapping|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
+        r"(Any|Callable|Figure|Iterator|Iterable|Literal|Mapping|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
     ),
-    (r"py:(class|obj)", r"(float64|int32|uint8|bool|columns|_?[A-Z]|n|t|s|ge|le|gt|lt|\d.*|.*=.*)"),
+    (
+        r"py:(class|obj)",
+        r"(float64|int32|uint8|bool|columns|median_low|_?[A-Z]|n|t|s|ge|le|gt|lt|\d.*|.*=.*)",
+    ),
     (r"py:.*", r"realitygap\..*\._.*"),
     (r"py:.*", r"realitygap\.kernels.*"),
 ]

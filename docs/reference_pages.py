@@ -197,22 +197,24 @@ def command_pages() -> dict[str, str]:
 
 def command_page(name: str, command: Any) -> str:
     """One command's page."""
-    text = (command.help or "").strip()
-    about, _, twin = text.partition("In Python: ")
-    about, _, example = about.partition("Example: ")
+    said = [" ".join(each.split()) for each in (command.help or "").strip().split("\n\n")]
+    examples = [each.removeprefix("Example: ") for each in said if each.startswith("Example: ")]
+    twins = [each.removeprefix("In Python: ") for each in said if each.startswith("In Python: ")]
+    about = [each for each in said if not each.startswith(("Example: ", "In Python: "))]
     arguments = [each for each in command.params if each.param_type_name == "argument"]
     options = [each for each in command.params if each.param_type_name == "option"]
     called = " ".join(
         ["realitygap", name, *(each.metavar or each.name.upper() for each in arguments), "[OPTIONS]"]
     )
-    paragraphs = "\n\n".join(escape(each) for each in about.strip().split("\n\n"))
+    paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
     rows = [(f"`{each.metavar}`", each.help) for each in arguments]
     rows += [(option_text(each), each.help) for each in options]
     parts.append(
         "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])
     )
-    parts += ["Example:", f"```sh\n{example.strip()}\n```", "In Python:", f"```py\n{twin.strip()}\n```"]
+    for head, kind, lines in (("Example:", "sh", examples), ("In Python:", "py", twins)):
+        parts += [head, "\n".join([f"```{kind}", *lines, "```"])]
     return "\n\n".join(parts) + "\n"
 
 

@@ -113,6 +113,13 @@ def test_numbers_on_the_page_of_choices_are_those_of_the_study(tmp_path):
     assert make_choices.table(folder) == reference_pages.CHOICES_DATA.read_text("utf-8")
 
 
+def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
+    make_reproduced = _load("make_reproduced")
+    tables, figures = make_reproduced.make(tmp_path)
+    assert {path.name: path.read_text("utf-8") for path in make_reproduced.TABLES.iterdir()} == tables
+    assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
+
+
 def test_a_changed_output_is_noticed():
     page = "```console\n$ realitygap --version\nrealitygap 0.0.0\n```\n"
     text, problems = make_outputs.rewrite(page, "page")

@@ -40,7 +40,7 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:(class|obj)",
-        r"(float64|int32|uint8|bool|columns|median_low|_?[A-Z]|n|t|s|ge|le|gt|lt|\d.*|.*=.*)",
+        r"(float64|int32|uint8|bool|columns|median_low|left|bottom|right|top|_?[A-Z]|n|t|s|ge|le|gt|lt|\d.*|.*=.*)",
     ),
     (r"py:.*", r"realitygap\..*\._.*"),
     (r"py:.*", r"realitygap\.kernels.*"),

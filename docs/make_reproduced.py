@@ -2,36 +2,116 @@
 
     uv run python docs/make_reproduced.py
 
-Carries out `realitygap run paper` in a temporary folder, writes its report with all figures and tables, and keeps
-those that the page shows: docs/data/reproduced/*.csv and docs/images/reproduced/*.svg.
+Carries out `realitygap run paper` and `realitygap run examples/constant-input.toml` in a temporary folder and writes
+docs/data/reproduced/*.csv and docs/images/reproduced/*.svg: those tables and figures of the paper's report that the
+page shows, where each value that the paper prints lies among our runs, and what the constant input does.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
-from realitygap import run_study, write_report
+import numpy as np
+import polars as pl
+
+from realitygap import ResultsFolder, run_study, write_report
+from realitygap.report import Interval, compare_conditions
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "reproduced"
 FIGURES = HERE / "images" / "reproduced"
-WANTED_TABLES = ("table-2", "table-3", "table-4", "table-5", "table-7", "table-8", "table-9", "structures")
-WANTED_FIGURES = ("figure-4", "figure-5", "figure-8", "figure-7")
+INPUTS_STUDY = HERE.parent / "examples" / "constant-input.toml"
+WANTED_TABLES = (
+    "table-2",
+    "table-3",
+    "table-4",
+    "table-5",
+    "table-6",
+    "table-7",
+    "table-8",
+    "table-9",
+    "structures",
+)
+WANTED_FIGURES = ("figure-4", "figure-5", "figure-6a", "figure-8", "figure-7")
+CELLS = 72
 
 
 def make(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
-    """The wanted tables and figures of the paper's study, by file name; everything is written below `folder`."""
+    """The tables and figures of the page, by file name; everything is written below `folder`."""
     result = run_study("paper", folder / "paper")
     write_report(result.folder, figures=folder / "figures")
+    inputs = run_study(INPUTS_STUDY, folder / "inputs")
     tables = {
         f"{name}.csv": (folder / "figures" / f"{name}.csv").read_text("utf-8") for name in WANTED_TABLES
     }
+    tables |= {"published.csv": published(result.folder), "constant-input.csv": comparisons(inputs.folder)}
     figures = {
         f"{name}.svg": (folder / "figures" / f"{name}.svg").read_text("utf-8") for name in WANTED_FIGURES
     }
     return tables, figures
+
+
+def published(folder: ResultsFolder) -> str:
+    """Where each value that the paper prints lies among our runs of that noise, selection and count of cells."""
+    rows = []
+    for condition in folder.description["conditions"]:
+        frame = folder.read(condition["name"], columns=["replicate", "coverage_line", "coverage_ends"])
+        best = frame.group_by("replicate").agg(pl.col("coverage_line", "coverage_ends").max())
+        for value in condition.get("published") or ():
+            cells = round(value * CELLS)
+            counts = [
+                int((np.rint(best[column].to_numpy() * CELLS) <= cells).sum())
+                for column in ("coverage_line", "coverage_ends")
+            ]
+            rows.append([condition["name"], f"{value:.3f}", cells, best.height, *counts])
+    return _csv(
+        [
+            "Condition",
+            "The paper",
+            f"nearest k of {CELLS}",
+            "n",
+            "our runs at or below it: along the line",
+            "our runs at or below it: ends of steps",
+        ],
+        rows,
+    )
+
+
+def comparisons(folder: ResultsFolder) -> str:
+    """Differences between conditions in selection or input alone, corrected over all comparisons of the study."""
+    rows = [
+        [
+            each.one,
+            each.other,
+            each.n,
+            _signed(each.difference),
+            _span(each.difference_interval),
+            f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
+            each.verdict,
+        ]
+        for each in compare_conditions(folder)
+        if each.reason in ("selection", "baseline")
+    ]
+    return _csv(["First", "Second", "n", "difference", "95 % interval", "p (Holm)", "What may be said"], rows)
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.3f}".replace("-", "−")
+
+
+def _span(interval: Interval | None) -> str:
+    return "" if interval is None else f"{_signed(interval.low)} to {_signed(interval.high)}"
+
+
+def _csv(head: list[str], rows: Iterable[list[object]]) -> str:
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerows([head, *rows])
+    return file.getvalue()
 
 
 def main() -> None:

@@ -49,6 +49,7 @@ def write_all(folder: Path) -> None:
         "parts/columns.md": columns(),
     }
     pages["parts/choices.md"] = choices()
+    pages["parts/largest-choices.md"] = largest_choices()
     pages |= {f"commands/{name}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -203,12 +204,13 @@ def command_page(name: str, command: Any) -> str:
     about = [each for each in said if not each.startswith(("Example: ", "In Python: "))]
     arguments = [each for each in command.params if each.param_type_name == "argument"]
     options = [each for each in command.params if each.param_type_name == "option"]
+    # an argument without a word of its own is named by the one before it, as in `show [WHAT] DIR`
     called = " ".join(
-        ["realitygap", name, *(each.metavar or each.name.upper() for each in arguments), "[OPTIONS]"]
+        ["realitygap", name, *(each.metavar for each in arguments if each.metavar), "[OPTIONS]"]
     )
     paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
-    rows = [(f"`{each.metavar}`", each.help) for each in arguments]
+    rows = [(f"`{each.metavar}`" if each.metavar else "", each.help) for each in arguments]
     rows += [(option_text(each), each.help) for each in options]
     parts.append(
         "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])
@@ -219,8 +221,9 @@ def command_page(name: str, command: Any) -> str:
 
 
 def option_text(option: Any) -> str:
-    """An option with what it takes."""
-    takes = "" if option.is_flag else f" {option.metavar or 'N'}"
+    """An option with what it takes: a name, else a number."""
+    word = option.metavar or ("NAME" if option.type_descriptor.annotation is str else "N")
+    takes = "" if option.is_flag else f" {word}"
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
 
 
@@ -375,6 +378,29 @@ def choices() -> str:
             for result in [results(rows[each]) for each in conditions] or [["", "", ""]]:
                 lines.append("| " + " | ".join([*head, words, *result]) + " |")
                 head, words = ["", ""], ""
+    return "\n".join(lines) + "\n"
+
+
+def largest_choices() -> str:
+    """The alternatives whose interval of the median lies apart from that of their baseline, and the baselines."""
+    rows = choices_rows()
+    n = sorted({row["n"] for row in rows.values()})
+    lines = [
+        "| selection | what is changed | median best coverage [95 %] | difference |",
+        "|---|---|---|---|",
+    ]
+    for row in rows.values():
+        baseline = rows[row["baseline"]]
+        if row["condition"] == row["baseline"]:
+            lines.append(f"| {row['baseline']} | nothing | {results(row)[1]} | |")
+        elif row["low"] > baseline["high"] or row["high"] < baseline["low"]:
+            lines.append(
+                "| " + " | ".join([row["baseline"], escape(row["change"]), *results(row)[1:]]) + " |"
+            )
+    lines += [
+        "",
+        f"SIM, n = {', '.join(n)} runs of each, 50 % noise; those whose interval lies apart from ours.",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -1,5 +1,6 @@
 """The documents say what is true: outputs, settings, commands, columns and numbers are those of the program."""
 
+import csv
 import importlib.util
 import re
 import subprocess
@@ -118,6 +119,50 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
     tables, figures = make_reproduced.make(tmp_path)
     assert {path.name: path.read_text("utf-8") for path in make_reproduced.TABLES.iterdir()} == tables
     assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
+
+
+def _rows(name):
+    path = _load("make_reproduced").TABLES / f"{name}.csv"
+    return list(csv.DictReader(path.read_text("utf-8").splitlines()))
+
+
+def test_what_the_page_of_the_paper_says_of_its_table_2_is_what_the_numbers_say():
+    rows = [row for row in _rows("published") if row["Condition"].startswith("novelty")]
+    below_all = [row["The paper"] for row in rows if row["our runs at or below it: along the line"] == "0"]
+    assert below_all == ["0.154", "0.166", "0.208", "0.180"]
+    objective = [row for row in _rows("published") if row["Condition"].startswith("coverage")]
+    assert [row["The paper"] for row in objective] == [row["The paper"] for row in rows]
+    assert [
+        row["The paper"] for row in objective if row["our runs at or below it: along the line"] == "0"
+    ] == below_all
+
+
+def test_what_the_page_of_the_paper_says_of_the_constant_input_is_what_the_numbers_say():
+    for row in _rows("constant-input"):
+        one, other = (row[side].split("-") for side in ("First", "Second"))
+        if one[0] == other[0]:  # with the input and without it
+            assert row["What may be said"] == f"{row['First']} above {row['Second']}"
+        else:  # the two searches, with the same inputs
+            assert one[2] == other[2]
+            assert row["What may be said"].startswith("not shown")
+
+
+def test_what_the_page_of_the_paper_says_of_noise_and_selection_is_what_the_numbers_say():
+    said = {(row["First"], row["Second"]): row["What may be said"] for row in _rows("table-3")}
+    for selection in ("coverage", "novelty", "random"):
+        for level in ("50", "80"):
+            one, other = f"{selection}-{level}", f"{selection}-10"
+            assert said[one, other] == f"{one} above {other}"
+        highest = said[f"{selection}-80", f"{selection}-50"]
+        assert highest.startswith("not shown") == (selection != "random")
+    for level in ("10", "50", "80"):
+        assert said[f"novelty-{level}", f"coverage-{level}"] == f"novelty-{level} above coverage-{level}"
+        assert said[f"random-{level}", f"coverage-{level}"] == f"coverage-{level} above random-{level}"
+    for row in _rows("table-5"):
+        change = row["on fresh noise, less that of its selection’s first noise level"]
+        if change:
+            low, high = map(float, re.search(r"\((\S+) to (\S+)\)", change.replace("−", "-")).groups())
+            assert low < 0 < high
 
 
 def test_a_changed_output_is_noticed():

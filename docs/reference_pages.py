@@ -206,11 +206,11 @@ def command_page(name: str, command: Any) -> str:
     options = [each for each in command.params if each.param_type_name == "option"]
     # an argument without a word of its own is named by the one before it, as in `show [WHAT] DIR`
     called = " ".join(
-        ["realitygap", name, *(each.metavar for each in arguments if each.metavar), "[OPTIONS]"]
+        ["realitygap", name, *(each.metavar for each in arguments), "[OPTIONS]"]
     )
     paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
-    rows = [(f"`{each.metavar}`" if each.metavar else "", each.help) for each in arguments]
+    rows = [(f"`{each.metavar}`", each.help) for each in arguments]
     rows += [(option_text(each), each.help) for each in options]
     parts.append(
         "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])

@@ -17,13 +17,13 @@ def show(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="[WHAT] DIR", help="A folder of results; or network, species, arena or robot."
+            metavar="WHAT", help="A folder of results; or network, species, arena or robot."
         ),
     ],
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="", help="After network and species, the folder; after arena, paper; after robot, jyro."
+            metavar="NAME", help="After network and species, the folder; after arena, paper; after robot, jyro."
         ),
     ] = None,
     out: Annotated[

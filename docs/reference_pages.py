@@ -204,10 +204,7 @@ def command_page(name: str, command: Any) -> str:
     about = [each for each in said if not each.startswith(("Example: ", "In Python: "))]
     arguments = [each for each in command.params if each.param_type_name == "argument"]
     options = [each for each in command.params if each.param_type_name == "option"]
-    # an argument without a word of its own is named by the one before it, as in `show [WHAT] DIR`
-    called = " ".join(
-        ["realitygap", name, *(each.metavar for each in arguments), "[OPTIONS]"]
-    )
+    called = " ".join(["realitygap", name, *(each.metavar for each in arguments), "[OPTIONS]"])
     paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
     rows = [(f"`{each.metavar}`", each.help) for each in arguments]

@@ -16,14 +16,13 @@ if TYPE_CHECKING:
 def show(
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="WHAT", help="A folder of results; or network, species, arena or robot."
-        ),
+        typer.Argument(metavar="WHAT", help="A folder of results; or network, species, arena or robot."),
     ],
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME", help="After network and species, the folder; after arena, paper; after robot, jyro."
+            metavar="NAME",
+            help="After network and species, the folder; after arena, paper; after robot, jyro.",
         ),
     ] = None,
     out: Annotated[

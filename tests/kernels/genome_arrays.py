@@ -82,7 +82,7 @@ def grown(neat: Neat, seed: int, n_mutations: int, history: History | None = Non
 
 def cursor() -> np.ndarray:
     """No number taken yet."""
-    return np.zeros(1, np.int64)
+    return np.zeros(5, np.int64)
 
 
 def settings(**changes: object) -> NeatSettings:

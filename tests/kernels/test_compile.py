@@ -61,7 +61,7 @@ def test_another_source_means_another_folder(tmp_path):
         target = copy / path.relative_to(original)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(path.read_bytes())
-    changed = copy / "kernels" / "_geometry.py"
+    changed = copy / "kernels" / "_coverage.py"
     changed.write_text(changed.read_text() + "\n# another comment\n")
     start(tmp_path / "cache2", PYTHONPATH=str(copy.parent))
     (other,) = (tmp_path / "cache2").iterdir()

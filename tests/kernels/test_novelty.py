@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 
 import numpy as np
@@ -13,12 +12,12 @@ from tests.reference import novelty as reference
 from tests.reference.effort import COMPILED, cases
 
 COLUMNS, ROWS = 12, 6
-PADDING = math.hypot(11, 5)
+SPANS = _novelty.make_spans(COLUMNS, ROWS)
 Cells = list[int]
 
 
 def sorted_points(cells: Cells, columns: int, rows: int, by_column: bool) -> np.ndarray:
-    points = np.empty((columns * rows, 2))
+    points = np.empty((columns * rows, 2), np.uint8)
     _novelty.sort_cells(np.array(cells, np.uint8), len(cells), columns, rows, by_column, points)
     return points[: len(cells)].copy()
 
@@ -29,7 +28,7 @@ def random_cells(rng: random.Random, n_cells: int) -> Cells:
 
 
 def packed(behaviors: list[Cells], by_column: bool) -> tuple[np.ndarray, np.ndarray]:
-    points = np.zeros((len(behaviors), COLUMNS * ROWS, 2))
+    points = np.zeros((len(behaviors), COLUMNS * ROWS, 2), np.uint8)
     for k, cells in enumerate(behaviors):
         points[k, : len(cells)] = sorted_points(cells, COLUMNS, ROWS, by_column)
     return points, np.array([len(cells) for cells in behaviors], np.int32)
@@ -51,11 +50,11 @@ def test_the_distance_equals_the_reference(by_column: bool) -> None:
     for _ in range(cases(500, 50)):
         one, other = random_cells(rng, COLUMNS * ROWS), random_cells(rng, COLUMNS * ROWS)
         a, b = (sorted_points(cells, COLUMNS, ROWS, by_column) for cells in (one, other))
-        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), PADDING)
+        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), SPANS)
         points = [reference.points_of(cells, COLUMNS, x_first=by_column) for cells in (one, other)]
         assert distance == pytest.approx(reference.paper_distance(*points, COLUMNS, ROWS), rel=1e-13)
-        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), PADDING)
-        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), PADDING) == 0.0
+        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), SPANS)
+        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), SPANS) == 0.0
 
 
 # --- the paper's archive ----------------------------------------------------------------------------------------
@@ -66,24 +65,23 @@ class KernelPaperArchive:
 
     def __init__(self, size: int, *, above_all: bool, by_column: bool) -> None:
         self.above_all, self.by_column = above_all, by_column
-        self.archive = np.empty((size, COLUMNS * ROWS, 2))
-        self.n_archive = np.zeros(size, np.int32)
-        self.state = np.zeros(2, np.int64)
+        self.archive = _novelty.make_archive(0, size, COLUMNS * ROWS)
 
     def update(self, behaviors: list[Cells]) -> list[float]:
         points, n_points = packed(behaviors, self.by_column)
-        novelty = np.empty(len(behaviors))
-        _novelty.paper_archive_step(
-            points, n_points, PADDING, self.archive, self.n_archive, self.state, self.above_all, novelty
-        )
+        n = len(behaviors)
+        novelty, distance = np.empty(n), np.empty((n, self.archive.n_points.size))
+        archive = self.archive._replace(place_of=np.empty(n, np.int64), distance=distance)
+        _novelty.paper_archive_step(points, n_points, SPANS, archive, self.above_all, novelty)
         return novelty.tolist()
 
     def behaviors(self) -> list[list[tuple[int, int]]]:
         """Oldest first."""
-        n = int(self.state[0])
-        places = [(int(self.state[1]) + k) % n for k in range(n)]
+        n, oldest = self.archive.state.tolist()
+        places = [(oldest + k) % n for k in range(n)]
         return [
-            [(int(x), int(y)) for x, y in self.archive[place, : self.n_archive[place]]] for place in places
+            [(int(x), int(y)) for x, y in self.archive.points[place, : self.archive.n_points[place]]]
+            for place in places
         ]
 
 
@@ -164,10 +162,9 @@ def test_nearest_novelty_equals_the_reference() -> None:
         n, m, k = rng.randint(1, 6), rng.randint(0, 9), rng.randint(1, 8)
         distance = np.array([[float(rng.randint(0, 5)) for _ in range(n + m)] for _ in range(n)])
         np.fill_diagonal(distance, -1.0)
-        novelty = np.empty(n)
-        _novelty.nearest_novelty(distance, k, novelty)
+        novelty = [_novelty.mean_of_nearest(row, np.int64(n + m), np.empty(k)) for row in distance]
         expected = [reference.mean(sorted(v for v in row if v >= 0)[:k]) for row in distance.tolist()]
-        assert novelty.tolist() == pytest.approx(expected, rel=1e-13)
+        assert novelty == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.mark.parametrize("patience", [1, 7, 20])
@@ -177,7 +174,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         rng = random.Random(seed)
         n, k, generations = 4 + seed % 6, rng.randint(1, 12), 10
         start = [20.0, 400.0, 0.0, 150.0][seed % 4]
-        archive = np.empty((n * generations, COLUMNS * ROWS, 2))
+        archive = np.empty((n * generations, COLUMNS * ROWS, 2), np.uint8)
         n_archive = np.zeros(n * generations, np.int32)
         state, counters = np.zeros(1, np.int64), np.zeros(2, np.int64)
         threshold = np.array([start])
@@ -188,17 +185,18 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
             behaviors = [random_cells(rng, COLUMNS * ROWS) for _ in range(n)]
             points, n_points = packed(behaviors, True)
             novelty = np.empty(n)
+            room = _novelty.NearestRoom(np.empty(n + len(archive)), np.empty(k), np.empty(n, np.bool_))
             _novelty.nearest_archive_step(
                 points,
                 n_points,
-                PADDING,
-                k,
+                SPANS,
                 patience,
                 archive,
                 n_archive,
                 state,
                 counters,
                 threshold,
+                room,
                 novelty,
             )
             expected = plain.update([reference.points_of(cells, COLUMNS) for cells in behaviors])

@@ -32,7 +32,7 @@ FEW = hypothesis_settings(max_examples=cases(300, 50), deadline=None, derandomiz
 
 def rounded(share: list[float], total: int) -> list[int]:
     count = np.zeros(len(share), np.int64)
-    _reproduction.round_to_sum(np.array(share, np.float64), np.int64(total), count)
+    _reproduction.round_to_sum(np.array(share, np.float64), np.int64(total), count, np.empty(len(share)))
     return count.tolist()
 
 

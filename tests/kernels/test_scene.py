@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _geometry, _scene
+from realitygap.kernels import _scene
 from realitygap.trials._scene import SceneTrack, simulate_case
 from realitygap.world._case import Case
 from realitygap.world._jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES
 from tests.reference import scene as reference
+from tests.reference.trial import touch
 
 # Kernel and reference do the same operations in the same order; sine and tanh may differ in the last bit.
 LAST_BITS = 1e-13
@@ -141,7 +142,7 @@ def test_round7_is_pythons_round() -> None:
 
 
 def test_lines_agree_with_exact_geometry_away_from_touching() -> None:
-    """The two geometries of the package: `_geometry.py` does not round."""
+    """The reference does not round."""
     rng = random.Random(3)
     near = 1e-5  # how far apart the two may be, and how close to touching a case is passed over
     for _ in range(5000):
@@ -153,10 +154,11 @@ def test_lines_agree_with_exact_geometry_away_from_touching() -> None:
         _scene.set_line(one, *a, *b)
         _scene.set_line(other, *c, *d)
         crossed, x, y = _scene.crossing(one, other)
-        fraction = _geometry.ray_fraction(*a, *b, *c, *d)
-        if crossed and math.isfinite(fraction):
-            assert math.hypot(a[0] + fraction * (b[0] - a[0]) - x, a[1] + fraction * (b[1] - a[1]) - y) < near
-        elif crossed != _geometry.segments_touch(*a, *b, *c, *d):
+        along = ((c[0] - a[0]) * (d[1] - c[1]) - (c[1] - a[1]) * (d[0] - c[0])) / turn
+        meet = touch(a, b, c, d)
+        if crossed and meet:
+            assert math.hypot(a[0] + along * (b[0] - a[0]) - x, a[1] + along * (b[1] - a[1]) - y) < near
+        elif crossed != meet:
             ends = (np.hypot(x - px, y - py) for px, py in (a, b, c, d))
             assert min(ends) < near
 

@@ -133,7 +133,7 @@ def run(
     stream: Stream | None = None,
     bias_value: float | None = None,
 ) -> Trial:
-    """Drive a controller for all steps; sensor s takes number s of the step's blocks of four."""
+    """Drive a controller for all steps; sensor s takes 24 bits of word s of the step's blocks of four."""
     robot = Robot(platform, arena)
     trial = Trial([robot.pose], [robot.readings()])
     here = robot.place()
@@ -144,8 +144,8 @@ def run(
     for step in range(platform.steps):
         moved = [0.0] * n_sensors
         if stream is not None:
-            numbers = [stream.number(4 * blocks * step + s) for s in range(n_sensors)]
-            moved = [noise * (2.0 * number - 1.0) for number in numbers]
+            words = [stream.words(blocks * step + s // 4)[s % 4] for s in range(n_sensors)]
+            moved = [noise * ((word >> 8) * 2 + 1 - 2**24) / 2**24 for word in words]
         inputs = [
             obstacle_input(trial.readings[-1], platform, moved),
             float(trial.stalled[-1]),

@@ -9,6 +9,7 @@ from realitygap.errors import TableError
 from realitygap.report import audit_notes, audit_results
 from realitygap.report._audit import doubt
 from realitygap.report._paper_audit import TABLE_2, audit_paper, largest_of_uniform, steps_for, table_2
+from tests.kernels.noisy import largest_noisy
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "table-2.csv"
 
@@ -195,12 +196,7 @@ def test_largest_of_three_uniform_numbers_is_a_half_on_average():
 
 
 def test_the_offset_is_that_of_the_simulated_sensors():
-    from realitygap.kernels._philox import make_stream
-    from realitygap.kernels._trial import largest_noisy_reading
-
-    readings = np.full(3, 0.1)
-    stream = make_stream(np.uint64(1), 0, 0, 0, 0, 1)
-    values = [largest_noisy_reading(readings, 0.2, 0.8, False, stream, step) for step in range(20_000)]
+    values = largest_noisy([0.5] * 3, 0.8, 20_000)
     # 20,000 steps with a standard deviation of 0.31: off by more than 0.011 less than once in a million times
     assert np.mean(values) - 0.5 == pytest.approx(0.8 * 0.5, abs=0.011)
 

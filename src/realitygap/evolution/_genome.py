@@ -44,7 +44,7 @@ class Network:
         self._row = row
         self._rules = rules
         self._bias_value = bias_value
-        room = rules.n_inputs + networks.order.shape[1]
+        room = rules.n_inputs + networks.bias.shape[1]
         self._values = np.zeros(room)
         self._before = np.zeros(room)
 

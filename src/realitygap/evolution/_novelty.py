@@ -60,14 +60,14 @@ def largest_cell_distance(columns: int, rows: int) -> float:
 
 def _sorted_points(
     cells: Cells, columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
-) -> NDArray[np.float64]:
+) -> NDArray[np.uint8]:
     numbers = np.unique(np.asarray(cells, np.int64))
     if numbers.size and (numbers[0] < 0 or numbers[-1] >= columns * rows):
         raise ValueError(
             f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
             f"expected 0 to {columns * rows - 1}: the grid has {columns} columns and {rows} rows."
         )
-    points = np.empty((columns * rows, 2))
+    points = np.empty((columns * rows, 2), np.uint8)
     _novelty.sort_cells(numbers, numbers.size, columns, rows, sort == "x-then-y", points)
     return points[: numbers.size]
 
@@ -97,8 +97,7 @@ def sorted_cells_distance(
     """
     a = _sorted_points(one, columns, rows, sort)
     b = _sorted_points(other, columns, rows, sort)
-    padding = largest_cell_distance(columns, rows)
-    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), padding))
+    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), _novelty.make_spans(columns, rows)))
 
 
 class PaperArchive:
@@ -115,13 +114,10 @@ class PaperArchive:
         self.settings = settings or NoveltySettings()
         self._columns = columns
         self._rows = rows
-        size, cells = self.settings.archive_size, columns * rows
-        self._archive = np.empty((size, cells, 2))
-        self._n_archive = np.zeros(size, np.int32)
-        self._state = np.zeros(2, np.int64)
+        self._archive = _novelty.make_archive(0, self.settings.archive_size, columns * rows)
 
     def __len__(self) -> int:
-        return int(self._state[0])
+        return int(self._archive.state[0])
 
     def update(self, behaviors: Sequence[Cells]) -> NDArray[np.float64]:
         """Novelty of one generation, which the archive then takes in.
@@ -136,14 +132,14 @@ class PaperArchive:
             ValueError: A cell outside the grid.
         """
         points, n_points = _pack(behaviors, self._columns, self._rows, self.settings.sort)
-        novelty = np.empty(len(behaviors))
+        n = len(behaviors)
+        novelty = np.empty(n)
+        room = {"place_of": np.zeros(n, np.int64), "distance": np.zeros((n, self.settings.archive_size))}
         _novelty.paper_archive_step(
             points,
             n_points,
-            largest_cell_distance(self._columns, self._rows),
-            self._archive,
-            self._n_archive,
-            self._state,
+            _novelty.make_spans(self._columns, self._rows),
+            self._archive._replace(**room),
             self.settings.enter == "above-all",
             novelty,
         )
@@ -152,8 +148,8 @@ class PaperArchive:
 
 def _pack(
     behaviors: Sequence[Cells], columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    points = np.zeros((len(behaviors), columns * rows, 2))
+) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+    points = np.zeros((len(behaviors), columns * rows, 2), np.uint8)
     n_points = np.zeros(len(behaviors), np.int32)
     for k, cells in enumerate(behaviors):
         found = _sorted_points(cells, columns, rows, sort)
@@ -238,8 +234,8 @@ class NearestArchive:
         for i in range(n):
             for j, other in enumerate(others):
                 distances[i, j] = -1.0 if i == j else self._distance(rows[i], other)
-        novelty = np.empty(n)
-        _novelty.nearest_novelty(distances, self._k, novelty)
+        nearest = np.empty(self._k)
+        novelty = np.array([_novelty.mean_of_nearest(row, len(others), nearest) for row in distances])
         entered = np.empty(n, np.bool_)
         _novelty.admit(novelty, self._counters, self._threshold, self._patience, entered)
         self.behaviors.extend(rows[k].copy() for k in np.flatnonzero(entered))

@@ -14,11 +14,15 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import caching
+from numba import _dynfunc
+from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # No fastmath: results must not depend on the machine. Nobody calls kernels from C.
-OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+MAKER = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def _sources_hash() -> str:
@@ -83,6 +87,74 @@ class _ForgivingCache(caching.FunctionCache):
             self.flush()
 
 
+def _mark_stage(state: Any) -> None:
+    """The array arguments of a stage never overlap: so loops over them can be taken side by side."""
+    state.flags.noalias = True
+
+
+class _Stage(Compiler):
+    def define_pipelines(self) -> Any:
+        _mark_stage(self.state)
+        return super().define_pipelines()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _LowerForCallers(NativeLowering):
+    """Lowers a function to what its callers link, and leaves optimizing and machine code to them.
+
+    Numba would optimize each function with all it calls, and again within each of its callers.
+    """
+
+    _name = "lower_for_callers"
+
+    def run_pass(self, state: Any) -> bool:
+        library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+        library.enable_object_caching()
+        library._optimize_final_module = lambda: None
+        library._finalize_final_module = functools.partial(_finish_without_code, library)
+        state.library = library
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        # Callers know it by this object; it cannot be called.
+        name = lowered.fndesc.qualname
+        function = _dynfunc.make_function(
+            lowered.fndesc.lookup_module(), name, "", 0, lowered.env, (library,)
+        )
+        state.targetctx.insert_user_function(function, lowered.fndesc, [library])
+        state.reload_init.extend(library._reload_init)
+        state["cr"] = lowered._replace(cfunc=function)
+        return True
+
+
+def _finish_without_code(library: Any) -> None:
+    library._finalize_dynamic_globals()
+    library._finalized = True
+
+
+class _Inner(Compiler):
+    def define_pipelines(self) -> Any:
+        managers = super().define_pipelines()
+        for manager in managers:
+            manager.passes = [
+                (_LowerForCallers, text) if step is NativeLowering else (step, text)
+                for step, text in manager.passes
+            ]
+            manager.finalize()
+        return managers
+
+
+class _InnerStage(_Inner):
+    def define_pipelines(self) -> Any:
+        _mark_stage(self.state)
+        return super().define_pipelines()
+
+
+# What makes no array needs no counting of who holds which, which costs more than the work of a small kernel.
+KERNEL = {**MAKER, "_nrt": False}
+INLINED = {**KERNEL, "forceinline": True}
+
+
 class Kernel:
     """A compiled function that can be called from Python and from other kernels.
 
@@ -91,10 +163,10 @@ class Kernel:
     compiled apart, at the first call, and kept.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, stage: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._entry = numba.njit(**OPTIONS)(function)
+        self._entry = numba.njit(**options, pipeline_class=_Stage if stage else Compiler)(function)
         if CACHE_FOLDER is not None:
             before = numba.config.CACHE_DIR
             numba.config.CACHE_DIR = str(CACHE_FOLDER)
@@ -103,7 +175,9 @@ class Kernel:
             finally:
                 numba.config.CACHE_DIR = before
         # Python must never call it: without a wrapper that ends the process. Numba's type holds it weakly.
-        self._inner = numba.njit(**OPTIONS, no_cpython_wrapper=True)(function)
+        self._inner = numba.njit(
+            **options, no_cpython_wrapper=True, pipeline_class=_InnerStage if stage else _Inner
+        )(function)
         self._numba_type_ = numba.types.Dispatcher(self._inner)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -115,8 +189,36 @@ class Kernel:
         return self._entry.stats
 
 
-def kernel(function: F) -> F:
-    """Compile `function` at its first call; a plain function where Numba is switched off."""
+def maker(function: F) -> F:
+    """Compile `function`, which makes arrays or calls one that does, at its first call.
+
+    This and the other decorators leave a plain function where Numba is switched off.
+    """
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function)  # type: ignore[return-value]
+    return Kernel(function, MAKER)  # type: ignore[return-value]
+
+
+def kernel(function: F) -> F:
+    """Compile `function`, which makes no arrays, at its first call."""
+    if numba.config.DISABLE_JIT:
+        return function
+    return Kernel(function, KERNEL)  # type: ignore[return-value]
+
+
+def inlined(function: F) -> F:
+    """A small kernel that becomes part of each of its callers, loops over lanes among them."""
+    if numba.config.DISABLE_JIT:
+        return function
+    return Kernel(function, INLINED)  # type: ignore[return-value]
+
+
+def stage(function: F) -> F:
+    """A kernel of loops over lanes. Its arrays must not overlap, and it must not make any.
+
+    To be taken side by side a loop must read what it selects from before it selects: of
+    `a[l] if hit else b[l]` the compiler makes one load from either address, lane by lane.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    return Kernel(function, INLINED, stage=True)  # type: ignore[return-value]

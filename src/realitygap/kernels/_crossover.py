@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import kernel
+from ._compile import inlined, kernel
 from ._genome import (
     closes_cycle,
     has_link,
@@ -16,7 +16,7 @@ from ._genome import (
 )
 
 
-@kernel
+@inlined
 def _enabled_in_child(rules, everywhere, chosen, stream, cursor):
     """Whether an inherited gene is on: `everywhere`, in all parents that have it; `chosen`, in the one taken."""
     if everywhere:
@@ -26,7 +26,7 @@ def _enabled_in_child(rules, everywhere, chosen, stream, cursor):
     return chosen if rules.disabled_bit_inherited else True
 
 
-@kernel
+@inlined
 def _mixed_bias(old, a, b, rules, node, average, stream, cursor):
     """The bias of a child's node: from the parent that has it; from either, or the mean, where both do."""
     in_a = has_node(old, a, rules, node)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
-from ._philox import FIRST, PURPOSE_GENOME, make_stream, uniform
+from ._compile import inlined, kernel
+from ._philox import FIRST, PURPOSE_GENOME, draw_words, make_stream, unit
 
 
 class Genomes(NamedTuple):
@@ -27,6 +27,8 @@ class Genomes(NamedTuple):
     hidden: NDArray[np.int32]  # (n, h) ids of hidden nodes, ascending
     bias: NDArray[np.float64]  # (n, o + h) of each output and hidden node; zero without node biases
     full: NDArray[np.bool_]  # (1,) set when a gene found no room: the rows are then worth nothing
+    reached: NDArray[np.int32]  # (c + 1,) room for the ids of nodes
+    cursor: NDArray[np.int64]  # (5,) room for what `next_uniform` knows
 
 
 class NeatRules(NamedTuple):
@@ -77,7 +79,6 @@ class NeatRules(NamedTuple):
     clip_negative: bool
 
 
-@kernel
 def make_genomes(n, n_outputs, room, hidden_room):
     """Empty genomes of n individuals with room for so many connection genes and hidden nodes."""
     return Genomes(
@@ -91,25 +92,33 @@ def make_genomes(n, n_outputs, room, hidden_room):
         np.zeros((n, hidden_room), np.int32),
         np.zeros((n, n_outputs + hidden_room)),
         np.zeros(1, np.bool_),
+        np.zeros(room + 1, np.int32),
+        np.zeros(5, np.int64),
     )
 
 
-@kernel
+@inlined
 def next_uniform(stream, cursor):
-    """The next number of a stream; `cursor[0]` counts those taken."""
+    """The next number of a stream; `cursor` holds how many were taken, and four words drawn at once."""
     index = cursor[0]
     cursor[0] = index + 1
-    return uniform(stream, index)
+    if index & 3 == 0:
+        words = draw_words(stream, index >> 2)
+        cursor[1] = words[0]
+        cursor[2] = words[1]
+        cursor[3] = words[2]
+        cursor[4] = words[3]
+    return unit(cursor[1 + (index & 3)])
 
 
-@kernel
+@inlined
 def next_below(stream, cursor, n):
     """The next whole number in 0 .. n-1 of a stream."""
     value = int(next_uniform(stream, cursor) * n)
     return min(value, n - 1)
 
 
-@kernel
+@inlined
 def next_signed(stream, cursor, size):
     """The next number in (-size, size) of a stream."""
     return (2.0 * next_uniform(stream, cursor) - 1.0) * size
@@ -118,7 +127,7 @@ def next_signed(stream, cursor, size):
 @kernel
 def first_genomes(genomes, rules, key, replicate, generation):
     """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4)."""
-    cursor = np.zeros(1, np.int64)
+    cursor = genomes.cursor
     n = genomes.n_connections.size
     for row in range(n):
         stream = make_stream(key, replicate, generation, row, FIRST, PURPOSE_GENOME)
@@ -140,7 +149,7 @@ def first_genomes(genomes, rules, key, replicate, generation):
             )
 
 
-@kernel
+@inlined
 def copy_genome(old, from_row, new, to_row):
     """Copy one individual's genome into a row of other arrays."""
     n = old.n_connections[from_row]
@@ -160,7 +169,7 @@ def copy_genome(old, from_row, new, to_row):
         new.bias[to_row, node] = old.bias[from_row, node]
 
 
-@kernel
+@inlined
 def has_link(genomes, row, source, target):
     """Whether a genome holds a gene, enabled or not, from one node to another."""
     for gene in range(genomes.n_connections[row]):
@@ -203,7 +212,7 @@ def closes_cycle(genomes, row, source, target, reached):
 ENABLED = np.bool_(True)
 
 
-@kernel
+@inlined
 def insert_gene(genomes, row, innovation, source, target, weight, enabled):
     """Put a connection gene where its innovation number belongs; sets `full` where there is no room."""
     gene = genomes.n_connections[row]
@@ -225,7 +234,7 @@ def insert_gene(genomes, row, innovation, source, target, weight, enabled):
     genomes.n_connections[row] += 1
 
 
-@kernel
+@inlined
 def insert_hidden(genomes, row, node, bias):
     """Put a hidden node where its id belongs, unless the genome has it; sets `full` where there is no room."""
     outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
@@ -246,7 +255,7 @@ def insert_hidden(genomes, row, node, bias):
     genomes.n_hidden[row] += 1
 
 
-@kernel
+@inlined
 def node_bias_of(genomes, row, rules, node):
     """The bias of an output or hidden node; 0 where the genome lacks the node."""
     if node < rules.n_inputs + rules.n_outputs:
@@ -257,7 +266,7 @@ def node_bias_of(genomes, row, rules, node):
     return 0.0
 
 
-@kernel
+@inlined
 def has_node(genomes, row, rules, node):
     """Whether a genome has a node; inputs and outputs are in every genome."""
     if node < rules.n_inputs + rules.n_outputs:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
+from ._compile import inlined, kernel
 from ._genome import (
     ENABLED,
     closes_cycle,
@@ -43,13 +43,17 @@ N_SPLITS = 3
 
 
 @kernel
+def clear_innovations(rules, innovations):
+    """No innovation yet: the next numbers are those after the first genomes'."""
+    innovations.counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs
+    innovations.counters[NEXT_NODE] = rules.n_inputs + rules.n_outputs
+    start_generation(innovations)
+
+
 def make_innovations(rules, n):
     """No innovation yet, with room for the n children of a generation."""
-    counters = np.zeros(4, np.int64)
-    counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs
-    counters[NEXT_NODE] = rules.n_inputs + rules.n_outputs
-    return Innovations(
-        counters,
+    innovations = Innovations(
+        np.zeros(4, np.int64),
         np.empty(n, np.int32),
         np.empty(n, np.int32),
         np.empty(n, np.int32),
@@ -57,9 +61,11 @@ def make_innovations(rules, n):
         np.empty(n, np.int32),
         np.empty(n, np.int32),
     )
+    clear_innovations(rules, innovations)
+    return innovations
 
 
-@kernel
+@inlined
 def start_generation(innovations):
     """Forget what arose in the generation before; the counters go on."""
     innovations.counters[N_LINKS] = 0
@@ -171,7 +177,7 @@ def add_link(genomes, row, rules, innovations, stream, cursor, reached):
     return False
 
 
-@kernel
+@inlined
 def mutated_weight(weight, rules, stream, cursor):
     """A weight moved by a step, or now and then replaced, within the limit (EC02, 4.1)."""
     if next_uniform(stream, cursor) < rules.replace_weight:
@@ -181,7 +187,7 @@ def mutated_weight(weight, rules, stream, cursor):
     return min(max(weight, -rules.weight_limit), rules.weight_limit)
 
 
-@kernel
+@inlined
 def mutate_weights(genomes, row, rules, stream, cursor):
     """Move every weight, and every node bias where there are such."""
     for gene in range(genomes.n_connections[row]):
@@ -191,7 +197,7 @@ def mutate_weights(genomes, row, rules, stream, cursor):
             genomes.bias[row, node] = mutated_weight(genomes.bias[row, node], rules, stream, cursor)
 
 
-@kernel
+@inlined
 def reenable(genomes, row):
     """Switch the oldest disabled gene on again, as C++ 1.2.1 does."""
     for gene in range(genomes.n_connections[row]):
@@ -200,7 +206,7 @@ def reenable(genomes, row):
             return
 
 
-@kernel
+@inlined
 def mutate(genomes, row, rules, innovations, stream, cursor, reached):
     """Mutate one genome: structure and weights, in the order node, link, weights, re-enabling."""
     changed = False

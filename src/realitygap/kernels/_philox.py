@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import kernel
+from ._compile import inlined
 
 PURPOSE_NOISE = np.int64(1)  # sensor noise of a trial
 PURPOSE_GENOME = np.int64(2)  # the first genomes
@@ -37,7 +37,7 @@ _32 = np.uint64(32)
 _TO_UNIT = 1.0 / 4294967296.0
 
 
-@kernel
+@inlined
 def philox(c0, c1, c2, c3, k0, k1):
     """Four 32-bit words from a counter of four words and a key of two, all uint32."""
     for _ in range(10):
@@ -56,13 +56,13 @@ def philox(c0, c1, c2, c3, k0, k1):
     return c0, c1, c2, c3
 
 
-@kernel
+@inlined
 def draw_words(stream, block):
     """Words number 4 * block to 4 * block + 3 of a stream."""
     return philox(np.uint32(block), stream[0], stream[1], stream[2], stream[3], stream[4])
 
 
-@kernel
+@inlined
 def make_stream(key, replicate, generation, individual, repeat, purpose):
     """The three fixed counter words and two key words that name one stream of numbers."""
     return (
@@ -74,21 +74,7 @@ def make_stream(key, replicate, generation, individual, repeat, purpose):
     )
 
 
-@kernel
+@inlined
 def unit(word):
     """A float64 in (0, 1), centered: the mean over all words is exactly one half."""
     return (np.float64(word) + 0.5) * _TO_UNIT
-
-
-@kernel
-def uniform(stream, index):
-    """Number `index` of a stream, uniform in (0, 1)."""
-    words = draw_words(stream, index >> 2)
-    lane = index & 3
-    if lane == 0:
-        return unit(words[0])
-    if lane == 1:
-        return unit(words[1])
-    if lane == 2:
-        return unit(words[2])
-    return unit(words[3])

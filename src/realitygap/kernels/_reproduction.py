@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ._compile import kernel
+from ._compile import inlined, kernel
 from ._crossover import crossover
 from ._genome import copy_genome, next_below, next_uniform
 from ._mutation import mutate, start_generation
@@ -14,7 +12,7 @@ from ._philox import FIRST, PURPOSE_CHILD, make_stream
 from ._species import BEST_EVER, N_SPECIES
 
 
-@kernel
+@inlined
 def note_improvement(fitness, species_of, species, generation):
     """Keep for each species, and for the run, the best fitness and the generation that first had it."""
     for k in range(species.counts[N_SPECIES]):
@@ -37,7 +35,7 @@ def note_improvement(fitness, species_of, species, generation):
 LOWEST_FITNESS = 0.0001
 
 
-@kernel
+@inlined
 def not_negative(fitness, rules, shared):
     """Write to `shared` the fitness that sharing can use: lifted by the lowest, or cut off below."""
     lowest = 0.0
@@ -50,19 +48,19 @@ def not_negative(fitness, rules, shared):
             shared[row] = fitness[row] - lowest
 
 
-@kernel
-def round_to_sum(share, total, count):
+@inlined
+def round_to_sum(share, total, count, rest):
     """Whole numbers in proportion to `share` that add up to `total`, by largest remainder.
 
     Args:
         share: (k,) not negative; all zero is not allowed.
         total: What the counts add up to.
         count: (k,) int64, written. Of equal remainders the earlier one is rounded up.
+        rest: (k,) room.
     """
     whole = 0.0
     for k in range(share.size):
         whole += share[k]
-    rest = np.empty(share.size)
     given = 0
     for k in range(share.size):
         exact = share[k] / whole * total
@@ -86,7 +84,7 @@ def round_to_sum(share, total, count):
         given -= 1
 
 
-@kernel
+@inlined
 def share_offspring(fitness, species_of, species, rules, generation, offspring):
     """How many children each species has; they add up to the size of the population.
 
@@ -97,9 +95,13 @@ def share_offspring(fitness, species_of, species, rules, generation, offspring):
     """
     n = fitness.size
     n_species = species.counts[N_SPECIES]
-    share = np.zeros(n_species)
-    best_now = np.empty(n_species)
+    share, best_now, rest = (
+        species.shares[0, :n_species],
+        species.shares[1, :n_species],
+        species.shares[2, :n_species],
+    )
     for k in range(n_species):
+        share[k] = 0.0
         best_now[k] = -math.inf
         for row in range(n):
             if species_of[row] == species.identity[k]:
@@ -133,10 +135,10 @@ def share_offspring(fitness, species_of, species, rules, generation, offspring):
     if not (0.0 < total < math.inf):
         for k in range(n_species):
             share[k] = species.size[k]
-    round_to_sum(share, n, offspring)
+    round_to_sum(share, n, offspring, rest)
 
 
-@kernel
+@inlined
 def ranked_members(fitness, species_of, identity, members):
     """Rows of a species from the fittest down, equally fit ones in their order; returns how many."""
     n = 0
@@ -185,15 +187,14 @@ def reproduce(
     n = fitness.size
     note_improvement(fitness, species_of, species, generation)
     n_species = species.counts[N_SPECIES]
-    offspring = np.zeros(n_species, np.int64)
-    shared = np.empty(n)
+    offspring, members = species.numbers[0, :n_species], species.numbers[1, :n]
+    shared = species.shares[3]
     not_negative(fitness, rules, shared)
     share_offspring(shared, species_of, species, rules, generation, offspring)
     start_generation(innovations)
-    members = np.empty(n, np.int64)
     # As many as there are genes, and not nodes: a row without room for its hidden nodes still holds their genes.
-    reached = np.empty(new.innovation.shape[1] + 1, np.int32)
-    cursor = np.zeros(1, np.int64)
+    reached = new.reached
+    cursor = new.cursor
     child = FIRST
     for k in range(n_species):
         if offspring[k] == 0:

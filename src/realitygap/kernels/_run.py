@@ -8,15 +8,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
+from ._compile import inlined, kernel
 from ._evolve import next_generation
-from ._genome import first_genomes, make_genomes
-from ._mutation import make_innovations
-from ._network import decode, make_networks
-from ._novelty import nearest_archive_step, paper_archive_step, sort_cells
+from ._genome import Genomes, first_genomes, make_genomes
+from ._lanes import LANES, Lanes
+from ._marks import list_cells
+from ._mutation import Innovations, clear_innovations
+from ._network import Networks, decode, make_networks
+from ._novelty import (
+    Archive,
+    NearestRoom,
+    make_spans,
+    nearest_archive_step,
+    paper_archive_step,
+    sort_cells,
+)
 from ._philox import FIRST, PURPOSE_NOISE, make_stream
-from ._species import make_species, speciate
-from ._trial import make_trace, make_workspace, run_trial
+from ._species import SpeciesTable, clear_species, speciate
+from ._trial import Trace, make_block, make_trace, run_block
+from ._wiring import Wiring, wire
 
 COVERAGE = 0
 NOVELTY = 1
@@ -34,7 +44,6 @@ class RunRules(NamedTuple):
     archive_size: int
     above_all: bool  # whether a newcomer must be more novel than everyone in the paper's archive
     by_column: bool  # whether behaviors are sorted by x first
-    padding: float  # distance for a cell without a counterpart [cells]
     neighbors: int
     archive_threshold: float
     archive_patience: int
@@ -60,147 +69,360 @@ class RunRows(NamedTuple):
     bias: NDArray[np.float64]  # (r, g, n, outputs + hidden room)
 
 
+class Runs(NamedTuple):
+    """What a block of r runs of n individuals knows beside its genomes."""
+
+    species_of: NDArray[np.int32]  # (r, n)
+    parents: NDArray[np.int32]  # (r, n, 2)
+    fitness: NDArray[np.float64]  # (r, n)
+    novelty: NDArray[np.float64]  # (r, n)
+    # Of each run, with the run as first axis
+    innovations: Innovations
+    species: SpeciesTable
+    archive: Archive
+    archive_counters: NDArray[np.int64]  # (r, 2)
+    archive_threshold: NDArray[np.float64]  # (r, 1)
+
+
+class RunRoom(NamedTuple):
+    """Room for a block of r runs of n individuals, t = r * n trials, in an arena of k cells."""
+
+    runs: Runs
+    genomes: Genomes
+    children: Genomes
+    networks: Networks
+    lanes: Lanes
+    wiring: Wiring
+    trace: Trace  # keeps nothing
+    which: NDArray[np.int32]  # (t,) 0, 1, ...
+    counters: NDArray[np.uint32]  # (t, 3)
+    cells: NDArray[np.uint8]  # (t, k)
+    ends: NDArray[np.uint8]  # (t, k)
+    counts: NDArray[np.int32]  # (t, 3)
+    points: NDArray[np.uint8]  # (n, k, 2)
+    n_points: NDArray[np.int32]  # (n,)
+    spans: NDArray[np.float64]  # (columns, rows)
+    nearest: NearestRoom
+
+
+@inlined
+def rows_of(genomes, first, n):
+    """The genomes of n individuals among others."""
+    last = first + n
+    return Genomes(
+        genomes.n_connections[first:last],
+        genomes.n_hidden[first:last],
+        genomes.innovation[first:last],
+        genomes.source[first:last],
+        genomes.target[first:last],
+        genomes.weight[first:last],
+        genomes.enabled[first:last],
+        genomes.hidden[first:last],
+        genomes.bias[first:last],
+        genomes.full,
+        genomes.reached,
+        genomes.cursor,
+    )
+
+
+@inlined
+def _innovations_of(innovations, run):
+    return Innovations(
+        innovations.counters[run],
+        innovations.link_source[run],
+        innovations.link_target[run],
+        innovations.link_number[run],
+        innovations.split_gene[run],
+        innovations.split_node[run],
+        innovations.split_number[run],
+    )
+
+
+@inlined
+def _species_of_run(species, run):
+    return SpeciesTable(
+        species.identity[run],
+        species.size[run],
+        species.best[run],
+        species.improved[run],
+        species.counts[run],
+        species.floats[run],
+        species.improved_at[run],
+        species.numbers,
+        species.shares,
+    )
+
+
+@inlined
+def _archive_of(archive, run):
+    return Archive(
+        archive.points[run],
+        archive.n_points[run],
+        archive.among[run],
+        archive.state[run],
+        archive.place_of,
+        archive.distance,
+        archive.archived,
+    )
+
+
+def _make_runs(rules, cells, n_runs):
+    n = rules.population
+    archive_room = rules.archive_size if rules.selection == NOVELTY else 0
+    if rules.selection == NEAREST_NOVELTY:
+        archive_room = n * rules.n_generations
+    return Runs(
+        species_of=np.zeros((n_runs, n), np.int32),
+        parents=np.zeros((n_runs, n, 2), np.int32),
+        fitness=np.zeros((n_runs, n)),
+        novelty=np.full((n_runs, n), math.nan),
+        innovations=Innovations(
+            np.zeros((n_runs, 4), np.int64),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+        ),
+        species=SpeciesTable(
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, n)),
+            np.zeros((n_runs, n), np.int32),
+            np.zeros((n_runs, 2), np.int64),
+            np.zeros((n_runs, 2)),
+            np.zeros((n_runs, 1), np.int64),
+            np.zeros((3, 2 * n), np.int64),
+            np.zeros((4, n)),
+        ),
+        archive=Archive(
+            np.zeros((n_runs, archive_room, cells, 2), np.uint8),
+            np.zeros((n_runs, archive_room), np.int32),
+            np.zeros((n_runs, rules.archive_size, rules.archive_size)),
+            np.zeros((n_runs, 2), np.int64),
+            np.zeros(n, np.int64),
+            np.zeros((n, rules.archive_size)),
+            np.zeros(rules.archive_size),
+        ),
+        archive_counters=np.zeros((n_runs, 2), np.int64),
+        archive_threshold=np.zeros((n_runs, 1)),
+    )
+
+
 @kernel
-def _keep_genomes(genomes, rows, run, generation):
-    """Copy a generation's genomes into the rows."""
+def _begin(runs, genomes, run, neat, rules, key, replicate):
+    """First genomes, in their species."""
+    n = rules.population
+    clear_innovations(neat, _innovations_of(runs.innovations, run))
+    species = _species_of_run(runs.species, run)
+    clear_species(neat, species)
+    archive = _archive_of(runs.archive, run)
+    archive.state[0] = archive.state[1] = 0
+    runs.archive_counters[run, 0] = runs.archive_counters[run, 1] = 0
+    runs.archive_threshold[run, 0] = rules.archive_threshold
+    for row in range(n):
+        runs.species_of[run, row] = 0
+        runs.parents[run, row, 0] = runs.parents[run, row, 1] = -1
+    own = rows_of(genomes, run * n, n)
+    first_genomes(own, neat, key, replicate, FIRST)
+    if rules.selection != RANDOM:
+        speciate(own, own, runs.fitness[run], runs.species_of[run], species, neat, key, replicate, FIRST)
+
+
+@kernel
+def _go_on(runs, genomes, children, run, neat, rules, key, replicate, generation):
+    """The next generation of a run, into `children`."""
+    n = rules.population
+    new = rows_of(children, run * n, n)
+    if rules.selection == RANDOM:
+        first_genomes(new, neat, key, replicate, generation + 1)
+        return
+    next_generation(
+        rows_of(genomes, run * n, n),
+        runs.fitness[run],
+        runs.species_of[run],
+        _species_of_run(runs.species, run),
+        neat,
+        _innovations_of(runs.innovations, run),
+        key,
+        replicate,
+        generation,
+        new,
+        runs.parents[run],
+    )
+
+
+@kernel
+def _keep(runs, genomes, run, rows, to_run, generation):
+    """Copy a generation of a run into the rows."""
     outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
-    for row in range(genomes.n_connections.size):
+    population = runs.fitness.shape[1]
+    for k in range(population):
+        row = run * population + k
+        rows.fitness[to_run, generation, k] = runs.fitness[run, k]
+        rows.novelty[to_run, generation, k] = runs.novelty[run, k]
+        rows.species[to_run, generation, k] = runs.species_of[run, k]
+        rows.parents[to_run, generation, k, 0] = runs.parents[run, k, 0]
+        rows.parents[to_run, generation, k, 1] = runs.parents[run, k, 1]
         n = genomes.n_connections[row]
         h = genomes.n_hidden[row]
-        rows.n_connections[run, generation, row] = n
-        rows.n_hidden[run, generation, row] = h
+        rows.n_connections[to_run, generation, k] = n
+        rows.n_hidden[to_run, generation, k] = h
         for gene in range(n):
-            rows.innovation[run, generation, row, gene] = genomes.innovation[row, gene]
-            rows.source[run, generation, row, gene] = genomes.source[row, gene]
-            rows.target[run, generation, row, gene] = genomes.target[row, gene]
-            rows.weight[run, generation, row, gene] = genomes.weight[row, gene]
-            rows.enabled[run, generation, row, gene] = genomes.enabled[row, gene]
+            rows.innovation[to_run, generation, k, gene] = genomes.innovation[row, gene]
+            rows.source[to_run, generation, k, gene] = genomes.source[row, gene]
+            rows.target[to_run, generation, k, gene] = genomes.target[row, gene]
+            rows.weight[to_run, generation, k, gene] = genomes.weight[row, gene]
+            rows.enabled[to_run, generation, k, gene] = genomes.enabled[row, gene]
         for node in range(h):
-            rows.hidden[run, generation, row, node] = genomes.hidden[row, node]
+            rows.hidden[to_run, generation, k, node] = genomes.hidden[row, node]
         for node in range(outputs + h):
-            rows.bias[run, generation, row, node] = genomes.bias[row, node]
+            rows.bias[to_run, generation, k, node] = genomes.bias[row, node]
 
 
 @kernel
-def run_replicates(scene, trial, neat, rules, key, first_replicate, rows):
+def _score(room, run, rules, scene, rows, to_run, generation):
+    """What a run's generation is worth: its coverage, or its novelty."""
+    runs = room.runs
+    n_cells = scene.columns * scene.rows
+    is_novelty = rules.selection == NOVELTY or rules.selection == NEAREST_NOVELTY
+    for row in range(rules.population):
+        trial = run * rules.population + row
+        for k in range(3):
+            rows.counts[to_run, generation, row, k] = room.counts[trial, k]
+        for k in range(room.counts[trial, 0]):
+            rows.cells[to_run, generation, row, k] = room.cells[trial, k]
+        counted = room.counts[trial, 1] if rules.count_ends else room.counts[trial, 0]
+        runs.fitness[run, row] = counted / n_cells
+        if is_novelty:
+            visited = room.ends[trial] if rules.count_ends else room.cells[trial]
+            sort_cells(visited, counted, scene.columns, scene.rows, rules.by_column, room.points[row])
+            room.n_points[row] = counted
+    if not is_novelty:
+        return
+    archive = _archive_of(runs.archive, run)
+    novelty = runs.novelty[run]
+    if rules.selection == NOVELTY:
+        paper_archive_step(room.points, room.n_points, room.spans, archive, rules.above_all, novelty)
+    else:
+        nearest_archive_step(
+            room.points,
+            room.n_points,
+            room.spans,
+            rules.archive_patience,
+            archive.points,
+            archive.n_points,
+            archive.state,
+            runs.archive_counters[run],
+            runs.archive_threshold[run],
+            room.nearest,
+            novelty,
+        )
+    for row in range(rules.population):
+        runs.fitness[run, row] = novelty[row]
+
+
+def runs_together(population):
+    """Runs whose individuals fill blocks of lanes without many being left over."""
+    together = 1
+    while together * population < 4 * LANES and (together * population) % LANES != 0:
+        together += 1
+    return together
+
+
+def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
+    """Room for a block of runs, at most `n_runs`, with so much room for genes and hidden nodes a genome."""
+    n = rules.population
+    together = min(runs_together(n), n_runs)
+    trials = together * n
+    n_cells = scene.columns * scene.rows
+    lanes, wiring = make_block(scene, neat, hidden_room)
+    archive_room = n * rules.n_generations if rules.selection == NEAREST_NOVELTY else 0
+    return RunRoom(
+        runs=_make_runs(rules, n_cells, together),
+        genomes=make_genomes(trials, neat.n_outputs, room, hidden_room),
+        children=make_genomes(trials, neat.n_outputs, room, hidden_room),
+        networks=make_networks(trials, neat, room, hidden_room),
+        lanes=lanes,
+        wiring=wiring,
+        trace=make_trace(scene.heading, scene.sensors.shape[0], neat.n_inputs, -1, 1),
+        which=np.arange(trials, dtype=np.int32),
+        counters=np.zeros((trials, 3), np.uint32),
+        cells=np.zeros((trials, n_cells), np.uint8),
+        ends=np.zeros((trials, n_cells), np.uint8),
+        counts=np.zeros((trials, 3), np.int32),
+        points=np.zeros((n, n_cells, 2), np.uint8),
+        n_points=np.zeros(n, np.int32),
+        spans=make_spans(scene.columns, scene.rows),
+        nearest=NearestRoom(np.zeros(n + archive_room), np.zeros(rules.neighbors), np.zeros(n, np.bool_)),
+    )
+
+
+@kernel
+def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
     """Carry out one run for each place of `rows`, replicate `first_replicate` and on.
+
+    Runs go forward together, a block of them at a time, so that their trials fill the lanes. What comes of
+    one does not depend on the others.
 
     Args:
         scene, trial, neat, rules: Where, how, by which NEAT and for what.
         key: The key of the condition's random numbers.
         first_replicate: Number of the first run.
+        room: For as many genes a genome as `rows`.
         rows: Written; its genome room is the most that a genome may hold.
 
     Returns:
         Whether all genomes found room; if not, the rows are worth nothing and want more room.
     """
+    runs, genomes, children, networks = room.runs, room.genomes, room.children, room.networks
     n = rules.population
-    room = rows.innovation.shape[3]
-    hidden_room = rows.hidden.shape[3]
-    cells = scene.columns * scene.rows
-    genomes = make_genomes(n, neat.n_outputs, room, hidden_room)
-    children = make_genomes(n, neat.n_outputs, room, hidden_room)
-    networks = make_networks(n, neat, room, hidden_room)
-    work = make_workspace(scene, neat.n_inputs + neat.n_outputs + hidden_room)
-    trace = make_trace(scene, neat.n_inputs, -1)
-    points = np.empty((n, cells, 2))
-    n_points = np.empty(n, np.int32)
-    is_novelty = rules.selection == NOVELTY or rules.selection == NEAREST_NOVELTY
-    archive_room = rules.archive_size if rules.selection == NOVELTY else 0
-    if rules.selection == NEAREST_NOVELTY:
-        archive_room = n * rules.n_generations
-    archive = np.empty((archive_room, cells, 2))
-    n_archive = np.zeros(archive_room, np.int32)
-    archive_state = np.zeros(2, np.int64)
-    archive_counters = np.zeros(2, np.int64)
-    archive_threshold = np.empty(1)
-    fitness = np.empty(n)
-    novelty = np.empty(n)
-    for row in range(n):
-        novelty[row] = math.nan
-    species_of = np.zeros(n, np.int32)
-    parents = np.empty((n, 2), np.int32)
-    for run in range(rows.fitness.shape[0]):
-        replicate = first_replicate + run
-        innovations = make_innovations(neat, n)
-        species = make_species(neat, n)
-        archive_state[0] = archive_state[1] = 0
-        archive_counters[0] = archive_counters[1] = 0
-        archive_threshold[0] = rules.archive_threshold
-        for row in range(n):
-            species_of[row] = 0
-            parents[row, 0] = parents[row, 1] = -1
-        first_genomes(genomes, neat, key, replicate, FIRST)
-        if rules.selection != RANDOM:
-            speciate(genomes, genomes, fitness, species_of, species, neat, key, replicate, FIRST)
+    total = rows.fitness.shape[0]
+    together = runs.fitness.shape[0]
+    for first_run in range(0, total, together):
+        n_runs = min(together, total - first_run)
+        for run in range(n_runs):
+            _begin(runs, genomes, run, neat, rules, key, first_replicate + first_run + run)
         for generation in range(rules.n_generations):
-            for row in range(n):
-                decode(genomes, row, neat, networks, row)
-                stream = make_stream(key, replicate, generation, row, FIRST, PURPOSE_NOISE)
-                n_line, n_ends, n_stalls = run_trial(
-                    scene, trial, networks, row, neat, stream, work, rows.cells[run, generation, row], trace
+            for run in range(n_runs):
+                for row in range(n):
+                    at = run * n + row
+                    decode(genomes, at, neat, networks, at)
+                    stream = make_stream(
+                        key, first_replicate + first_run + run, generation, row, FIRST, PURPOSE_NOISE
+                    )
+                    room.counters[at, 0] = stream[0]
+                    room.counters[at, 1] = stream[1]
+                    room.counters[at, 2] = stream[2]
+            for first in range(0, n_runs * n, LANES):
+                n_lanes = min(LANES, n_runs * n - first)
+                wire(networks, room.which, first, n_lanes, neat, room.wiring)
+                run_block(
+                    scene,
+                    trial,
+                    neat,
+                    room.wiring,
+                    key,
+                    room.counters,
+                    first,
+                    n_lanes,
+                    room.lanes,
+                    room.cells,
+                    room.counts,
+                    room.trace,
                 )
-                rows.counts[run, generation, row, 0] = n_line
-                rows.counts[run, generation, row, 1] = n_ends
-                rows.counts[run, generation, row, 2] = n_stalls
-                counted = n_ends if rules.count_ends else n_line
-                fitness[row] = counted / cells
-                if is_novelty:
-                    visited = work.order_ends if rules.count_ends else rows.cells[run, generation, row]
-                    sort_cells(visited, counted, scene.columns, scene.rows, rules.by_column, points[row])
-                    n_points[row] = counted
-            if rules.selection == NOVELTY:
-                paper_archive_step(
-                    points,
-                    n_points,
-                    rules.padding,
-                    archive,
-                    n_archive,
-                    archive_state,
-                    rules.above_all,
-                    novelty,
-                )
-            elif rules.selection == NEAREST_NOVELTY:
-                nearest_archive_step(
-                    points,
-                    n_points,
-                    rules.padding,
-                    rules.neighbors,
-                    rules.archive_patience,
-                    archive,
-                    n_archive,
-                    archive_state,
-                    archive_counters,
-                    archive_threshold,
-                    novelty,
-                )
-            for row in range(n):
-                if is_novelty:
-                    fitness[row] = novelty[row]
-                rows.fitness[run, generation, row] = fitness[row]
-                rows.novelty[run, generation, row] = novelty[row]
-                rows.species[run, generation, row] = species_of[row]
-                rows.parents[run, generation, row, 0] = parents[row, 0]
-                rows.parents[run, generation, row, 1] = parents[row, 1]
-            _keep_genomes(genomes, rows, run, generation)
-            if generation + 1 == rules.n_generations:
-                break
-            if rules.selection == RANDOM:
-                first_genomes(genomes, neat, key, replicate, generation + 1)
-                continue
-            next_generation(
-                genomes,
-                fitness,
-                species_of,
-                species,
-                neat,
-                innovations,
-                key,
-                replicate,
-                generation,
-                children,
-                parents,
-            )
+                if rules.count_ends:
+                    for lane in range(n_lanes):
+                        list_cells(room.lanes.ends, lane, scene.columns, scene.rows, room.ends[first + lane])
+            for run in range(n_runs):
+                to_run = first_run + run
+                _score(room, run, rules, scene, rows, to_run, generation)
+                _keep(runs, genomes, run, rows, to_run, generation)
+                if generation + 1 < rules.n_generations:
+                    _go_on(
+                        runs, genomes, children, run, neat, rules, key, first_replicate + to_run, generation
+                    )
             if children.full[0]:
                 return False
             genomes, children = children, genomes

@@ -3,7 +3,7 @@
 Everything here follows Jyro's numbers, not only its rules: lines are rounded to seven decimals in the same
 places, and operations come in the same order. The rounding matters. It decides whether a body that
 touches a wall is blocked, and it moves a crossing of two nearly parallel lines by far more than 1e-7 m.
-`_geometry.py` leaves it out and is for trials, where speed counts and noise hides it.
+`_walls.py` leaves it out and is for trials, where speed counts and noise hides it.
 
 Headings are Jyro's: 0 faces +y, counter-clockwise. A *line* is a row of six numbers: both ends, slope, and
 y at x = 0; a vertical one has the slope inf.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
+from ._compile import kernel, maker
 
 FLOATS = NDArray[np.float64]
 INTS = NDArray[np.int64]
@@ -218,7 +218,7 @@ def blocked(scene, walls, bodies, robot, edges):
     return False
 
 
-@kernel
+@maker
 def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):
     """Move one robot by one step, or leave it entirely where it is: (stall, energy spent).
 
@@ -245,7 +245,7 @@ def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):
 # --- sensors -----------------------------------------------------------------------------------------------
 
 
-@kernel
+@maker
 def cast_ray(scene, walls, bodies, robot, px, py, angle, reach):
     """Distance from P to the nearest wall or robot of another name [m]; inf when nothing is within `reach`.
 
@@ -273,7 +273,7 @@ def light_falloff(sensor, distance, reach):
     return (1.0 / (part * part)) / (1.0 / (nearest * nearest))  # its square
 
 
-@kernel
+@maker
 def read_light(scene, walls, bodies, robot, sensor, px, py, reach):
     """Light that arrives at P from all lights; half of it from those in a shadow."""
     total = 0.0
@@ -288,7 +288,7 @@ def read_light(scene, walls, bodies, robot, sensor, px, py, reach):
     return total
 
 
-@kernel
+@maker
 def sense(scene, walls, bodies, robot, pose, readings):
     """Fill the robot's part of `readings` (s,): distances [m], 0 or 1 from bumpers, light intensities."""
     turned = pose[2] + _HALF_PI
@@ -314,7 +314,7 @@ def sense(scene, walls, bodies, robot, pose, readings):
 # --- controllers -------------------------------------------------------------------------------------------
 
 
-@kernel
+@maker
 def observe(scene, robot, readings, stall, part_of_time):
     """The inputs of the robot's network, in its order, as a new array."""
     own = readings[scene.sensor_rows[robot] : scene.sensor_rows[robot + 1]]
@@ -336,7 +336,7 @@ def observe(scene, robot, readings, stall, part_of_time):
     return values[:n]
 
 
-@kernel
+@maker
 def think(scene, robot, weight_start, values):
     """The robot's command (speed, turn rate) from the inputs of its network: layers of tanh(W x + b)."""
     w = weight_start
@@ -354,7 +354,7 @@ def think(scene, robot, weight_start, values):
     return values[0] * scene.scales[robot, 0], values[1] * scene.scales[robot, 1]
 
 
-@kernel
+@maker
 def first_weights(scene):
     """(r,) where the weights of each robot's network begin in `scene.weights`."""
     starts = np.zeros(len(scene.names), np.int64)
@@ -369,7 +369,7 @@ def first_weights(scene):
 # --- the scene ---------------------------------------------------------------------------------------------
 
 
-@kernel
+@maker
 def run_scene(scene: Scene, dt: float, n_steps: int) -> tuple[FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS]:
     """What happens in a scene, step by step; row 0 is the start.
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
+from ._compile import inlined, kernel
 from ._genome import has_node, next_below, node_bias_of
 from ._philox import FIRST, PURPOSE_SPECIES, make_stream
 
@@ -23,6 +23,8 @@ class SpeciesTable(NamedTuple):
     counts: NDArray[np.int64]  # (2,) species now; next identity
     floats: NDArray[np.float64]  # (2,) compatibility threshold; best fitness of the whole run
     improved_at: NDArray[np.int64]  # (1,) generation of that best fitness
+    numbers: NDArray[np.int64]  # (3, 2 n) room
+    shares: NDArray[np.float64]  # (4, n) room
 
 
 N_SPECIES = 0
@@ -35,23 +37,33 @@ LOWEST_THRESHOLD = 0.3
 
 
 @kernel
+def clear_species(rules, species):
+    """Make it a table of no species yet."""
+    species.counts[N_SPECIES] = 0
+    species.counts[NEXT_IDENTITY] = 0
+    species.floats[THRESHOLD] = rules.threshold
+    species.floats[BEST_EVER] = -math.inf
+    species.improved_at[0] = 0
+
+
 def make_species(rules, n):
     """No species yet, with room for as many as there are individuals."""
-    floats = np.empty(2)
-    floats[THRESHOLD] = rules.threshold
-    floats[BEST_EVER] = -math.inf
-    return SpeciesTable(
+    species = SpeciesTable(
         np.zeros(n, np.int32),
         np.zeros(n, np.int32),
         np.zeros(n),
         np.zeros(n, np.int32),
         np.zeros(2, np.int64),
-        floats,
+        np.zeros(2),
         np.zeros(1, np.int64),
+        np.zeros((3, 2 * n), np.int64),
+        np.zeros((4, n)),
     )
+    clear_species(rules, species)
+    return species
 
 
-@kernel
+@inlined
 def genome_distance(one, a, other, b, rules):
     """Compatibility distance c1 E/N + c2 D/N + c3 W of two genomes; inf when no gene matches.
 
@@ -100,7 +112,7 @@ def genome_distance(one, a, other, b, rules):
     )
 
 
-@kernel
+@inlined
 def _representative(species_of, fitness, which, rules, stream, cursor):
     """A member of a species of the generation before: at random, or its champion."""
     if rules.champion_represents:
@@ -140,16 +152,15 @@ def speciate(new, old, fitness, species_of, species, rules, key, replicate, gene
     """
     n = new.n_connections.size
     n_known = species.counts[N_SPECIES]
-    representative = np.empty(n_known + n, np.int32)
-    cursor = np.zeros(1, np.int64)
+    representative, identity, size = species.numbers[0], species.numbers[1], species.numbers[2]
+    cursor = new.cursor
     for k in range(n_known):
         stream = make_stream(key, replicate, generation, k, FIRST, PURPOSE_SPECIES)
         cursor[0] = 0
         representative[k] = _representative(species_of, fitness, species.identity[k], rules, stream, cursor)
-    identity = np.empty(n_known + n, np.int32)
     for k in range(n_known):
         identity[k] = species.identity[k]
-    size = np.zeros(n_known + n, np.int32)
+        size[k] = 0
     n_all = n_known
     for row in range(n):
         home = -1
@@ -168,6 +179,7 @@ def speciate(new, old, fitness, species_of, species, rules, key, replicate, gene
             home = n_all
             representative[home] = row
             identity[home] = species.counts[NEXT_IDENTITY]
+            size[home] = 0
             species.counts[NEXT_IDENTITY] += 1
             n_all += 1
         size[home] += 1

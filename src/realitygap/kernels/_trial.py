@@ -1,317 +1,383 @@
-"""One trial: one network, one robot with range sensors, one arena of straight walls.
+"""Trials: networks, robots with range sensors, one arena of straight walls, many at a time.
 
 The platform `jyro`: the box that collides, a blocked move that changes nothing, one thin ray a sensor and the
 paper's uniform noise (Jyro's model, sections 3 to 6; the paper, section 2.3). Headings here are
-counter-clockwise from +x.
+counter-clockwise from +x, in whole turns; positions count from the start.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel
-from ._coverage import to_grid, visit, visit_line
-from ._geometry import ray_fraction, segments_touch
-from ._math import sin_cos, wrap_heading
-from ._network import activate
-from ._philox import FIRST, PURPOSE_NOISE, draw_words, make_stream, unit
-
-# Two lines may differ from their distance as computed by rounding; beyond this margin [m] they cannot touch.
-REACH_MARGIN = 1e-9
+from ._compile import inlined, kernel, stage
+from ._lanes import LANES, fill, keep_where_low, make_lanes
+from ._marks import count_cells, list_fresh, mark_ends, mark_line, place_line
+from ._math import sin_cos_of_turns
+from ._philox import philox
+from ._walls import gap_to_planes, sense_planes, sense_segments, touch_segments
+from ._wiring import make_wiring, think, wire
 
 
 class TrialScene(NamedTuple):
-    """Where and with what body a trial takes place; lengths [m], angles [rad]."""
+    """Where and with what body trials take place, in the precision of the trials; lengths [m] from the start."""
 
-    walls: NDArray[np.float64]  # (w, 4) x1, y1, x2, y2
-    normals: NDArray[np.float64]  # (w, 3) unit normal and offset of each wall's line
-    body: NDArray[np.float64]  # (b, 2) corners, forward and left of the center, in order
-    body_radius: float  # no corner is farther from the center
-    sensors: NDArray[np.float64]  # (s, 4) mount forward and left, cosine and sine of its direction
-    sensor_radius: float  # no end of a ray is farther from the center
-    sensor_range: float
-    start: NDArray[np.float64]  # (3,) x, y, heading
-    grid: NDArray[np.float64]  # (3,) x and y of the lower left corner of the reachable cells, size of a cell
+    walls: NDArray[np.floating]  # (w, 4) x1, y1, x2, y2
+    normals: NDArray[np.floating]  # (w, 3) unit normal into the room and offset of each wall's line
+    is_enclosed: bool  # whether a wall is where its line is, for all that a trial can reach
+    body: NDArray[np.floating]  # (b, 2) corners, forward and left of the center, in order
+    sensors: NDArray[np.floating]  # (s, 4) mount forward and left, cosine and sine of its direction
+    heading: NDArray[np.floating]  # (1,) of the start [turns]
+    grid: NDArray[np.floating]  # (4,) the start in grid units, cells per meter, how near to a border is on it
     columns: int
     rows: int
 
 
 class TrialRules(NamedTuple):
-    """How a trial is run."""
+    """How trials are run. The arrays have one number for all trials, or one for each."""
 
     n_steps: int
-    step_s: float
-    speed: float  # at full output [m/s]
-    turn_rate: float  # at full output [rad/s]
-    noise: float  # each reading is moved by noise * U(-1, 1)
     clip: bool  # whether a noisy reading is limited to 0..1
     bias_input: bool  # whether the network has a fourth input, constant
     bias_value: float
-
-
-class Workspace(NamedTuple):
-    """Room that trials share, one after the other."""
-
-    values: NDArray[np.float64]  # (m,)
-    before: NDArray[np.float64]  # (m,)
-    readings: NDArray[np.float64]  # (s,) [m]
-    corners: NDArray[np.float64]  # (b, 2) [m]
-    visited: NDArray[np.bool_]  # (c,)
-    visited_ends: NDArray[np.bool_]  # (c,)
-    order_ends: NDArray[np.uint8]  # (c,)
+    step_length: NDArray[np.floating]  # at full output [m]
+    step_turn: NDArray[np.floating]  # at full output [turns]
+    noise: NDArray[np.floating]  # each reading is moved by noise * U(-1, 1)
+    sensor_range: NDArray[np.floating]  # [m]
 
 
 class Trace(NamedTuple):
-    """What happened step by step; row 0 is the start. Arrays of no rows: nothing is kept."""
+    """What happened step by step in the first k lanes; row 0 is the start. Arrays of no rows keep nothing."""
 
-    poses: NDArray[np.float64]  # (t + 1, 3)
-    readings: NDArray[np.float64]  # (t + 1, s) [m], without noise
-    inputs: NDArray[np.float64]  # (t, i) what the network saw
-    commands: NDArray[np.float64]  # (t, 2) what it answered, -1..1
-    stalled: NDArray[np.bool_]  # (t + 1,)
-
-
-@kernel
-def make_workspace(scene, n_nodes):
-    """Room for trials in a scene by networks of up to so many nodes."""
-    cells = scene.columns * scene.rows
-    return Workspace(
-        np.zeros(n_nodes),
-        np.zeros(n_nodes),
-        np.zeros(scene.sensors.shape[0]),
-        np.zeros((scene.body.shape[0], 2)),
-        np.zeros(cells, np.bool_),
-        np.zeros(cells, np.bool_),
-        np.zeros(cells, np.uint8),
-    )
+    poses: NDArray[np.floating]  # (t + 1, 3, k)
+    readings: NDArray[np.floating]  # (t + 1, s, k) parts of the range, without noise
+    inputs: NDArray[np.floating]  # (t, i, k) what the networks saw
+    commands: NDArray[np.floating]  # (t, 2, k) what they answered, -1..1
+    stalled: NDArray[np.bool_]  # (t + 1, k)
 
 
-@kernel
-def make_trace(scene, n_inputs, n_steps):
-    """Room for the steps of one trial; `n_steps` < 0: for none."""
-    sensors = scene.sensors.shape[0]
-    return Trace(
-        np.zeros((n_steps + 1, 3)),
-        np.zeros((n_steps + 1, sensors)),
-        np.zeros((max(n_steps, 0), n_inputs)),
-        np.zeros((max(n_steps, 0), 2)),
-        np.zeros(n_steps + 1, np.bool_),
-    )
+@stage
+def _draw(step, c1, c2, c3, k0, k1, w0, w1, w2, w3):
+    for lane in range(LANES):
+        a, b, c, d = philox(np.uint32(step), c1[lane], c2[lane], c3[lane], k0, k1)
+        w0[lane] = a
+        w1[lane] = b
+        w2[lane] = c
+        w3[lane] = d
 
 
-@kernel
-def blocked(scene, x, y, cosine, sine, corners):
-    """Whether the body at a pose touches a wall."""
-    n = scene.body.shape[0]
-    placed = False
-    for w in range(scene.walls.shape[0]):
-        gap = abs(scene.normals[w, 0] * x + scene.normals[w, 1] * y - scene.normals[w, 2])
-        if gap > scene.body_radius + REACH_MARGIN:
-            continue
-        if not placed:
-            for b in range(n):
-                forward = scene.body[b, 0]
-                left = scene.body[b, 1]
-                corners[b, 0] = x + forward * cosine - left * sine
-                corners[b, 1] = y + forward * sine + left * cosine
-            placed = True
-        for b in range(n):
-            to = b + 1 if b + 1 < n else 0
-            if segments_touch(
-                corners[b, 0],
-                corners[b, 1],
-                corners[to, 0],
-                corners[to, 1],
-                scene.walls[w, 0],
-                scene.walls[w, 1],
-                scene.walls[w, 2],
-                scene.walls[w, 3],
-            ):
-                return True
-    return False
+@stage
+def draw_lanes(step, counters, key, words):
+    """Four random words a lane.
 
-
-@kernel
-def sense(scene, x, y, cosine, sine, readings):
-    """Distance from each sensor to the nearest wall straight ahead of it, at most the range [m]."""
-    for s in range(readings.size):
-        readings[s] = 1.0
-    for w in range(scene.walls.shape[0]):
-        gap = abs(scene.normals[w, 0] * x + scene.normals[w, 1] * y - scene.normals[w, 2])
-        if gap > scene.sensor_radius + REACH_MARGIN:
-            continue
-        for s in range(readings.size):
-            forward = scene.sensors[s, 0]
-            left = scene.sensors[s, 1]
-            px = x + forward * cosine - left * sine
-            py = y + forward * sine + left * cosine
-            ahead = scene.sensors[s, 2]
-            aside = scene.sensors[s, 3]
-            qx = px + scene.sensor_range * (ahead * cosine - aside * sine)
-            qy = py + scene.sensor_range * (ahead * sine + aside * cosine)
-            fraction = ray_fraction(
-                px, py, qx, qy, scene.walls[w, 0], scene.walls[w, 1], scene.walls[w, 2], scene.walls[w, 3]
-            )
-            readings[s] = min(readings[s], fraction)
-    for s in range(readings.size):
-        readings[s] *= scene.sensor_range
-
-
-@kernel
-def largest_noisy_reading(readings, sensor_range, noise, clip, stream, step):
-    """What the network sees of the obstacle sensors: the largest of the inverted, noisy readings.
-
-    Each reading becomes (R - d) / R, limited to 1, and is moved by noise * U(-1, 1); then the largest is
-    taken (the paper, section 2.3). With several sensors and noise this has a mean above that of one.
+    Args:
+        step: First word of the counter.
+        counters: (3, LANES) the other three.
+        key: uint64.
+        words: (4, LANES) written.
     """
-    n = readings.size
-    blocks = (n + 3) >> 2
-    largest = -math.inf
-    for s in range(n):
-        value = min((sensor_range - readings[s]) / sensor_range, 1.0)
-        lane = s & 3
-        if lane == 0:
-            words = draw_words(stream, step * blocks + (s >> 2))
-        if lane == 0:
-            word = words[0]
-        elif lane == 1:
-            word = words[1]
-        elif lane == 2:
-            word = words[2]
-        else:
-            word = words[3]
-        value += noise * (2.0 * unit(word) - 1.0)
+    k0 = np.uint32(np.uint64(key) & np.uint64(0xFFFFFFFF))
+    k1 = np.uint32(np.uint64(key) >> np.uint64(32))
+    _draw(step, counters[0], counters[1], counters[2], k0, k1, words[0], words[1], words[2], words[3])
+
+
+@stage
+def _larger_noisy(fraction, words, noise, clip, value):
+    real = value.dtype.type
+    for lane in range(LANES):
+        # Odd, from 1 - 2^24 to 2^24 - 1, which both precisions hold exactly: the mean is 0 in either.
+        odd = np.int32(np.int32(words[lane] >> np.uint32(8)) * np.int32(2) + np.int32(1 - (1 << 24)))
+        one = real(1.0) - fraction[lane] + noise[lane] * (real(odd) * real(1.0 / (1 << 24)))
         if clip:
-            value = min(max(value, 0.0), 1.0)
-        largest = max(largest, value)
-    return largest
+            one = one if one > real(0.0) else real(0.0)
+            one = one if one < real(1.0) else real(1.0)
+        largest = value[lane]
+        value[lane] = one if one > largest else largest
 
 
-@kernel
-def as_command(output):
-    """A network's output as a command: limited to -1..1, and 0 where it is no number.
+@stage
+def largest_noisy_readings(fractions, noise, clip, step, counters, key, words, value):
+    """What networks see of the obstacle sensors: the largest of the inverted, noisy readings.
 
-    Only `identity` gives such outputs; a recurrent network of it can grow without limit.
+    Each reading becomes (R - d) / R and is moved by noise * U(-1, 1); then the largest is taken (the paper,
+    section 2.3). With several sensors and noise this has a mean above that of one. Sensor k takes number k of
+    the step's random words, 24 bits of it.
+
+    Args:
+        fractions: (s, LANES) d / R of each sensor, 0..1.
+        noise: Level.
+        clip: Whether a noisy reading is limited to 0..1.
+        step, counters, key, words: As in `draw_lanes`.
+        value: Written.
     """
-    if output > 1.0:
-        return 1.0
-    if output < -1.0:
-        return -1.0
-    return output if output == output else 0.0
+    real = value.dtype.type
+    for lane in range(LANES):
+        value[lane] = real(-np.inf)
+    n = fractions.shape[0]
+    blocks = (n + 3) >> 2
+    for block in range(blocks):
+        draw_lanes(step * blocks + block, counters, key, words)
+        for s in range(4 * block, min(4 * block + 4, n)):
+            _larger_noisy(fractions[s], words[s & 3], noise, clip, value)
 
 
-@kernel
-def run_trial(scene, rules, networks, row, neat, stream, work, order, trace):
-    """Drive one network from the start for all steps.
+@inlined
+def as_command(output):
+    """A network's output as a command: limited to -1..1."""
+    real = type(output)
+    limited = output if output < real(1.0) else real(1.0)
+    return limited if limited > real(-1.0) else real(-1.0)
+
+
+@stage
+def propose(move, turn, step_length, step_turn, pose, proposed):
+    """Where a step would end: along the old heading, then turned."""
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
+    to_sine, to_cosine = proposed.sine, proposed.cosine
+    real = x.dtype.type
+    for lane in range(LANES):
+        length = as_command(move[lane]) * step_length[lane]
+        to_x[lane] = x[lane] + length * cosine[lane]
+        to_y[lane] = y[lane] + length * sine[lane]
+        turned = heading[lane] + as_command(turn[lane]) * step_turn[lane]
+        turned = turned - np.floor(turned + real(0.5))
+        to_heading[lane] = turned
+        sine_now, cosine_now = sin_cos_of_turns(turned)
+        to_sine[lane] = sine_now
+        to_cosine[lane] = cosine_now
+
+
+@stage
+def _note_stalls(low, stalled, n_stalls):
+    real = low.dtype.type
+    for lane in range(LANES):
+        so_far = n_stalls[lane]
+        hit = low[lane] <= real(0.0)
+        stalled[lane] = real(1.0) if hit else real(0.0)
+        n_stalls[lane] = np.int32(so_far + np.int32(1 if hit else 0))
+
+
+@stage
+def settle(low, pose, proposed, stalled, n_stalls):
+    """Go where the step would end, or stay where it is in touch with a wall there."""
+    _note_stalls(low, stalled, n_stalls)
+    keep_where_low(low, pose.x, proposed.x)
+    keep_where_low(low, pose.y, proposed.y)
+    keep_where_low(low, pose.heading, proposed.heading)
+    keep_where_low(low, pose.sine, proposed.sine)
+    keep_where_low(low, pose.cosine, proposed.cosine)
+
+
+@stage
+def sense(scene, lanes):
+    """Distances from each sensor to the nearest wall straight ahead of it, as parts of the range."""
+    if scene.is_enclosed:
+        sense_planes(
+            scene.normals,
+            scene.sensors,
+            lanes.sensor_range,
+            lanes.pose,
+            lanes.seen,
+            lanes.fractions,
+            lanes.rates,
+        )
+    else:
+        sense_segments(
+            scene.walls,
+            scene.sensors,
+            lanes.sensor_range,
+            lanes.pose,
+            lanes.seen,
+            lanes.fractions,
+            lanes.rates,
+        )
+
+
+@stage
+def observe(scene, rules, key, lanes, step):
+    """Write what the networks see before a step to the first of `lanes.values`."""
+    real = lanes.low.dtype.type
+    largest_noisy_readings(
+        lanes.fractions, lanes.noise, rules.clip, step, lanes.counters, key, lanes.words, lanes.values[0]
+    )
+    stall = lanes.values[1]
+    for lane in range(LANES):
+        stall[lane] = lanes.stalled[lane]
+    fill(lanes.values[2], real(step) / real(rules.n_steps))
+    if rules.bias_input:
+        fill(lanes.values[3], real(rules.bias_value))
+
+
+@stage
+def move(scene, lanes, ahead, turn):
+    """Carry out commands (LANES,), limited to -1..1, where nothing is in the way."""
+    propose(ahead, turn, lanes.step_length, lanes.step_turn, lanes.pose, lanes.proposed)
+    if scene.is_enclosed:
+        gap_to_planes(scene.normals, scene.body, lanes.proposed, lanes.seen, lanes.low)
+    else:
+        touch_segments(scene.walls, scene.body, lanes.proposed, lanes.seen, lanes.low)
+    settle(lanes.low, lanes.pose, lanes.proposed, lanes.stalled, lanes.n_stalls)
+
+
+@stage
+def arrive(scene, lanes):
+    """Mark the cells on the way to where the robots are now, and sense there."""
+    place_line(scene.grid, lanes.pose.x, lanes.pose.y, lanes.line)
+    mark_line(
+        lanes.line, scene.grid[3], scene.columns, scene.rows, lanes.visited, lanes.fresh, lanes.any_fresh
+    )
+    mark_ends(lanes.line, scene.columns, scene.rows, lanes.ends)
+    sense(scene, lanes)
+
+
+@stage
+def _spread(values, first, n_lanes, row):
+    """Each trial's own number, or the one of all; lanes without a trial get the last one."""
+    if values.size == 1:
+        fill(row, values[0])
+    else:
+        for lane in range(LANES):
+            row[lane] = values[first + min(lane, n_lanes - 1)]
+
+
+@stage
+def start_lanes(scene, rules, counters, first, n_lanes, lanes):
+    """Put the robots of trials `first` and on at the start, where they have yet to `arrive`.
 
     Args:
         scene, rules: Where and how.
-        networks, row, neat: Which network, and how it is activated.
-        stream: The random numbers of the trial's noise.
-        work: Room.
-        order: (c,) uint8, written: cells visited along the line, in order of first visit.
-        trace: Where to keep the steps; arrays of no rows keep nothing.
-
-    Returns:
-        Cells along the line, cells at the ends of steps (the start counts for both), and blocked steps.
+        counters: (n, 3) uint32, the fixed words of each trial's random numbers.
+        first, n_lanes: Which of the n trials.
+        lanes: Written.
     """
-    keep = trace.stalled.size > 0
-    for cell in range(work.visited.size):
-        work.visited[cell] = False
-        work.visited_ends[cell] = False
-    for node in range(work.values.size):
-        work.values[node] = 0.0
-    x = scene.start[0]
-    y = scene.start[1]
-    heading = scene.start[2]
-    sine, cosine = sin_cos(heading)
-    u = to_grid(x, scene.grid[0], scene.grid[2])
-    v = to_grid(y, scene.grid[1], scene.grid[2])
-    column = int(math.floor(u))
-    line = int(math.floor(v))
-    n_line = visit(column, line, scene.columns, scene.rows, work.visited, order, FIRST)
-    n_ends = visit(column, line, scene.columns, scene.rows, work.visited_ends, work.order_ends, FIRST)
-    sense(scene, x, y, cosine, sine, work.readings)
-    stalled = False
-    n_stalls = 0
-    if keep:
-        trace.poses[0, 0] = x
-        trace.poses[0, 1] = y
-        trace.poses[0, 2] = heading
-        trace.stalled[0] = False
-        for s in range(work.readings.size):
-            trace.readings[0, s] = work.readings[s]
-    for step in range(rules.n_steps):
-        work.values[0] = largest_noisy_reading(
-            work.readings, scene.sensor_range, rules.noise, rules.clip, stream, step
-        )
-        work.values[1] = 1.0 if stalled else 0.0
-        work.values[2] = step / rules.n_steps
-        if rules.bias_input:
-            work.values[3] = rules.bias_value
-        activate(networks, row, neat, work.values, work.before)
-        move = as_command(work.values[neat.n_inputs])
-        turn = as_command(work.values[neat.n_inputs + 1])
-        distance = move * rules.speed * rules.step_s
-        new_x = x + distance * cosine
-        new_y = y + distance * sine
-        new_heading = wrap_heading(heading + turn * rules.turn_rate * rules.step_s)
-        new_sine, new_cosine = sin_cos(new_heading)
-        stalled = blocked(scene, new_x, new_y, new_cosine, new_sine, work.corners)
-        if stalled:
-            n_stalls += 1
-        else:
-            x = new_x
-            y = new_y
-            heading = new_heading
-            sine = new_sine
-            cosine = new_cosine
-            new_u = to_grid(x, scene.grid[0], scene.grid[2])
-            new_v = to_grid(y, scene.grid[1], scene.grid[2])
-            n_line = visit_line(u, v, new_u, new_v, scene.columns, scene.rows, work.visited, order, n_line)
-            u = new_u
-            v = new_v
-            column = int(math.floor(u))
-            line = int(math.floor(v))
-            n_ends = visit(
-                column, line, scene.columns, scene.rows, work.visited_ends, work.order_ends, n_ends
-            )
-            sense(scene, x, y, cosine, sine, work.readings)
-        if keep:
-            for k in range(neat.n_inputs):
-                trace.inputs[step, k] = work.values[k]
-            trace.commands[step, 0] = move
-            trace.commands[step, 1] = turn
-            trace.poses[step + 1, 0] = x
-            trace.poses[step + 1, 1] = y
-            trace.poses[step + 1, 2] = heading
-            trace.stalled[step + 1] = stalled
-            for s in range(work.readings.size):
-                trace.readings[step + 1, s] = work.readings[s]
-    return n_line, n_ends, n_stalls
+    real = lanes.low.dtype.type
+    sine, cosine = sin_cos_of_turns(scene.heading[0])
+    fill(lanes.pose.x, real(0.0))
+    fill(lanes.pose.y, real(0.0))
+    fill(lanes.pose.heading, scene.heading[0])
+    fill(lanes.pose.sine, sine)
+    fill(lanes.pose.cosine, cosine)
+    fill(lanes.stalled, real(0.0))
+    fill(lanes.n_stalls, np.int32(0))
+    fill(lanes.n_line, np.int32(0))
+    fill(lanes.line.to_u, scene.grid[0])
+    fill(lanes.line.to_v, scene.grid[1])
+    _spread(rules.step_length, first, n_lanes, lanes.step_length)
+    _spread(rules.step_turn, first, n_lanes, lanes.step_turn)
+    _spread(rules.noise, first, n_lanes, lanes.noise)
+    _spread(rules.sensor_range, first, n_lanes, lanes.sensor_range)
+    for word in range(3):
+        for lane in range(LANES):
+            lanes.counters[word, lane] = counters[first + min(lane, n_lanes - 1), word]
+    for node in range(lanes.values.shape[0]):
+        fill(lanes.values[node], real(0.0))
+    for word in range(lanes.visited.shape[0]):
+        fill(lanes.visited[word], np.uint32(0))
+        fill(lanes.ends[word], np.uint32(0))
 
 
 @kernel
-def run_trials(
-    scene, rules, networks, neat, key, replicate, generation, first, repeat, work, order, counts, trace
-):
-    """Try each of n networks once; network k draws the noise of individual `first` + k.
+def _keep(trace, lanes, neat, step):
+    for k in range(trace.stalled.shape[1]):
+        trace.poses[step + 1, 0, k] = lanes.pose.x[k]
+        trace.poses[step + 1, 1, k] = lanes.pose.y[k]
+        trace.poses[step + 1, 2, k] = lanes.pose.heading[k]
+        trace.stalled[step + 1, k] = lanes.stalled[k] > 0
+        for s in range(trace.readings.shape[1]):
+            trace.readings[step + 1, s, k] = lanes.fractions[s, k]
+        if step >= 0:
+            for i in range(neat.n_inputs):
+                trace.inputs[step, i, k] = lanes.values[i, k]
+            trace.commands[step, 0, k] = as_command(lanes.values[neat.n_inputs, k])
+            trace.commands[step, 1, k] = as_command(lanes.values[neat.n_inputs + 1, k])
+
+
+def make_trace(like, n_sensors, n_inputs, n_steps, n_kept):
+    """Room for the steps of so many trials; `n_steps` < 0: for none."""
+    real = like.dtype
+    return Trace(
+        np.zeros((n_steps + 1, 3, n_kept), real),
+        np.zeros((n_steps + 1, n_sensors, n_kept), real),
+        np.zeros((max(n_steps, 0), n_inputs, n_kept), real),
+        np.zeros((max(n_steps, 0), 2, n_kept), real),
+        np.zeros((n_steps + 1, n_kept), np.bool_),
+    )
+
+
+@stage
+def advance(scene, rules, neat, wiring, key, lanes, step):
+    """One step of networks and robots; step -1 is the arrival at the start."""
+    if step >= 0:
+        observe(scene, rules, key, lanes, step)
+        think(wiring, neat, lanes.values, lanes.before, lanes.total)
+        move(scene, lanes, lanes.values[neat.n_inputs], lanes.values[neat.n_inputs + 1])
+    arrive(scene, lanes)
+
+
+@kernel
+def _list(scene, lanes, n_lanes, cells, first):
+    list_fresh(
+        lanes.line,
+        scene.columns,
+        scene.rows,
+        lanes.fresh,
+        lanes.any_fresh,
+        n_lanes,
+        cells,
+        first,
+        lanes.n_line,
+    )
+
+
+def make_block(scene, neat, hidden_room):
+    """Room for a block of trials of networks with so many hidden nodes: lanes and wiring."""
+    n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
+    lanes = make_lanes(scene.heading, scene.sensors.shape[0], n_nodes, scene.columns, scene.rows)
+    return lanes, make_wiring(scene.heading, neat, hidden_room)
+
+
+@kernel
+def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, cells, counts, trace):
+    """Drive the networks of a block, from the start for all steps.
 
     Args:
-        scene, rules, networks, neat, work, trace: As in `run_trial`; the trace is that of the last trial.
-        key, replicate, generation, first, repeat: Which random numbers.
-        order: (n, c) uint8, written: cells along the line in order of first visit.
-        counts: (n, 3) int32, written: cells along the line, cells at the ends of steps, blocked steps.
+        scene, rules: Where and how.
+        neat, wiring: The networks.
+        key, counters, first, n_lanes: Of the random numbers, and which of the n trials, as in `start_lanes`.
+        lanes: Room.
+        cells: (n, c) uint8, written: cells visited along the line, in order of first visit.
+        counts: (n, 3) int32, written: cells along the line, cells at the ends of steps (the start counts for
+            both), blocked steps.
+        trace: Where to keep the steps; arrays of no rows keep nothing.
     """
-    for row in range(counts.shape[0]):
-        stream = make_stream(key, replicate, generation, first + row, repeat, PURPOSE_NOISE)
-        n_line, n_ends, n_stalls = run_trial(
-            scene, rules, networks, row, neat, stream, work, order[row], trace
-        )
-        counts[row, 0] = n_line
-        counts[row, 1] = n_ends
-        counts[row, 2] = n_stalls
+    keep = trace.stalled.shape[0] > 0
+    start_lanes(scene, rules, counters, first, n_lanes, lanes)
+    for step in range(-1, rules.n_steps):
+        advance(scene, rules, neat, wiring, key, lanes, step)
+        _list(scene, lanes, n_lanes, cells, first)
+        if keep:
+            _keep(trace, lanes, neat, step)
+    for lane in range(n_lanes):
+        counts[first + lane, 0] = lanes.n_line[lane]
+        counts[first + lane, 1] = count_cells(lanes.ends, lane)
+        counts[first + lane, 2] = lanes.n_stalls[lane]
+
+
+@kernel
+def run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, counts, trace):
+    """Carry out n trials, a block after the other.
+
+    Args:
+        scene, rules, neat: Where, how, and how networks are activated.
+        networks: The networks, at least one.
+        rows: (n,) int32, which network each trial is of.
+        lanes, wiring: Room.
+        key, counters, cells, counts, trace: As in `run_block`.
+    """
+    for first in range(0, rows.size, LANES):
+        n_lanes = min(LANES, rows.size - first)
+        wire(networks, rows, first, n_lanes, neat, wiring)
+        run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, cells, counts, trace)

@@ -8,7 +8,6 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from realitygap.evolution import largest_cell_distance
 from realitygap.kernels import _run
 from realitygap.kernels._run import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
@@ -23,7 +22,6 @@ FIRST_HIDDEN_ROOM = 4
 
 def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
-    arena = condition.arena.arena()
     novelty = condition.novelty
     selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[
         condition.selection
@@ -38,7 +36,6 @@ def run_rules(condition: Condition) -> RunRules:
         archive_size=novelty.archive_size,
         above_all=novelty.enter == "above-all",
         by_column=novelty.sort == "x-then-y",
-        padding=largest_cell_distance(arena.grid.columns, arena.grid.rows),
         neighbors=novelty.neighbors,
         archive_threshold=float(novelty.threshold),
         archive_patience=novelty.patience,
@@ -95,7 +92,9 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
     hidden_room = FIRST_HIDDEN_ROOM
     while True:
         rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
-        if _run.run_replicates(scene, trial, neat, rules, np.uint64(condition.key), first_replicate, rows):
+        space = _run.make_run_room(scene, neat, rules, n_runs, room, hidden_room)
+        key = np.uint64(condition.key)
+        if _run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows):
             return rows
         room, hidden_room = 2 * room, 2 * hidden_room
 

@@ -4,20 +4,79 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._math import sin_cos
-from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS
-from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_trace, make_workspace, run_trials
+from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
+from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_block, make_trace, run_trials
 from realitygap.robots import STEP_S, JyroPlatform
 from realitygap.world import Arena
 
 
-def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
+Precision = Literal["single", "double"]
+REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
+
+# How near to a border of cells [cells] is on it: beyond what rounding does to a position in a long trial.
+SNAP = {"single": 1e-5, "double": 1e-9}
+
+
+def _normals(walls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(w, 3) unit normals towards the side of the start, which is the origin, and offsets of walls (w, 4)."""
+    along = walls[:, 2:] - walls[:, :2]
+    normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(along[:, 0], along[:, 1])[:, None]
+    offsets = (normals * walls[:, :2]).sum(axis=1)
+    outward = offsets > 0
+    normals[outward] *= -1
+    offsets[outward] *= -1
+    return np.column_stack([normals, offsets])
+
+
+def is_enclosed(platform: JyroPlatform, walls: NDArray[np.float64], heading: float) -> bool:
+    """Whether a trial may take each wall for the whole line through it.
+
+    So it is where the walls close a convex room around the robot at its start, every sensor is mounted
+    inside the body's outline, and no step moves the center as far as twice its distance from the nearest edge of
+    the body. Then the body cannot come to lie beyond a wall whole: its center is at least that distance
+    inside before such a step and as far outside after it. So it is in touch with a wall wherever a
+    corner of it is beyond one's line.
+
+    Args:
+        platform: Body, sensors and speed.
+        walls: (w, 4) ends [m] as seen from the start.
+        heading: Of the start.
+    """
+    ends = [tuple(end) for wall in walls for end in (wall[:2], wall[2:])]
+    if (
+        len(walls) < 3
+        or any(ends.count(end) != 2 for end in ends)
+        or (walls[:, :2] == walls[:, 2:]).all(1).any()
+    ):
+        return False
+    normals = _normals(walls)
+    gaps = normals[:, :2] @ walls.reshape(-1, 2).T - normals[:, 2:]
+    if (normals[:, 2] == 0).any() or gaps.min() < -1e-9:
+        return False
+    sine, cosine = math.sin(heading), math.cos(heading)
+    body = np.array(platform.body.corners)
+    turned = body @ np.array([[cosine, sine], [-sine, cosine]])
+    if (normals[:, :2] @ turned.T - normals[:, 2:]).min() <= 0:
+        return False
+    edges = np.column_stack([body, np.roll(body, -1, axis=0)])
+    mounts = np.array([(forward, left) for forward, left, _ in platform.sensors.mounts])
+    inside = _normals(edges)
+    if (inside[:, :2] @ body.T - inside[:, 2:]).min() < -1e-9:
+        return False
+    if (inside[:, :2] @ mounts.T - inside[:, 2:]).min() < 0:
+        return False
+    return platform.speed * STEP_S < 2 * -inside[:, 2].max()
+
+
+def jyro_scene(platform: JyroPlatform, arena: Arena, precision: Precision = "single") -> TrialScene:
     """Arena, body and sensors in the form that kernels read.
 
     Raises:
@@ -25,45 +84,48 @@ def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
     """
     if arena.grid.n_cells > 256:
         raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
-    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
-    along = walls[:, 2:] - walls[:, :2]
-    length = np.sqrt((along * along).sum(axis=1))
-    normals = np.stack([-along[:, 1] / length, along[:, 0] / length], axis=1)
-    offsets = (normals * walls[:, :2]).sum(axis=1)
-    mounts = platform.sensors.mounts
-    sensors = np.empty((len(mounts), 4))
-    radius = 0.0
-    for k, (forward, left, direction) in enumerate(mounts):
-        sine, cosine = sin_cos(direction)
+    real = REAL[precision]
+    start = arena.start
+    walls = np.array(arena.walls, np.float64).reshape(-1, 4) - [start.x, start.y, start.x, start.y]
+    sensors = np.empty((len(platform.sensors.mounts), 4))
+    for k, (forward, left, direction) in enumerate(platform.sensors.mounts):
+        sine, cosine = sin_cos(direction) if direction else (0.0, 1.0)
         sensors[k] = forward, left, cosine, sine
-        radius = max(radius, math.hypot(forward, left) + platform.sensors.max_range)
     grid = arena.grid
+    in_cells = [(start.x - grid.x) / grid.cell, (start.y - grid.y) / grid.cell]
+    cells = [round(place) if abs(place - round(place)) < SNAP["double"] else place for place in in_cells]
     return TrialScene(
-        walls=walls,
-        normals=np.column_stack([normals, offsets]),
-        body=np.array(platform.body.corners, np.float64),
-        body_radius=platform.body_radius,
-        sensors=sensors,
-        sensor_radius=radius,
-        sensor_range=float(platform.sensor_range),
-        start=np.array(arena.start, np.float64),
-        grid=np.array([grid.x, grid.y, grid.cell], np.float64),
+        walls=walls.astype(real),
+        normals=_normals(walls).astype(real),
+        is_enclosed=is_enclosed(platform, walls, start.heading),
+        body=np.array(platform.body.corners, real),
+        sensors=sensors.astype(real),
+        heading=np.array([start.heading / math.tau], real),
+        grid=np.array([*cells, 1 / grid.cell, SNAP[precision]], real),
         columns=grid.columns,
         rows=grid.rows,
     )
 
 
-def jyro_rules(platform: JyroPlatform, *, noise: float, bias_input: bool, bias_value: float) -> TrialRules:
+def jyro_rules(
+    platform: JyroPlatform,
+    *,
+    noise: float,
+    bias_input: bool,
+    bias_value: float,
+    precision: Precision = "single",
+) -> TrialRules:
     """How a trial on `jyro` is run, in the form that kernels read."""
+    real = REAL[precision]
     return TrialRules(
         n_steps=platform.steps,
-        step_s=STEP_S,
-        speed=platform.speed,
-        turn_rate=platform.turn_rate,
-        noise=float(noise),
         clip=platform.noisy_reading == "clip",
         bias_input=bias_input,
         bias_value=float(bias_value),
+        step_length=np.array([platform.speed * STEP_S], real),
+        step_turn=np.array([platform.turn_rate * STEP_S / math.tau], real),
+        noise=np.array([noise], real),
+        sensor_range=np.array([platform.sensor_range], real),
     )
 
 
@@ -157,40 +219,59 @@ class NoiseKey:
                 )
 
 
-def _run(
+def _counters(keys: Sequence[NoiseKey]) -> NDArray[np.uint32]:
+    """(n, 3) the fixed words of each trial's random numbers."""
+    counters = np.empty((len(keys), 3), np.uint32)
+    for k, key in enumerate(keys):
+        counters[k] = (
+            key.individual << 8 | int(PURPOSE_NOISE),
+            key.generation << 12 | key.repeat,
+            key.replicate,
+        )
+    return counters
+
+
+def run_all(
     platform: JyroPlatform,
     arena: Arena,
     genomes: Sequence[Genome],
+    rows: Sequence[int],
     noise: float,
-    noise_key: NoiseKey,
-    kept_steps: int,
+    keys: Sequence[NoiseKey],
+    precision: Precision,
+    kept_steps: int = -1,
 ) -> tuple[TrialBatch, Trace]:
+    """Trial k is one of genome `rows[k]` under `keys[k]`, all of the same `key`; the trace is of the first."""
     _check_sizes(genomes)
     rules = genomes[0].rules
-    scene = jyro_scene(platform, arena)
+    scene = jyro_scene(platform, arena, precision)
     trial = jyro_rules(
-        platform, noise=noise, bias_input=rules.bias_input >= 0, bias_value=genomes[0].bias_value
+        platform,
+        noise=noise,
+        bias_input=rules.bias_input >= 0,
+        bias_value=genomes[0].bias_value,
+        precision=precision,
     )
-    networks = decode_all(genomes)
-    work = make_workspace(scene, rules.n_inputs + networks.order.shape[1])
-    trace = make_trace(scene, rules.n_inputs, kept_steps)
-    cells = np.zeros((len(genomes), arena.grid.n_cells), np.uint8)
-    counts = np.zeros((len(genomes), 3), np.int32)
-    run_trials(
-        scene,
-        trial,
-        networks,
-        rules,
-        np.uint64(noise_key.key),
-        noise_key.replicate,
-        noise_key.generation,
-        noise_key.individual,
-        noise_key.repeat,
-        work,
-        cells,
-        counts,
-        trace,
-    )
+    trace = make_trace(scene.heading, scene.sensors.shape[0], rules.n_inputs, kept_steps, 1)
+    cells = np.zeros((len(rows), arena.grid.n_cells), np.uint8)
+    counts = np.zeros((len(rows), 3), np.int32)
+    if len(rows):
+        networks = decode_all(genomes)
+        lanes, wiring = make_block(scene, rules, networks.place.shape[1])
+        run_trials(
+            scene,
+            trial,
+            rules,
+            networks,
+            np.array(rows, np.int32),
+            np.uint64(keys[0].key),
+            _counters(keys),
+            lanes,
+            wiring,
+            cells,
+            counts,
+            trace,
+        )
     return TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2]), trace
 
 
@@ -201,6 +282,7 @@ def try_genomes(
     *,
     noise: float,
     noise_key: NoiseKey,
+    precision: Precision = "single",
 ) -> TrialBatch:
     """Try each of n genomes of one population once.
 
@@ -210,25 +292,38 @@ def try_genomes(
         genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
+        precision: Of the arithmetic: "single" (32 bits, as studies use unless they say otherwise) or "double".
 
     Raises:
         ValueError: No genome, or one with other inputs or outputs.
     """
-    return _run(platform, arena, genomes, noise, noise_key, -1)[0]
+    first = noise_key.individual
+    keys = [replace(noise_key, individual=first + k) for k in range(len(genomes))]
+    return run_all(platform, arena, genomes, range(len(genomes)), noise, keys, precision)[0]
 
 
 def trace_genome(
-    platform: JyroPlatform, arena: Arena, genome: Genome, *, noise: float, noise_key: NoiseKey
+    platform: JyroPlatform,
+    arena: Arena,
+    genome: Genome,
+    *,
+    noise: float,
+    noise_key: NoiseKey,
+    precision: Precision = "single",
 ) -> Trajectory:
     """Try one genome once and keep every step; arguments as in `try_genomes`."""
-    batch, trace = _run(platform, arena, [genome], noise, noise_key, platform.steps)
+    batch, trace = run_all(platform, arena, [genome], [0], noise, [noise_key], precision, platform.steps)
+    poses = trace.poses[:, :, 0].astype(np.float64)
+    poses *= [1.0, 1.0, math.tau]
+    poses += [arena.start.x, arena.start.y, 0.0]
+    poses[:, 2] %= math.tau
     return Trajectory(
         STEP_S,
-        trace.poses,
-        trace.readings,
-        trace.inputs,
-        trace.commands,
-        trace.stalled,
+        poses,
+        trace.readings[:, :, 0].astype(np.float64) * platform.sensor_range,
+        trace.inputs[:, :, 0].astype(np.float64),
+        trace.commands[:, :, 0].astype(np.float64),
+        trace.stalled[:, 0],
         float(batch.coverage_line[0]),
         float(batch.coverage_ends[0]),
         tuple(int(cell) for cell in batch.behavior(0)),

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from realitygap.evolution import Genome, decode_all
-from realitygap.kernels._network import Networks
+from realitygap.evolution import Genome
 from realitygap.kernels._philox import MAX_REPEATS
-from realitygap.kernels._trial import make_trace, make_workspace, run_trials
 from realitygap.robots import JyroPlatform
 from realitygap.world import Arena
 
-from ._jyro import NoiseKey, TrialBatch, _check_sizes, jyro_rules, jyro_scene
+from ._jyro import NoiseKey, Precision, TrialBatch, _check_sizes, run_all
 
 
 def retry_genomes(
@@ -24,6 +23,7 @@ def retry_genomes(
     noise: float,
     noise_keys: Sequence[NoiseKey],
     repeats: range,
+    precision: Precision = "single",
 ) -> TrialBatch:
     """Try each of n genomes once for each number in `repeats`, r in all.
 
@@ -34,6 +34,8 @@ def retry_genomes(
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
+
+        precision: As in `try_genomes`.
 
     Returns:
         n * r trials, those of a genome together: `coverage_line.reshape(n, r)` has a row per genome.
@@ -47,35 +49,13 @@ def retry_genomes(
         raise ValueError(f"There are {len(noise_keys)} noise keys, expected {len(genomes)}: one a genome.")
     if len(repeats) and not 0 <= min(repeats) <= max(repeats) < MAX_REPEATS:
         raise ValueError(f"repeats is {repeats}, expected numbers from 0 to {MAX_REPEATS - 1}.")
-    rules = genomes[0].rules
-    scene = jyro_scene(platform, arena)
-    trial = jyro_rules(
-        platform, noise=noise, bias_input=rules.bias_input >= 0, bias_value=genomes[0].bias_value
-    )
-    networks = decode_all(genomes)
-    work = make_workspace(scene, rules.n_inputs + networks.order.shape[1])
-    trace = make_trace(scene, rules.n_inputs, -1)
-    total = len(genomes) * len(repeats)
-    cells = np.zeros((total, arena.grid.n_cells), np.uint8)
-    counts = np.zeros((total, 3), np.int32)
-    at = 0
-    for k, key in enumerate(noise_keys):
-        one = Networks._make(part[k : k + 1] for part in networks)
-        for repeat in repeats:
-            run_trials(
-                scene,
-                trial,
-                one,
-                rules,
-                np.uint64(key.key),
-                key.replicate,
-                key.generation,
-                key.individual,
-                repeat,
-                work,
-                cells[at : at + 1],
-                counts[at : at + 1],
-                trace,
-            )
-            at += 1
-    return TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2])
+    n_repeats = len(repeats)
+    cells = np.zeros((len(genomes), n_repeats, arena.grid.n_cells), np.uint8)
+    counts = np.zeros((3, len(genomes), n_repeats), np.int32)
+    for key in {noise_key.key for noise_key in noise_keys}:
+        rows = [row for row, noise_key in enumerate(noise_keys) if noise_key.key == key]
+        keys = [replace(noise_keys[row], repeat=repeat) for row in rows for repeat in repeats]
+        batch, _ = run_all(platform, arena, genomes, np.repeat(rows, n_repeats), noise, keys, precision)
+        cells[rows] = batch.cells.reshape(len(rows), n_repeats, -1)
+        counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))
+    return TrialBatch(cells.reshape(-1, arena.grid.n_cells), *counts.reshape(3, -1))

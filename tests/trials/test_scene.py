@@ -157,9 +157,9 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path: Path, monkeypatch
 
 def test_a_place_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     track = simulate_case(Case.from_dict(small_case()))
-    with pytest.raises(CaseError, match="cannot be written"):
+    with pytest.raises(CaseError, match="Could not write"):
         track.write_csv(tmp_path / "nowhere" / "out.csv")
-    with pytest.raises(CaseError, match="cannot be written"):
+    with pytest.raises(CaseError, match="Could not write"):
         track.write_csv(tmp_path)
 
 

@@ -27,12 +27,17 @@ from realitygap.records._columns import SCHEMA
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._digest import RowsDigest, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
-from realitygap.records._listing import TRIALS_NAME, is_temporary, is_trace, list_chunks, listed
+from realitygap.records._listing import (
+    LEDGER_NAME,
+    TRIALS_NAME,
+    is_temporary,
+    is_trace,
+    list_chunks,
+    listed,
+)
 from realitygap.records._lock import LOCK_NAME, FolderLock
 from realitygap.records._log import LOG_NAME, append_line, read_lines
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
-
-LEDGER_NAME = "ledger.sqlite"
 
 
 class ResultsFolder:

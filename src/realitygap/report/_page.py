@@ -15,13 +15,12 @@ from pydantic import ValidationError
 
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError
-from realitygap.records import RecordWarning, ResultsFolder, column_table
+from realitygap.records import RecordWarning, ResultsFolder, column_table, refuse_results, write_whole
 from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
 from realitygap.report._export import export_page
-from realitygap.report._formats import write_whole
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_tally_paths
@@ -79,8 +78,10 @@ def write_report(
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the page
-            or another file cannot be written.
+            or another file cannot be written, or would take the place of a file of a study's results.
     """
+    if out is not None:
+        refuse_results(Path(out))
     with warnings.catch_warnings():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
@@ -91,7 +92,7 @@ def write_report(
             content["exported"] = export_page(Path(figures), tally, content, page)
             page = _render(content)
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
-    write_whole(path, page.encode("utf-8", "replace"))
+    write_whole(path, [page.encode("utf-8", "replace")])
     return path
 
 

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from realitygap._version import __version__
 from realitygap.drawing import Picture
 from realitygap.errors import RecordError, did_you_mean
-from realitygap.records import RecordWarning, ResultsFolder
+from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
 from realitygap.report._networks_figure import draw_network
@@ -59,6 +59,7 @@ def save_view(
     """
     out = Path(out)
     ending = check_ending(out, (".gif", *_STILL) if subject == "run" else _STILL)
+    refuse_results(out)
     with warnings.catch_warnings():
         if not isinstance(folder, ResultsFolder):
             warnings.simplefilter("default", RecordWarning)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import CaseError
+from ..errors import CaseError, RecordError
 from ..kernels import _scene as kernel
 from ..world._case import Case, CaseDevice
 
@@ -57,9 +55,14 @@ class SceneTrack:
         sensors than another leaves its last columns empty.
 
         Raises:
-            CaseError: The file cannot be written.
+            CaseError: The file cannot be written, or belongs to a study's results.
         """
-        _write_whole(path, (line + "\n" for line in self._lines()))
+        from ..records import write_whole
+
+        try:
+            write_whole(path, (f"{line}\n".encode() for line in self._lines()))
+        except RecordError as error:
+            raise CaseError(str(error)) from error
 
     def _lines(self) -> Iterator[str]:
         n_sensors = [readings.shape[1] for readings in self.readings]
@@ -174,27 +177,3 @@ def _table(rows: Iterable[Iterable[float]], n_columns: int) -> NDArray[np.float6
 def _row_starts(counts: Iterable[int]) -> NDArray[np.int64]:
     """(r + 1,) where the rows of each robot begin, from how many rows each has."""
     return np.cumsum([0, *counts]).astype(np.int64)
-
-
-def _write_whole(path: Path, lines: Iterable[str]) -> None:
-    """Write a file beside its place and rename it, so that the place holds the old file or the new one."""
-    is_special = path.exists() and not path.is_file()  # a terminal, a pipe: nothing to be renamed
-    place = path.resolve()
-    beside = path if is_special else place.with_name(f".{place.name}.{os.getpid()}.tmp")
-    try:
-        with beside.open("w", encoding="utf-8", newline="") as file:
-            file.writelines(lines)
-            if not is_special:
-                file.flush()
-                os.fsync(file.fileno())
-        if not is_special:
-            beside.replace(place)
-    except OSError as error:
-        raise CaseError(
-            f"{path}: cannot be written ({error.strerror}). "
-            "Name a file in a folder that exists and can be written."
-        ) from None
-    finally:
-        if not is_special:
-            with contextlib.suppress(OSError):
-                beside.unlink(missing_ok=True)

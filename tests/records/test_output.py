@@ -96,6 +96,6 @@ def test_a_folder_or_a_name_that_is_none_is_one_message(tmp_path, monkeypatch):
     """`report --out ""` once ended in a traceback."""
     monkeypatch.chdir(tmp_path)
     for path in (tmp_path, Path(), Path("/")):
-        with pytest.raises(RecordError, match="Could not write .*: it is a folder"):
+        with pytest.raises(RecordError, match=r"Could not write .*: it is a folder"):
             write_whole(path, [b"page"])
     assert not list(tmp_path.iterdir())

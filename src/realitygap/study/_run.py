@@ -159,7 +159,7 @@ def _open_folder(path: Path, study: Study, *, fresh: bool) -> ResultsFolder:
 
 
 def _adopt(folder: ResultsFolder, study: Study) -> None:
-    """Bring the folder's description up to date; refuse a condition that has changed."""
+    """Bring the folder's description up to date; refuse another study, and a condition that has changed."""
     old = folder.description
     new = study.description()
     there = {condition["name"]: condition for condition in old["conditions"]}
@@ -169,6 +169,13 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
+    if there:
+        # conditions that this study lacks may stay in a folder of its own, but not in that of another
+        differences = [
+            f"the study's {key} is {old.get(key)!r} there, {new[key]!r} here"
+            for key in ("name", "seed", "pair")
+            if old.get(key) != new[key]
+        ] + differences
     if differences:
         shown = differences[:20] + (
             [f"... and {len(differences) - 20} more"] if len(differences) > 20 else []

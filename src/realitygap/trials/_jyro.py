@@ -54,7 +54,13 @@ def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
 
 
 def jyro_rules(platform: JyroPlatform, *, noise: float, bias_input: bool, bias_value: float) -> TrialRules:
-    """How a trial on `jyro` is run, in the form that kernels read."""
+    """How a trial on `jyro` is run, in the form that kernels read.
+
+    Raises:
+        ValueError: The noise is not a finite number from 0 on.
+    """
+    if not (math.isfinite(noise) and noise >= 0):
+        raise ValueError(f"noise is {noise}, expected a finite number, 0 or more.")
     return TrialRules(
         n_steps=platform.steps,
         step_s=STEP_S,
@@ -166,6 +172,11 @@ def _run(
     kept_steps: int,
 ) -> tuple[TrialBatch, Trace]:
     _check_sizes(genomes)
+    if noise_key.individual + len(genomes) > MAX_INDIVIDUALS:
+        raise ValueError(
+            f"The last of {len(genomes)} genomes from individual {noise_key.individual} on is beyond "
+            f"{MAX_INDIVIDUALS - 1}: its numbers would repeat. Begin lower, or try fewer in a call."
+        )
     rules = genomes[0].rules
     scene = jyro_scene(platform, arena)
     trial = jyro_rules(
@@ -207,12 +218,14 @@ def try_genomes(
     Args:
         platform: The robot as simulated.
         arena: Where.
-        genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs.
+        genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs; all of
+            one kind: constant input, activation, recurrence and biases of nodes are the same.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
 
     Raises:
-        ValueError: No genome, or one with other inputs or outputs.
+        ValueError: No genome, one with other inputs or outputs, genomes of several kinds, noise that is not a
+            finite number from 0 on, or more individuals than there are numbers for.
     """
     return _run(platform, arena, genomes, noise, noise_key, -1)[0]
 
@@ -245,3 +258,17 @@ def _check_sizes(genomes: Sequence[Genome]) -> None:
                 f"A genome has {given} inputs and {genome.rules.n_outputs} outputs, expected 3 inputs (largest "
                 "reading, stall, time; a constant one is extra) and 2 outputs (move, turn)."
             )
+    first = _kind(genomes[0])
+    for k, genome in enumerate(genomes):
+        for name, value in _kind(genome).items():
+            if value != first[name]:
+                raise ValueError(
+                    f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "
+                    "those of each kind in a call of their own."
+                )
+
+
+def _kind(genome: Genome) -> dict[str, float]:
+    """What all genomes of a call share: the kernels read it once."""
+    names = ("n_inputs", "bias_input", "activation", "activation_slope", "recurrent", "node_bias")
+    return {name: getattr(genome.rules, name) for name in names} | {"bias_value": genome.bias_value}

@@ -30,7 +30,7 @@ def retry_genomes(
     Args:
         platform: The robot as simulated.
         arena: Where.
-        genomes: Of the same rules, as in `try_genomes`; they may come from different runs.
+        genomes: Of one kind, as in `try_genomes`; they may come from different runs.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
@@ -39,8 +39,8 @@ def retry_genomes(
         n * r trials, those of a genome together: `coverage_line.reshape(n, r)` has a row per genome.
 
     Raises:
-        ValueError: No genome, one with other inputs or outputs, another number of keys than of genomes, or a
-            repeat below 0 or beyond 4095.
+        ValueError: No genome, one with other inputs or outputs, genomes of several kinds, another number of
+            keys than of genomes, a repeat below 0 or beyond 4095, or noise that is not a finite number from 0 on.
     """
     _check_sizes(genomes)
     if len(noise_keys) != len(genomes):

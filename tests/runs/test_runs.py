@@ -101,6 +101,45 @@ def test_a_row_of_other_settings_is_noticed():
         replay(Condition(name="a", jyro={"steps": 20, "turn_per_step": 0.9}), row)
 
 
+@pytest.fixture(scope="module")
+def shown():
+    """A condition and a row of it with blocked steps."""
+    condition = Condition(name="a", noise=0.1)
+    return condition, run_replicates(condition, 0, 2).filter(pl.col("stalls") > 0).row(0, named=True)
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "text"),
+    [
+        ("key", lambda value: value ^ 1, "its random numbers have the key"),
+        ("stalls", lambda value: value - 1, "stalls is"),
+        ("coverage_line", lambda value: value + 1 / 72, "coverage_line is"),
+        ("coverage_ends", lambda value: value + 1 / 72, "coverage_ends is"),
+        ("cells", lambda value: [*value[:-1], (value[-1] + 1) % 72], "first difference at place"),
+        ("cells", lambda value: value[:-1], "first difference at place"),
+        ("cells", lambda value: [*value, 71], "first difference at place"),
+    ],
+)
+def test_a_row_that_was_changed_is_noticed(shown, column, change, text):
+    """Only the cells were compared, and only their number was told: 'visits 9 cells, its row has 9'."""
+    condition, row = shown
+    replay(condition, row)
+    with pytest.raises(RecordError, match=text):
+        replay(condition, {**row, column: change(row[column])})
+
+
+def test_a_row_of_another_seed_is_noticed(shown):
+    condition, row = shown
+    with pytest.raises(RecordError, match="have the key"):
+        replay(condition.model_copy(update={"seed": 2}), row)
+
+
+def test_a_row_without_all_columns_is_refused(shown):
+    condition, row = shown
+    with pytest.raises(RecordError, match="The row lacks cells, stalls"):
+        replay(condition, {key: value for key, value in row.items() if key not in ("cells", "stalls")})
+
+
 def test_random_networks_are_unrelated():
     rows = run_replicates(Condition(name="random", selection="random"), 0, 3)
     weights = [tuple(weights) for weights in rows["genome"].struct.field("weight").to_list()]

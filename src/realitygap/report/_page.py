@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
-from pydantic import ValidationError
 
 from realitygap._version import __version__
-from realitygap.errors import RealityGapError
+from realitygap.errors import RealityGapError, RecordVersionError
 from realitygap.records import RecordWarning, ResultsFolder, column_table, refuse_results, write_whole
 from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
@@ -182,7 +181,7 @@ def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
                 draw_tally_paths(tally, condition, width=width, name=f"{anchor}-{name}")
                 for width, name in ((WIDE, "wide"), (NARROW, "narrow"))
             )
-        except ValidationError:
+        except RecordVersionError:
             found.append(
                 f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."

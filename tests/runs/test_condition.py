@@ -85,3 +85,11 @@ def test_the_constant_input_comes_with_novelty(selection, bias_input, has):
 def test_a_name_must_fit_into_a_file_name(name):
     with pytest.raises(ValidationError):
         Condition(name=name)
+
+
+def test_a_run_that_no_memory_holds_is_refused():
+    """A million individuals over a million generations ended in a traceback."""
+    many = Condition(name="x").neat.model_copy(update={"population": 5000, "generations": 1000})
+    assert Condition(name="a", neat=many).neat == many
+    with pytest.raises(ValidationError, match="expected at most 5,000,000"):
+        Condition(name="a", neat=many.model_copy(update={"generations": 1001}))

@@ -154,3 +154,20 @@ def test_evolution_beats_as_many_random_networks():
         best[selection] = rows.group_by("replicate", maintain_order=True).agg(pl.col("coverage_line").max())
     wins = (best["coverage"]["coverage_line"] > best["random"]["coverage_line"]).sum()
     assert wins >= 45
+
+
+@pytest.mark.parametrize(
+    ("first", "n_runs", "error"),
+    [
+        (-1, 1, ValueError),
+        (1 << 32, 1, ValueError),
+        ((1 << 32) - 1, 2, ValueError),
+        (0, 0, ValueError),
+        (0.5, 1, TypeError),
+        (0, "1", TypeError),
+    ],
+)
+def test_replicates_that_are_none_or_would_repeat_are_refused(first, n_runs, error):
+    """Replicate 2**32 was computed as replicate 0."""
+    with pytest.raises(error, match="expected"):
+        run_replicates(CONDITIONS[0], first, n_runs)

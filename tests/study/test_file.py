@@ -188,6 +188,12 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("arena.start = [0.1, 0.3]", "condition[1] 'a'.arena.start", "expected"),
         ("arena.start = [0.1, 0.05, 0.0]", "condition[1] 'a'", "does not fit at the start"),
         ("jyro.steps = 0", "condition[1] 'a'.jyro.steps", "expected at least 1"),
+        ("neat.settings = []", "condition[1] 'a'.neat.settings", "unknown set []"),
+        (
+            "neat.population = 1000000\nneat.generations = 1000000",
+            "condition[1] 'a'",
+            "1,000,000,000,000 trials a run, expected at most 5,000,000",
+        ),
         ("novelty.archive_size = 0", "condition[1] 'a'.novelty.archive_size", "expected at least 1"),
     ],
 )
@@ -216,6 +222,12 @@ def test_a_file_that_is_no_study_is_refused(text, message):
 def test_the_same_mistake_in_a_shared_section_is_said_once():
     text = MINIMAL + '[[condition]]\nname = "b"\n[neat]\nadd_link = 7\n'
     assert mistakes(text) == ["neat.add_link: expected at most 1.0, came 7."]
+
+
+def test_a_set_of_settings_that_is_no_name_is_one_mistake():
+    """A list for a name ended in a traceback."""
+    (line,) = mistakes(MINIMAL + "[neat]\nsettings = []\n")
+    assert line.startswith("neat.settings: unknown set []. Known: default")
 
 
 def test_unknown_study_names_the_nearest():

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from realitygap.evolution import NeatSettings, Population
@@ -19,6 +20,14 @@ SETTINGS = NeatSettings.named("rosenzweig-remy")
 def test_a_key_whose_numbers_would_repeat_is_refused(wrong):
     with pytest.raises(ValueError, match="expected 0 to"):
         NoiseKey(**{"key": 1, **wrong})
+
+
+def test_a_key_is_made_of_whole_numbers():
+    with pytest.raises(TypeError, match=r"key is 1\.5, expected a whole number"):
+        NoiseKey(1.5)
+    key = NoiseKey(np.uint64(7), np.uint32(1))
+    assert key == NoiseKey(7, 1)
+    assert {type(key.key), type(key.replicate)} == {int}, "another type would have kernels compiled again"
 
 
 def test_one_trial_kept_step_by_step_is_that_of_the_batch():

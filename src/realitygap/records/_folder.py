@@ -15,6 +15,7 @@ import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError, did_you_mean
 from realitygap.records._chunk import (
+    MAX_REPLICATE,
     Chunk,
     ChunkName,
     check_condition,
@@ -283,7 +284,9 @@ class ResultsFolder:
         if replicates is None:
             parts = list(self._frames(names, columns))
         else:
-            wanted = pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+            # what is beyond any chunk may be beyond polars' numbers, too
+            possible = {number for number in replicates if 0 <= number <= MAX_REPLICATE}
+            wanted = pl.Series(sorted(possible), dtype=pl.Int64)
             names = [name for name in names if wanted.is_between(name.first, name.last).any()]
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())

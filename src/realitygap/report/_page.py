@@ -13,8 +13,15 @@ from typing import Any
 import polars as pl
 
 from realitygap._version import __version__
-from realitygap.errors import RealityGapError, RecordVersionError
-from realitygap.records import RecordWarning, ResultsFolder, column_table, refuse_results, write_whole
+from realitygap.errors import RealityGapError, RecordError, RecordVersionError
+from realitygap.records import (
+    RecordWarning,
+    ResultsFolder,
+    column_table,
+    is_special,
+    refuse_results,
+    write_whole,
+)
 from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
@@ -67,8 +74,8 @@ def write_report(
     Args:
         folder: the results of a study, or the path to them. They are only read; trials that are drawn are
             recomputed.
-        out: the file to write; `report.html` in the folder when not given. A file that is there gives way,
-            and stays as it is until the new one is complete.
+        out: the file to write, ending in .html; `report.html` in the folder when not given. A file that is there
+            gives way, and stays as it is until the new one is complete.
         figures: a folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
             Nothing but the page is written when not given.
 
@@ -77,10 +84,11 @@ def write_report(
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the page
-            or another file cannot be written, or would take the place of a file of a study's results.
+            or another file cannot be written, ends in something else, or would take the place of
+            a file of a study's results.
     """
     if out is not None:
-        refuse_results(Path(out))
+        _check_out(Path(out))
     with warnings.catch_warnings():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
@@ -93,6 +101,13 @@ def write_report(
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
     write_whole(path, [page.encode("utf-8", "replace")])
     return path
+
+
+def _check_out(path: Path) -> None:
+    """Refuse a wrong place before minutes are spent on the page."""
+    refuse_results(path)
+    if path.suffix.lower() not in (".html", ".htm", "") and not is_special(path):
+        raise RecordError(f"{path} ends in {path.suffix}, expected .html: a report is a page.")
 
 
 def _render(content: Mapping[str, Any]) -> str:

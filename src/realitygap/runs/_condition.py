@@ -21,6 +21,9 @@ from realitygap.world import ArenaSettings, is_inside
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 
+# Trials of a run: with some 600 bytes for the row of each, 3 GB.
+MOST_TRIALS = 5_000_000
+
 Selection = Literal["coverage", "novelty", "random"]
 
 
@@ -72,6 +75,16 @@ class Condition(BaseModel):
                     f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
                     f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _a_run_fits_into_memory(self) -> Self:
+        n_trials = self.neat.population * self.neat.generations
+        if n_trials > MOST_TRIALS:
+            raise ValueError(
+                f"population {self.neat.population:,} x generations {self.neat.generations:,} are {n_trials:,} "
+                f"trials a run, expected at most {MOST_TRIALS:,}: a run is held in memory until it is written"
+            )
         return self
 
     @property

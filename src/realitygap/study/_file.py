@@ -150,23 +150,15 @@ def _place(section: str) -> str:
     return f"platform.{section}" if section in PLATFORMS else section
 
 
-def _neat_values(values: dict[str, Any], name: Any) -> dict[str, Any]:
-    """Settings of NEAT on top of the named set; an unknown name is left for the caller to find."""
-    if isinstance(name, str) and name in NAMED_SETTINGS:
-        return {**NAMED_SETTINGS[name], **values, "settings": name}
-    return {**NAMED_SETTINGS[DEFAULT_NEAT], **values}
-
-
 def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:
     """Note the mistakes of one section alone, so that each is said where it was made."""
     if section == "neat":
         name = values.get("settings", DEFAULT_NEAT)
-        if name not in NAMED_SETTINGS:
+        if not isinstance(name, str) or name not in NAMED_SETTINGS:
             problems.add(
                 f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}"
             )
-            values = {key: value for key, value in values.items() if key != "settings"}
-        values = _neat_values(values, name)
+            values = {**values, "settings": DEFAULT_NEAT}
     problems.check(SECTIONS[section], values, place)
 
 
@@ -192,10 +184,8 @@ def _condition(
         changed = problems.table(f"{place}.{section}", values.get(section, {}))
         if changed:
             _check_section(section, changed, f"{place}.{section}", problems)
-        both = {**base.get(section, {}), **changed}
-        merged[section] = (
-            _neat_values(both, both.get("settings", DEFAULT_NEAT)) if section == "neat" else both
-        )
+        merged[section] = {**base.get(section, {}), **changed}
+    merged["neat"] = {"settings": DEFAULT_NEAT, **merged["neat"]}
     if "name" in own:
         problems.check(Condition, own, place)
     if len(problems.lines) > before or about is None:

@@ -24,7 +24,7 @@ class StudySection(BaseModel):
     note: str = Field("", max_length=500, description="A remark for whoever reads the summary.")
     seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
     replicates: int = Field(
-        100, ge=1, le=4_000_000_000, description="Runs of each condition. More extend what is there."
+        100, ge=1, le=1_000_000_000, description="Runs of each condition. More extend what is there."
     )
     pair: bool = Field(
         True,

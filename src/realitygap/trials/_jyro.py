@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import whole_number
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._math import sin_cos
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS
@@ -139,7 +140,12 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class NoiseKey:
-    """Which random numbers a trial draws: those of one individual of one run."""
+    """Which random numbers a trial draws: those of one individual of one run.
+
+    Raises:
+        TypeError: One of them is not a whole number.
+        ValueError: One is out of its range, beyond which numbers would repeat.
+    """
 
     key: int
     replicate: int = 0
@@ -156,11 +162,7 @@ class NoiseKey:
             "repeat": MAX_REPEATS,
         }
         for name, limit in limits.items():
-            value = getattr(self, name)
-            if not 0 <= value < limit:
-                raise ValueError(
-                    f"{name} is {value}, expected 0 to {limit - 1}: beyond it numbers would repeat."
-                )
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), 0, limit - 1))
 
 
 def _run(

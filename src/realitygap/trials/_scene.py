@@ -87,11 +87,15 @@ def simulate_case(case: Case) -> SceneTrack:
     Returns:
         The track of all robots over all steps.
 
+    Raises:
+        CaseError: A number grows beyond what a float64 holds.
+
     Source: Jyro 0.3.2. Differs: sensors are read at the start when all robots are in place, and not
     while they are being added.
     """
     scene = _as_arrays(case)
     times, poses, stalls, commands, energies, readings = kernel.run_scene(scene, case.dt, case.steps)
+    _refuse_beyond_numbers(case, {"poses": poses, "times": times, "readings": readings, "commands": commands})
     parts = [
         readings[:, first:last]
         for first, last in zip(scene.sensor_rows[:-1], scene.sensor_rows[1:], strict=True)
@@ -99,19 +103,38 @@ def simulate_case(case: Case) -> SceneTrack:
     return SceneTrack(times, poses, stalls, commands, energies, parts)
 
 
+def _refuse_beyond_numbers(case: Case, found: dict[str, NDArray[np.float64]]) -> None:
+    for name, values in found.items():
+        steps = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+        if len(steps):
+            raise CaseError(
+                f"The {name} are no finite numbers from step {steps[0]} on: dt {case.dt:g}, a command or a place is "
+                "too large. Make it smaller."
+            )
+
+
 def simulate_file(case: str | Path, out: str | Path) -> tuple[Case, SceneTrack]:
     """Run the case in the JSON file `case` and write its track to `out`, a CSV file.
 
     Raises:
-        CaseError: The case cannot be carried out as written, or `out` cannot be written.
+        CaseError: The case cannot be carried out as written, or `out` ends in something else than .csv, cannot
+            be written, or belongs to a study's results.
     """
     case, out = Path(case), Path(out)
     if case.exists() and out.exists() and case.samefile(out):
         raise CaseError(f"{out}: would overwrite the case itself. Name another file for the result.")
+    _check_ending(out)
     described = Case.read(case)
     track = simulate_case(described)
     track.write_csv(out)
     return described, track
+
+
+def _check_ending(out: Path) -> None:
+    from ..records import is_special
+
+    if out.suffix.lower() not in (".csv", "") and not is_special(out):
+        raise CaseError(f"{out} ends in {out.suffix}, expected .csv: a track is a CSV file.")
 
 
 def _as_arrays(case: Case) -> kernel.Scene:

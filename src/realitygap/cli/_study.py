@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -147,7 +146,8 @@ class _ProgressBar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        if self._progress.live.is_started:  # else it would print an empty line
+            self._progress.stop()
 
     def show(self, progress: Progress) -> None:
         """Show how far the study is; nothing where nothing is missing."""
@@ -177,18 +177,14 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
 
     summary = summarize(result.folder)
     if as_json:
-        json.dump(
-            {
-                "folder": str(result.folder.path),
-                "runs": result.n_runs,
-                "computed": result.n_computed,
-                "seconds": result.seconds,
-                "conditions": summary.to_dicts(),
-            },
-            sys.stdout,
-            indent=2,
-        )
-        typer.echo()
+        found = {
+            "folder": str(result.folder.path),
+            "runs": result.n_runs,
+            "computed": result.n_computed,
+            "seconds": result.seconds,
+            "conditions": summary.to_dicts(),
+        }
+        typer.echo(json.dumps(found, indent=2))
         return
     from rich.console import Console
 

@@ -137,6 +137,25 @@ class ResultsFolder:
             f"this realitygap computes version {RESULTS_VERSION}, whose numbers may differ."
         )
 
+    @property
+    def missing_note(self) -> str | None:
+        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many.
+
+        Raises:
+            RecordError: what is published is not in order, as far as names tell.
+        """
+        replicates = self._description.study.get("replicates")
+        if not isinstance(replicates, int):
+            return None
+        n_runs = replicates * len(self.conditions)
+        n_there = sum(max(0, min(name.last + 1, replicates) - name.first) for name in self._names())
+        if n_there >= n_runs:
+            return None
+        return (
+            f"{n_there:,} of {n_runs:,} runs are there, and the digest is theirs alone. The command that ran the study "
+            "goes on with what is missing."
+        )
+
     def update_description(self, description: Mapping[str, Any]) -> None:
         """Replace the description, when a study gets more replicates or conditions.
 

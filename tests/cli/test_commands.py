@@ -216,6 +216,14 @@ def test_a_terminal_without_some_letters_shows_question_marks(small):
     assert "The paper?s simulated study" in done.stdout
 
 
+def test_what_is_printed_can_be_pasted_into_a_shell(tmp_path):
+    done = realitygap("run", "paper", "--replicates", "1", "--out", "my results", cwd=tmp_path)
+    assert "realitygap report 'my results'" in done.stdout
+    assert "polars.scan_parquet('my results/trials/*.parquet')" in done.stdout
+    done = realitygap("new-study", "my study.toml", cwd=tmp_path)
+    assert done.stdout.endswith("Carry it out with: realitygap run 'my study.toml'\n")
+
+
 def test_an_error_of_run_begins_with_its_first_letter():
     """An empty line, meant to end a progress bar that was never shown, came first."""
     assert realitygap("run", "papr").stderr.startswith("realitygap: Unknown study")
@@ -296,6 +304,15 @@ def test_bench_measures_what_it_names():
     for name in list(figures)[:3]:
         assert set(figures[name]) == {"per_core", "all_cores"}
         assert all(rate > 0 for rate in figures[name].values())
+
+
+@pytest.mark.parametrize("seconds", ["inf", "0", "nan"])
+def test_bench_ends(seconds):
+    """With inf it never did."""
+    done = realitygap("bench", "--seconds", seconds)
+    assert done.returncode in (1, 2)
+    assert "Traceback" not in done.stderr
+    assert seconds in done.stderr
 
 
 @pytest.mark.parametrize(

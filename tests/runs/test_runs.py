@@ -128,6 +128,14 @@ def test_a_row_that_was_changed_is_noticed(shown, column, change, text):
         replay(condition, {**row, column: change(row[column])})
 
 
+def test_a_trial_is_shown_by_its_entry_in_the_description_too(shown):
+    condition, row = shown
+    entry = {"name": "a", "label": "SIM", "hash": condition.hash(), "settings": condition.settings()}
+    assert replay(entry, row).cells == replay(condition, row).cells
+    with pytest.raises(TypeError, match=r"condition is 'a', expected a Condition, or its settings"):
+        replay("a", row)
+
+
 def test_a_row_of_another_seed_is_noticed(shown):
     condition, row = shown
     with pytest.raises(RecordError, match="have the key"):

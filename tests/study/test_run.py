@@ -245,6 +245,13 @@ def test_a_count_below_one_is_refused(study, tmp_path, wrong):
         run_study(study, tmp_path / "r", **wrong)
 
 
+@pytest.mark.parametrize("wrong", [{"threads": 1.5}, {"threads": "2"}, {"chunk": 1.5}, {"chunk": True}])
+def test_a_count_that_is_no_whole_number_is_refused(study, tmp_path, wrong):
+    with pytest.raises(TypeError, match="expected a whole number"):
+        run_study(study, tmp_path / "r", **wrong)
+    assert not (tmp_path / "r").exists()
+
+
 def test_seed_beside_a_resolved_study_is_refused(study, tmp_path):
     with pytest.raises(ValueError, match="this study has its own"):
         run_study(study, tmp_path / "r", seed=1)

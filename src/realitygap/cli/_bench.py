@@ -7,10 +7,14 @@ from typing import Annotated
 
 import typer
 
+from realitygap.errors import RealityGapError
+
 
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
-    seconds: Annotated[float, typer.Option(min=0.01, help="How long each figure is measured.")] = 2.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.01, max=3600, help="How long each figure is measured.")
+    ] = 2.0,
 ) -> None:
     """Measure robot-steps and whole paper runs a second, on one core and on all.
 
@@ -23,7 +27,10 @@ def bench(
     """
     from realitygap.study import measure_speed
 
-    figures = measure_speed(seconds)
+    try:
+        figures = measure_speed(seconds)
+    except ValueError as error:  # not a number is within any limits
+        raise RealityGapError(str(error)) from error
     if as_json:
         typer.echo(json.dumps(figures, indent=2))
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,7 +105,7 @@ def new_study(
         raise StudyError(f"{path} exists already and was left as it is. Choose another name.") from None
     except OSError as error:
         raise StudyError(f"{path} cannot be written: {error.strerror}.") from error
-    typer.echo(f"Written: {path}. Carry it out with: realitygap run {path}")
+    typer.echo(f"Written: {path}. Carry it out with: realitygap run {shlex.quote(str(path))}")
 
 
 def _as_name(stem: str) -> str:
@@ -204,5 +205,5 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
         )
     else:
         typer.echo(f"All {result.n_runs} runs were there already.")
-    typer.echo(f"Results: {path}   in Python: polars.scan_parquet('{path}/trials/*.parquet')")
-    typer.echo(f"Report:  realitygap report {path}")
+    typer.echo(f"Results: {path}   in Python: polars.scan_parquet({f'{path}/trials/*.parquet'!r})")
+    typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")

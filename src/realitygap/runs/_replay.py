@@ -27,7 +27,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
     """Recompute the trial of a row of results, step by step.
 
     Args:
-        condition: As resolved, or its settings as kept in `study.json`.
+        condition: As resolved, or its entry in `study.json`, or the settings in that.
         row: The row, as `DataFrame.row(k, named=True)` gives it.
 
     Returns:
@@ -38,6 +38,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             condition do not belong together, or another version computed it. Cells in their order, both
             coverages, blocked steps and the key are compared.
         RecordVersionError: The settings are not those of this version.
+        TypeError: The condition is something else.
     """
     lacking = [column for column in _COLUMNS if column not in row]
     if lacking:
@@ -45,7 +46,11 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             f"The row lacks {', '.join(lacking)}: expected a row with all columns of the records."
         )
     if not isinstance(condition, Condition):
-        condition = Condition.from_settings(row["condition"], dict(condition))
+        if not isinstance(condition, Mapping):
+            raise TypeError(
+                f"condition is {condition!r}, expected a Condition, or its settings as in study.json."
+            )
+        condition = Condition.from_settings(row["condition"], dict(condition.get("settings", condition)))
     trajectory = trace_genome(
         condition.jyro,
         condition.arena.arena(),

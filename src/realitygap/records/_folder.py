@@ -139,11 +139,7 @@ class ResultsFolder:
 
     @property
     def missing_note(self) -> str | None:
-        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many.
-
-        Raises:
-            RecordError: what is published is not in order, as far as names tell.
-        """
+        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
         replicates = self._description.study.get("replicates")
         if not isinstance(replicates, int):
             return None

@@ -36,7 +36,7 @@ def test_the_files_of_a_study_are_never_written_over(results, name):
     """`report --out results/study.json` once replaced the study, and said that all was well."""
     before = contents(results)
     with pytest.raises(RecordError, match="nothing was written"):
-        write_whole(results / name, [b"page"])
+        write_whole(results / name, b"page")
     assert contents(results) == before
 
 
@@ -52,14 +52,14 @@ def test_nor_by_another_way_to_the_same_file(results, tmp_path, monkeypatch):
         Path("../study.json"),
     ):
         with pytest.raises(RecordError, match="nothing was written"):
-            write_whole(path, [b"page"])
+            write_whole(path, b"page")
     assert contents(results) == before
 
 
 def test_a_ledger_is_kept_where_there_is_no_study(tmp_path):
     (tmp_path / "ledger.sqlite").write_bytes(b"trials")
     with pytest.raises(RecordError, match="nothing was written"):
-        write_whole(tmp_path / "ledger.sqlite", [b"page"])
+        write_whole(tmp_path / "ledger.sqlite", b"page")
     assert (tmp_path / "ledger.sqlite").read_bytes() == b"trials"
 
 
@@ -73,7 +73,7 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
     """The link itself was replaced, and the file behind it stayed as it was."""
     (tmp_path / "target.html").write_text("old")
     (tmp_path / "link.html").symlink_to("target.html")
-    write_whole(tmp_path / "link.html", [b"new"])
+    write_whole(tmp_path / "link.html", b"new")
     assert (tmp_path / "link.html").is_symlink()
     assert (tmp_path / "target.html").read_text() == "new"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link.html", "target.html"]
@@ -86,7 +86,7 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path):
     read = []
     reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
     reader.start()
-    write_whole(pipe, [b"a page"])
+    write_whole(pipe, b"a page")
     reader.join(10)
     assert read == [b"a page"]
     assert pipe.is_fifo()
@@ -97,5 +97,5 @@ def test_a_folder_or_a_name_that_is_none_is_one_message(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for path in (tmp_path, Path(), Path("/")):
         with pytest.raises(RecordError, match=r"Could not write .*: it is a folder"):
-            write_whole(path, [b"page"])
+            write_whole(path, b"page")
     assert not list(tmp_path.iterdir())

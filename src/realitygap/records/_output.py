@@ -40,7 +40,7 @@ def is_special(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def write_whole(path: Path, parts: Iterable[bytes]) -> None:
+def write_whole(path: Path, data: bytes | Iterable[bytes]) -> None:
     """Write a file beside its place and rename it, so that the place holds the old file or the new one.
 
     A link stays and what it leads to is written; a terminal, a device or a pipe is written to as it is.
@@ -49,6 +49,7 @@ def write_whole(path: Path, parts: Iterable[bytes]) -> None:
         RecordError: it belongs to a study's results, or cannot be written; a file that was there is as it was.
     """
     refuse_results(path)
+    parts = [data] if isinstance(data, bytes) else data
     try:
         if is_special(path):
             with path.open("wb") as file:

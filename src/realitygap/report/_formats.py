@@ -64,7 +64,7 @@ def save_drawing(drawing: Drawing, path: str | Path, *, title: str = "realitygap
         ValueError: another ending.
     """
     path = Path(path)
-    write_whole(path, [drawing_bytes(drawing, check_ending(path, (".pdf", ".png", ".svg")), title)])
+    write_whole(path, drawing_bytes(drawing, check_ending(path, (".pdf", ".png", ".svg")), title))
     return path
 
 
@@ -73,12 +73,12 @@ def save_picture(picture: Picture, path: str | Path) -> Path:
     path = Path(path)
     ending = check_ending(path, (".pdf", ".png", ".svg"))
     if ending == ".svg":
-        write_whole(path, [picture.to_svg().encode("utf-8")])
+        write_whole(path, picture.to_svg().encode("utf-8"))
         return path
     with house_style():
         figure = figure_of(picture, _PICTURE_WIDTH)
         drawing = Drawing("", "", picture.description, figure)
-    write_whole(path, [drawing_bytes(drawing, ending, picture.title)])
+    write_whole(path, drawing_bytes(drawing, ending, picture.title))
     return path
 
 

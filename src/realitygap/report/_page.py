@@ -99,7 +99,7 @@ def write_report(
             content["exported"] = export_page(Path(figures), tally, content, page)
             page = _render(content)
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
-    write_whole(path, [page.encode("utf-8", "replace")])
+    write_whole(path, page.encode("utf-8", "replace"))
     return path
 
 

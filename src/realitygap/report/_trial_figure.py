@@ -199,7 +199,7 @@ def animate_trial(trial: ChosenTrial, path: str | Path) -> Path:
         loop=0,
         comment=f"realitygap: {trial.label}, {trial.title}",
     )
-    write_whole(Path(path), [buffer.getvalue()])
+    write_whole(Path(path), buffer.getvalue())
     return Path(path)
 
 

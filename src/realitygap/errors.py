@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import operator
 from collections.abc import Iterable
 
 
@@ -37,3 +38,27 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     if near:
         return f"Did you mean {near[0]!r}?"
     return f"Known: {', '.join(choices)}." if choices else ""
+
+
+def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
+    """An argument that counts or numbers something, as Python's own int; numpy's whole numbers are taken too.
+
+    Args:
+        name: Of the argument, for the message.
+        value: What came.
+        least, most: What it may be; no upper limit when `most` is not given.
+
+    Raises:
+        TypeError: It is not a whole number.
+        ValueError: It is out of range.
+    """
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]  # refused below where it has no such thing
+    except TypeError:
+        number = None
+    if number is None or isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}, expected a whole number.")
+    if number < least or (most is not None and number > most):
+        expected = f"at least {least}" if most is None else f"{least} to {most}"
+        raise ValueError(f"{name} is {number}, expected {expected}.")
+    return number

@@ -54,3 +54,12 @@ def test_wrong_input_gets_one_message(content, texts, tmp_path):
 
 def test_a_denominator_below_1_is_wrong_usage():
     assert realitygap("audit-results", str(EXAMPLE), "--denominator", "0").returncode == 2
+
+
+def test_a_large_table_says_how_far_it_is(tmp_path):
+    lines = [f"{name},{k},{k % 7}" for name in "ab" for k in range(500)]
+    (tmp_path / "t.csv").write_text("\n".join(["condition,run,value", *lines]))
+    done = realitygap("audit-results", "t.csv", "--json", cwd=tmp_path)
+    assert done.stderr == "Comparing pair 1 of 1 ...\n"
+    assert json.loads(done.stdout)["pairs"]
+    assert realitygap("audit-results", str(EXAMPLE)).stderr == ""

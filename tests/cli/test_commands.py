@@ -154,6 +154,81 @@ def test_digest_prints_64_digits(tmp_path):
     assert re.fullmatch(r"[0-9a-f]{64}\n", done.stdout)
 
 
+def test_digest_says_that_runs_are_missing(tmp_path):
+    """Of an interrupted study it printed a digest like any other."""
+    realitygap("run", "paper", "--replicates", "2", "--out", "r", cwd=tmp_path)
+    whole = realitygap("digest", "r", cwd=tmp_path)
+    assert whole.stderr == ""
+    next((tmp_path / "r" / "trials").glob("novelty-10.*")).unlink()
+    part = realitygap("digest", "r", cwd=tmp_path)
+    assert part.returncode == 0
+    assert re.fullmatch(r"[0-9a-f]{64}\n", part.stdout)
+    assert part.stdout != whole.stdout
+    assert part.stderr.startswith("realitygap: note: 17 of 18 runs are there")
+    assert part.stderr.count("\n") == 1
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("small")
+    assert realitygap("run", "paper", "--replicates", "1", "--out", "r", cwd=folder).returncode == 0
+    return folder
+
+
+COMMANDS_THAT_PRINT = [
+    "digest r",
+    "run paper --replicates 1 --out r",
+    "run paper --replicates 1 --out r --json",
+]
+
+
+@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="the system has no full device")
+@pytest.mark.parametrize("words", COMMANDS_THAT_PRINT)
+def test_output_that_cannot_be_written_is_one_message(small, words):
+    """It ended in a traceback. The device is only ever opened as what the shell redirects to."""
+    command = f"{sys.executable} -m realitygap {words} > /dev/full"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, cwd=small, check=False)
+    one_message(done, "The output cannot be written: No space left on device")
+
+
+@pytest.mark.parametrize("words", COMMANDS_THAT_PRINT)
+def test_output_that_nobody_reads_is_no_failure_with_a_traceback(small, words):
+    closed = subprocess.run(
+        f"{sys.executable} -m realitygap {words} >&-",
+        shell=True, capture_output=True, text=True, cwd=small, check=False,
+    )  # fmt: skip
+    assert (closed.returncode, closed.stderr) == (0, "")
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "realitygap", *words.split()]
+    piped = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, cwd=small, check=False)
+    os.close(write)
+    assert (piped.returncode, piped.stderr) == (1, "")
+
+
+def test_a_terminal_without_some_letters_shows_question_marks(small):
+    """Where only ASCII can be printed, the apostrophe of the title ended in a traceback."""
+    done = realitygap(
+        "run", "paper", "--replicates", "1", "--out", "r",
+        cwd=small, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "The paper?s simulated study" in done.stdout
+
+
+def test_what_is_printed_can_be_pasted_into_a_shell(tmp_path):
+    done = realitygap("run", "paper", "--replicates", "1", "--out", "my results", cwd=tmp_path)
+    assert "realitygap report 'my results'" in done.stdout
+    assert "polars.scan_parquet('my results/trials/*.parquet')" in done.stdout
+    done = realitygap("new-study", "my study.toml", cwd=tmp_path)
+    assert done.stdout.endswith("Carry it out with: realitygap run 'my study.toml'\n")
+
+
+def test_an_error_of_run_begins_with_its_first_letter():
+    """An empty line, meant to end a progress bar that was never shown, came first."""
+    assert realitygap("run", "papr").stderr.startswith("realitygap: Unknown study")
+
+
 def test_new_study_writes_a_file_that_runs(tmp_path):
     assert realitygap("new-study", "mine.toml", cwd=tmp_path).returncode == 0
     done = realitygap("run", "mine.toml", "--replicates", "1", cwd=tmp_path)
@@ -231,6 +306,14 @@ def test_bench_measures_what_it_names():
         assert all(rate > 0 for rate in figures[name].values())
 
 
+@pytest.mark.parametrize("seconds", ["inf", "0", "nan"])
+def test_bench_ends(seconds):
+    """With inf it never did."""
+    done = realitygap("bench", "--seconds", seconds)
+    assert done.returncode == 2
+    assert "Invalid value for '--seconds'" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "texts"),
     [
@@ -239,6 +322,7 @@ def test_bench_measures_what_it_names():
         ("digest nowhere", ["nowhere does not exist"]),
         ("report nowhere", ["nowhere does not exist"]),
         ("simulate nowhere.json --out x.csv", ["nowhere.json"]),
+        ("simulate nowhere.json --out x.html", ["x.html ends in .html", "expected .csv"]),
         ("new-study mine.txt", ["does not end in .toml"]),
         ("new-study no/such/folder/mine.toml", ["cannot be written"]),
         ("run paper --replicates 1 --out /dev/null/x", ["/dev/null/x"]),

@@ -120,6 +120,9 @@ def test_a_file_that_is_there_gives_way(results, tmp_path):
         (["robot", "r2d2", "-o", "a.svg"], "Known: jyro."),
         (["arena", "--condition", "x", "-o", "a.svg"], "Of no meaning for arena: --condition"),
         (["nowhere", "-o", "a.svg"], "nowhere does not exist"),
+        (["DIR", "--replicate", "9" * 20, "-o", "a.svg"], f"has no run {'9' * 20} in"),
+        (["species", "DIR", "--replicate", "9" * 20, "-o", "a.svg"], "has no run"),
+        (["DIR", "--replicate", "-1", "-o", "a.svg"], "has no run -1 in"),
         (["DIR", "-o", "no/where/a.svg"], "Could not write no/where/a.svg"),
     ],
 )

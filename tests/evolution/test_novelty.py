@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -164,3 +165,12 @@ def test_wrong_settings_are_refused() -> None:
     for wrong in [{"archive_size": 0}, {"neighbors": 0}, {"patience": 0}, {"threshold": -1}, {"size": 3}]:
         with pytest.raises(ValidationError):
             NoveltySettings.model_validate(wrong)
+
+
+@pytest.mark.parametrize("cells", [[1.7], ["1"], [None]])
+def test_a_cell_is_a_whole_number(cells: list[Any]) -> None:
+    """1.7 was taken for cell 1."""
+    with pytest.raises(TypeError, match="expected whole numbers"):
+        sorted_cells_distance(cells, [1])
+    with pytest.raises(TypeError, match="expected whole numbers"):
+        PaperArchive().update([cells])

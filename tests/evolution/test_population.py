@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -192,7 +193,7 @@ def test_what_is_no_fitness_is_refused_and_changes_nothing(fitness: list[float],
 def test_a_population_needs_inputs_and_outputs() -> None:
     with pytest.raises(ValueError, match="n_inputs is 0"):
         Population(0, 1)
-    with pytest.raises(ValueError, match="n_outputs 0"):
+    with pytest.raises(ValueError, match="n_outputs is 0"):
         Population(1, 0)
 
 
@@ -216,3 +217,40 @@ def test_xor_is_solved_about_as_fast_as_published() -> None:
     solved = [number for number in evaluations if number is not None]
     assert len(solved) >= 10
     assert 2_000 < np.mean(solved) < 6_500
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "message"),
+    [
+        ({"n_inputs": 1.5}, TypeError, "n_inputs is 1.5, expected a whole number"),
+        ({"n_outputs": "1"}, TypeError, "n_outputs is '1', expected a whole number"),
+        ({"settings": {}}, TypeError, r"settings is \{\}, expected NeatSettings"),
+        ({"settings": "default"}, TypeError, "settings is 'default', expected NeatSettings"),
+        ({"seed": -1}, ValueError, "seed is -1, expected 0 to"),
+        ({"seed": 1.0}, TypeError, "seed is 1.0, expected a whole number"),
+        ({"replicate": -1}, ValueError, "replicate is -1, expected 0 to 4294967295"),
+        ({"replicate": 1 << 32}, ValueError, "replicate is 4294967296"),
+        ({"key": 1 << 64}, ValueError, "key is 18446744073709551616"),
+    ],
+)
+def test_numbers_that_would_repeat_and_other_things_are_refused(
+    wrong: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    """Replicate 2**32 drew the numbers of replicate 0."""
+    with pytest.raises(error, match=message):
+        Population(**{"n_inputs": 2, "n_outputs": 1, **wrong})
+
+
+def test_numpy_s_whole_numbers_are_taken() -> None:
+    settings = NeatSettings(population=5)
+    ours = Population(2, 1, settings, seed=3, replicate=4)
+    other = Population(np.int64(2), np.uint8(1), settings, seed=np.int32(3), replicate=np.uint32(4))
+    assert ours.ask() == other.ask()
+
+
+@pytest.mark.parametrize("fitness", [["1", "2"], [1j, 2j], object(), {"a": 1.0}, "12", [[1.0], [1.0, 2.0]]])
+def test_what_is_not_made_of_numbers_is_no_fitness(fitness: Any) -> None:
+    population = Population(2, 1, NeatSettings(population=2))
+    with pytest.raises(TypeError, match="expected 2 real numbers, one for each genome asked"):
+        population.tell(fitness)
+    assert population.generation == 0

@@ -101,3 +101,19 @@ def test_whole_numbers_given_for_shares_do_not_make_another_kernel() -> None:
     one = NeatSettings(add_node=1, threshold=3, bias_value=1).rules(2, 1)
     other = NeatSettings().rules(2, 1)
     assert list(map(type, one)) == list(map(type, other))
+
+
+@pytest.mark.parametrize("name", NAMED_SETTINGS)
+def test_a_set_that_is_named_fills_in_its_values(name: str) -> None:
+    """`NeatSettings(settings="stanley-2002")` had the values of 'default' under the name of the other."""
+    assert NeatSettings(settings=name) == NeatSettings.named(name)
+    assert NeatSettings(settings=name, add_link=0.5) == NeatSettings.named(name, add_link=0.5)
+
+
+def test_a_set_that_is_not_there_or_named_twice_is_refused() -> None:
+    with pytest.raises(ValueError, match="Did you mean 'stanley-2002'"):
+        NeatSettings(settings="stanley-2020")
+    with pytest.raises(ValueError, match="The set is named twice: 'default' and 'stanley-2002'"):
+        NeatSettings.named("default", settings="stanley-2002")
+    with pytest.raises(ValueError, match="Unknown NEAT settings"):
+        NeatSettings.named([])  # type: ignore[arg-type]

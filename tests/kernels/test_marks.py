@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 
@@ -51,7 +52,7 @@ def marked(paths: list[Path], columns: int, rows: int, real: type) -> list[tuple
 
 
 def exact(path: Path, columns: int, rows: int) -> tuple[list[int], set[int]]:
-    lines = [cells_on_line(*a, *b) for a, b in zip(path, path[1:], strict=False)]
+    lines = [cells_on_line(*a, *b) for a, b in itertools.pairwise(path)]
     start = [cell_of(*path[0])]
     line = first_visits(start + [cell for cells in lines for cell in cells], columns, rows)
     return line, set(first_visits([cell_of(*point) for point in path], columns, rows))

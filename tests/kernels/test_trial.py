@@ -27,7 +27,7 @@ from tests.reference.philox import NOISE, Stream
 pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered", "ignore:invalid value encountered")
 
 WIDTH, DEPTH = 42 * 0.0254, 24 * 0.0254
-QUIET: Any = {"noise": 0.0, "noise_key": NoiseKey(1), "precision": "double"}
+QUIET: Any = {"noise": 0.0, "noise_key": NoiseKey(1)}
 
 
 def as_genome(neat: Neat, genome: Genome, bias_value: float = 1.0) -> evolution.Genome:
@@ -41,7 +41,9 @@ def constant(move: float, turn: float) -> evolution.Genome:
 
 
 def drive(move: float, turn: float, start: tuple[float, float, float], **platform: Any) -> Trajectory:
-    return trace_genome(JyroPlatform(**platform), paper_arena(Pose(*start)), constant(move, turn), **QUIET)
+    return trace_genome(
+        JyroPlatform(precision="double", **platform), paper_arena(Pose(*start)), constant(move, turn), **QUIET
+    )
 
 
 def controller(neat: Neat, genome: Genome) -> Callable[[Sequence[float]], list[float]]:
@@ -62,7 +64,7 @@ def random_arena(rng: random.Random) -> Arena:
     while True:
         start = Pose(rng.uniform(0, WIDTH), rng.uniform(0, DEPTH), rng.uniform(-6.28, 6.28))
         found = Arena("random", tuple(walls), arena.grid, start)
-        if reference.Robot(JyroPlatform(), found).move(0.0, 0.0):
+        if reference.Robot(JyroPlatform(precision="double"), found).move(0.0, 0.0):
             return found
 
 
@@ -73,6 +75,7 @@ def random_platform(rng: random.Random) -> JyroPlatform:
         sensor_offset=rng.choice([0.0, 0.05, 0.2]),
         sensor_range=rng.choice([0.2, 0.05, 2.0]),
         noisy_reading=rng.choice(["leave", "clip"]),
+        precision="double",
     )
 
 
@@ -107,9 +110,7 @@ def test_random_trials_equal_the_reference() -> None:
         genome = grown(neat, seed, rng.choice([0, 3, 10]))
         noise = rng.choice([0.0, 0.1, 0.8])
         key = NoiseKey(rng.getrandbits(64), rng.randrange(99), rng.randrange(99), rng.randrange(99), seed % 3)
-        found = trace_genome(
-            platform, arena, as_genome(neat, genome, 0.5), noise=noise, noise_key=key, precision="double"
-        )
+        found = trace_genome(platform, arena, as_genome(neat, genome, 0.5), noise=noise, noise_key=key)
 
         answer = controller(neat, genome)
         for inputs, command in zip(found.inputs.tolist(), found.commands.tolist(), strict=True):
@@ -145,8 +146,8 @@ def test_whole_trials_equal_the_reference_with_its_own_network() -> None:
         neat = Neat(settings(activation="tanh", activation_slope=1.0), 3, 2)
         genome = grown(neat, seed, rng.choice([0, 3, 10]))
         arena = random_arena(rng)
-        found = trace_genome(JyroPlatform(), arena, as_genome(neat, genome), **QUIET)
-        expected = reference.run(JyroPlatform(), arena, controller(neat, genome))
+        found = trace_genome(JyroPlatform(precision="double"), arena, as_genome(neat, genome), **QUIET)
+        expected = reference.run(JyroPlatform(precision="double"), arena, controller(neat, genome))
         assert found.stalled.tolist() == expected.stalled
         np.testing.assert_allclose(found.poses[1:], expected.poses[1:], rtol=0, atol=1e-9)
 
@@ -189,7 +190,7 @@ def jyro_pairs(n: int) -> Any:
         rng = random.Random(seed)
         neat, genome, network = layered(rng, rng.choice([0, 3]))
         start = Pose(rng.uniform(0.15, 0.9), rng.uniform(0.15, 0.45), rng.uniform(-3, 3))
-        platform = JyroPlatform(turn_per_step=rng.choice([0.1, 0.9]))
+        platform = JyroPlatform(precision="double", turn_per_step=rng.choice([0.1, 0.9]))
         yield (
             platform,
             start,
@@ -239,8 +240,8 @@ def test_a_mirrored_arena_gives_the_mirrored_path() -> None:
         x, y, heading = arena.start
         walls = tuple((x1, DEPTH - y1, x2, DEPTH - y2) for x1, y1, x2, y2 in arena.walls)
         other = Arena("mirrored", walls, arena.grid, Pose(x, DEPTH - y, -heading))
-        one = trace_genome(JyroPlatform(), arena, as_genome(neat, genome), **QUIET)
-        two = trace_genome(JyroPlatform(), other, as_genome(neat, mirrored), **QUIET)
+        one = trace_genome(JyroPlatform(precision="double"), arena, as_genome(neat, genome), **QUIET)
+        two = trace_genome(JyroPlatform(precision="double"), other, as_genome(neat, mirrored), **QUIET)
         assert one.stalled.tolist() == two.stalled.tolist()
         np.testing.assert_allclose(one.poses[:, 0], two.poses[:, 0], rtol=0, atol=1e-9)
         np.testing.assert_allclose(one.poses[:, 1], DEPTH - two.poses[:, 1], rtol=0, atol=1e-9)
@@ -250,7 +251,7 @@ def test_a_mirrored_arena_gives_the_mirrored_path() -> None:
 def test_a_trial_is_the_same_alone_among_others_and_with_its_steps_kept() -> None:
     neat = Neat(settings(activation="tanh", recurrent=True), 3, 2)
     genomes = [as_genome(neat, grown(neat, seed, seed)) for seed in range(10)]
-    platform, arena = JyroPlatform(), paper_arena()
+    platform, arena = JyroPlatform(precision="double"), paper_arena()
     batch = try_genomes(platform, arena, genomes, noise=0.5, noise_key=NoiseKey(9, 8, 7, 3))
     for k, genome in enumerate(genomes):
         key = NoiseKey(9, 8, 7, 3 + k)
@@ -285,11 +286,11 @@ def test_planes_and_segments_give_one_path_where_walls_enclose_the_robot(
         arena = rng.choice([paper_arena(), random_room(rng)])
         neat = Neat(settings(activation="tanh", activation_slope=1.0), 3, 2)
         genome = as_genome(neat, grown(neat, seed, rng.choice([0, 4])))
-        platform = JyroPlatform(turn_per_step=rng.choice([0.1, 0.9, 3.0]))
+        platform = JyroPlatform(precision="double", turn_per_step=rng.choice([0.1, 0.9, 3.0]))
         if not jyro_scene(platform, arena).is_enclosed:
             continue
         enclosed += 1
-        trial = {"noise": 0.3, "noise_key": NoiseKey(seed), "precision": "double"}
+        trial = {"noise": 0.3, "noise_key": NoiseKey(seed)}
         planes = trace_genome(platform, arena, genome, **trial)
         with monkeypatch.context() as patch:
             patch.setattr("realitygap.trials._jyro.is_enclosed", lambda *_: False)
@@ -305,12 +306,14 @@ def test_planes_and_segments_give_one_path_where_walls_enclose_the_robot(
 
 def test_which_scenes_are_enclosed() -> None:
     paper = paper_arena()
-    assert jyro_scene(JyroPlatform(), paper).is_enclosed
-    assert jyro_scene(JyroPlatform(turn_per_step=3.0), paper).is_enclosed  # turning moves no center
+    assert jyro_scene(JyroPlatform(precision="double"), paper).is_enclosed
+    assert jyro_scene(
+        JyroPlatform(precision="double", turn_per_step=3.0), paper
+    ).is_enclosed  # turning moves no center
 
     def changed(walls: Sequence[tuple[float, float, float, float]], **platform: Any) -> bool:
         arena = Arena("changed", tuple(walls), paper.grid, paper.start)
-        return bool(jyro_scene(JyroPlatform(**platform), arena).is_enclosed)
+        return bool(jyro_scene(JyroPlatform(precision="double", **platform), arena).is_enclosed)
 
     assert changed([(c, d, a, b) for a, b, c, d in paper.walls])
     assert not changed(paper.walls[:3])  # open
@@ -319,7 +322,7 @@ def test_which_scenes_are_enclosed() -> None:
     notch = [(0, 0), (WIDTH, 0), (WIDTH, DEPTH), (0.6, DEPTH), (0.6, 0.4), (0, 0.4)]
     assert not changed([(*notch[k], *notch[(k + 1) % 6]) for k in range(6)])  # not convex
     far = Arena("beyond", paper.walls, paper.grid, Pose(-1.0, 0.3, 0.0))
-    assert not jyro_scene(JyroPlatform(), far).is_enclosed
+    assert not jyro_scene(JyroPlatform(precision="double"), far).is_enclosed
 
 
 def test_single_precision_seldom_changes_what_a_trial_visits() -> None:
@@ -332,7 +335,9 @@ def test_single_precision_seldom_changes_what_a_trial_visits() -> None:
     genomes = [as_genome(neat, grown(neat, seed, seed % 3)) for seed in range(cases(2_000, 64))]
     trial = {"noise": 0.5, "noise_key": NoiseKey(11)}
     single = try_genomes(JyroPlatform(), paper_arena(), genomes, **trial)
-    double = try_genomes(JyroPlatform(), paper_arena(), genomes, precision="double", **trial)
+    double = try_genomes(
+        JyroPlatform(precision="double"), paper_arena(), genomes, precision="double", **trial
+    )
     assert (single.n_line != double.n_line).mean() < (0.02 if COMPILED else 0.1)
 
 
@@ -342,7 +347,7 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
     neat = Neat(settings(activation="tanh"), 3, 2)
     genome = as_genome(neat, grown(neat, 5, 2))
     ranges = [0.1 + 0.01 * k for k in range(n)]
-    scene = jyro_scene(JyroPlatform(), arena, "double")
+    scene = jyro_scene(JyroPlatform(precision="double"), arena)
     rules = _trial.TrialRules(
         n_steps=87,
         clip=False,
@@ -375,9 +380,9 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
         trace,
     )
     for k in range(n):
-        platform = JyroPlatform(turn_per_step=0.1 + 0.02 * k, sensor_range=ranges[k])
+        platform = JyroPlatform(precision="double", turn_per_step=0.1 + 0.02 * k, sensor_range=ranges[k])
         key = NoiseKey(4, individual=k)
-        alone = trace_genome(platform, arena, genome, noise=0.01 * k, noise_key=key, precision="double")
+        alone = trace_genome(platform, arena, genome, noise=0.01 * k, noise_key=key)
         assert cells[k, : counts[k, 0]].tolist() == list(alone.cells)
         assert counts[k, 2] == alone.stalled.sum()
     assert len({row.tobytes() for row in cells}) > 30
@@ -487,16 +492,20 @@ def test_touching_counts_and_the_next_number_does_not() -> None:
         _walls.gap_to_planes(plane, square, *lanes_at(x, y), low)
         return bool(low[0] <= 0)
 
-    assert touches(0.75, 1.0) and beyond(0.75, 1.0)
-    assert not touches(0.75 - 1e-15, 1.0) and not beyond(0.75 - 1e-15, 1.0)
+    assert touches(0.75, 1.0)
+    assert beyond(0.75, 1.0)
+    assert not touches(0.75 - 1e-15, 1.0)
+    assert not beyond(0.75 - 1e-15, 1.0)
     assert touches(0.75, 2.25)  # a corner on the wall's end
-    assert not touches(0.75, 2.25 + 1e-15) and beyond(0.75, 2.25 + 1e-15)
-    assert not touches(1.5, 1.0) and beyond(1.5, 1.0)  # only a plane has a side that is inside
+    assert not touches(0.75, 2.25 + 1e-15)
+    assert beyond(0.75, 2.25 + 1e-15)
+    assert not touches(1.5, 1.0)  # only a plane has a side that is inside
+    assert beyond(1.5, 1.0)
 
 
 def test_a_ray_reads_from_its_mount_and_not_past_its_range() -> None:
     arena = Arena("one wall", ((1.0, -5.0, 1.0, 5.0),), paper_arena().grid, Pose(0.0, 0.0, 0.0))
-    scene = jyro_scene(JyroPlatform(), arena, "double")
+    scene = jyro_scene(JyroPlatform(precision="double"), arena)
     assert not scene.is_enclosed
     reach, fractions, rates = np.full(LANES, 0.2), np.empty((3, LANES)), np.empty((3, LANES))
 
@@ -538,6 +547,6 @@ def test_a_recurrent_network_that_grows_without_limit_still_ends_its_trial() -> 
     neat = Neat(settings(activation="identity", recurrent=True, node_bias=True), 3, 2)
     genes = {0: Gene(3, 3, 8.0), 1: Gene(4, 4, -8.0), 2: Gene(3, 4, 8.0), 3: Gene(4, 3, 8.0)}
     genome = as_genome(neat, Genome(genes, {3: 0.1, 4: 0.1}))
-    path = trace_genome(JyroPlatform(steps=2_000), paper_arena(), genome, **QUIET)
+    path = trace_genome(JyroPlatform(precision="double", steps=2_000), paper_arena(), genome, **QUIET)
     assert np.isfinite(path.poses).all()
     assert np.abs(path.commands).max() == 1.0

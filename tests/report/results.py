@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from realitygap.records import ResultsFolder
+from realitygap.runs import Condition
 from tests.records.rows import HASH, make_rows
 
 Runs = Sequence[Sequence[Sequence[float]]]
@@ -17,16 +18,12 @@ Runs = Sequence[Sequence[Sequence[float]]]
 
 
 def settings(selection: str = "coverage", noise: float = 0.1, **changes: Any) -> dict[str, Any]:
-    """Settings as a study has them, a part of them."""
-    return {
-        "selection": selection,
-        "platform": "jyro",
-        "noise": noise,
-        "arena": {"preset": "paper", "start": "corner"},
-        "task": {"cells": "line", "bias_input": "with-novelty"},
-        "neat": {"population": 2, "generations": 2, "add_link": 0.1, "add_node": 0.05},
-        "jyro": {"steps": 87},
-    } | changes
+    """Settings as a study has them; a table in `changes` changes some of its values."""
+    neat = {"population": 2, "generations": 2, "add_link": 0.1, "add_node": 0.05}
+    given = Condition(name="any", neat=neat).settings() | {"selection": selection, "noise": noise}
+    for key, value in changes.items():
+        given[key] = {**given.get(key, {}), **value} if isinstance(value, dict) else value
+    return given
 
 
 def describe(name: str, **fields: Any) -> dict[str, Any]:

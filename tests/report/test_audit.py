@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import TableError
-from realitygap.report import audit_notes, audit_results
+from realitygap.report import AuditProgress, audit_notes, audit_results
 from realitygap.report._audit import doubt
 from realitygap.report._paper_audit import TABLE_2, audit_paper, largest_of_uniform, steps_for, table_2
 from tests.kernels.noisy import largest_noisy
@@ -203,3 +203,24 @@ def test_the_offset_is_that_of_the_simulated_sensors():
 
 def test_table_2_as_numbers():
     assert table_2()["Physical robot"].tolist() == [0.431, 0.583, 0.333]
+
+
+def test_progress_is_told_before_each_two_conditions(tmp_path):
+    """Thousands of runs kept silent for minutes."""
+    told: list[AuditProgress] = []
+    audit_results(write(tmp_path / "t.csv", *rows(a=[1, 2], b=[2, 3], c=[3, 4])), tell=told.append)
+    assert [(each.n_done, each.n_pairs, each.n_runs) for each in told] == [(0, 3, 6), (1, 3, 6), (2, 3, 6)]
+
+
+def test_a_long_header_is_shortened_in_the_message(tmp_path):
+    header = ",".join(f"column{k}" for k in range(500)) + "," + "x" * 5000
+    with pytest.raises(TableError, match="has no column condition") as caught:
+        audit_results(write(tmp_path / "t.csv", header=header))
+    assert "'column0', 'column1'" in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize("denominator", [1.5, "72"])
+def test_a_denominator_is_a_whole_number(denominator):
+    with pytest.raises(TypeError, match=r"denominator is .*, expected a whole number"):
+        audit_results(EXAMPLE, denominator=denominator)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from realitygap.errors import RecordError
+from realitygap.records import ResultsFolder
 from realitygap.report import summarize, write_report
 from realitygap.study import run_study
 from tests.report.results import describe, random_runs, settings, write_results
@@ -235,6 +236,22 @@ def test_page_goes_where_it_is_told_and_replaces_what_is_there(tiny_study, tmp_p
 def test_a_folder_that_is_not_there_is_a_clear_error(tiny_study, tmp_path):
     with pytest.raises(RecordError, match="Could not write"):
         write_report(tiny_study, tmp_path / "nowhere" / "page.html")
+
+
+@pytest.mark.parametrize("name", ["page.svg", "page.toml", "page.html.csv"])
+def test_a_report_is_a_page(tiny_study, tmp_path, name):
+    with pytest.raises(RecordError, match=r"expected \.html"):
+        write_report(tiny_study, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["study.json", "trials/report.html", ".lock", "log.jsonl"])
+def test_a_page_never_takes_the_place_of_results(tiny_study, name):
+    """The study itself was replaced, and all was well."""
+    digest = tiny_study.digest()
+    with pytest.raises(RecordError, match="nothing was written"):
+        write_report(tiny_study, tiny_study.path / name)
+    assert ResultsFolder.open(tiny_study.path).digest() == digest
 
 
 def test_the_same_results_give_the_same_page(tiny_study, tmp_path):

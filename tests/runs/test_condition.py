@@ -3,6 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
+from realitygap.errors import RecordVersionError
 from realitygap.runs import Condition
 
 
@@ -13,6 +14,22 @@ def test_settings_give_the_condition_again():
     again = Condition.from_settings("a", condition.settings())
     assert again == condition
     assert again.hash() == condition.hash()
+
+
+def test_settings_that_are_not_all_there_are_refused():
+    """What was missing was filled in with a default, and the trials of another condition were shown."""
+    whole = Condition(name="a", noise=0.5).settings()
+    no_noise = {key: value for key, value in whole.items() if key != "noise"}
+    no_steps = {**whole, "jyro": {key: value for key, value in whole["jyro"].items() if key != "steps"}}
+    for part, text in (
+        (no_noise, "noise is missing"),
+        (no_steps, r"jyro\.steps is missing"),
+        ({}, "platform is missing"),
+        ({**whole, "flux": 3}, "flux"),
+        ({**whole, "noise": -1}, "noise"),
+    ):
+        with pytest.raises(RecordVersionError, match=rf"settings of condition 'a' .*{text}"):
+            Condition.from_settings("a", part)
 
 
 def test_every_setting_changes_the_hash():
@@ -68,3 +85,11 @@ def test_the_constant_input_comes_with_novelty(selection, bias_input, has):
 def test_a_name_must_fit_into_a_file_name(name):
     with pytest.raises(ValidationError):
         Condition(name=name)
+
+
+def test_a_run_that_no_memory_holds_is_refused():
+    """A million individuals over a million generations ended in a traceback."""
+    many = Condition(name="x").neat.model_copy(update={"population": 5000, "generations": 1000})
+    assert Condition(name="a", neat=many).neat == many
+    with pytest.raises(ValidationError, match="expected at most 5,000,000"):
+        Condition(name="a", neat=many.model_copy(update={"generations": 1001}))

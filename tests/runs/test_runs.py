@@ -101,6 +101,53 @@ def test_a_row_of_other_settings_is_noticed():
         replay(Condition(name="a", jyro={"steps": 20, "turn_per_step": 0.9}), row)
 
 
+@pytest.fixture(scope="module")
+def shown():
+    """A condition and a row of it with blocked steps."""
+    condition = Condition(name="a", noise=0.1)
+    return condition, run_replicates(condition, 0, 2).filter(pl.col("stalls") > 0).row(0, named=True)
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "text"),
+    [
+        ("key", lambda value: value ^ 1, "its random numbers have the key"),
+        ("stalls", lambda value: value - 1, "stalls is"),
+        ("coverage_line", lambda value: value + 1 / 72, "coverage_line is"),
+        ("coverage_ends", lambda value: value + 1 / 72, "coverage_ends is"),
+        ("cells", lambda value: [*value[:-1], (value[-1] + 1) % 72], "first difference at place"),
+        ("cells", lambda value: value[:-1], "first difference at place"),
+        ("cells", lambda value: [*value, 71], "first difference at place"),
+    ],
+)
+def test_a_row_that_was_changed_is_noticed(shown, column, change, text):
+    """Only the cells were compared, and only their number was told: 'visits 9 cells, its row has 9'."""
+    condition, row = shown
+    replay(condition, row)
+    with pytest.raises(RecordError, match=text):
+        replay(condition, {**row, column: change(row[column])})
+
+
+def test_a_trial_is_shown_by_its_entry_in_the_description_too(shown):
+    condition, row = shown
+    entry = {"name": "a", "label": "SIM", "hash": condition.hash(), "settings": condition.settings()}
+    assert replay(entry, row).cells == replay(condition, row).cells
+    with pytest.raises(TypeError, match=r"condition is 'a', expected a Condition, or its settings"):
+        replay("a", row)
+
+
+def test_a_row_of_another_seed_is_noticed(shown):
+    condition, row = shown
+    with pytest.raises(RecordError, match="have the key"):
+        replay(condition.model_copy(update={"seed": 2}), row)
+
+
+def test_a_row_without_all_columns_is_refused(shown):
+    condition, row = shown
+    with pytest.raises(RecordError, match="The row lacks cells, stalls"):
+        replay(condition, {key: value for key, value in row.items() if key not in ("cells", "stalls")})
+
+
 def test_random_networks_are_unrelated():
     rows = run_replicates(Condition(name="random", selection="random"), 0, 3)
     weights = [tuple(weights) for weights in rows["genome"].struct.field("weight").to_list()]
@@ -115,3 +162,20 @@ def test_evolution_beats_as_many_random_networks():
         best[selection] = rows.group_by("replicate", maintain_order=True).agg(pl.col("coverage_line").max())
     wins = (best["coverage"]["coverage_line"] > best["random"]["coverage_line"]).sum()
     assert wins >= 45
+
+
+@pytest.mark.parametrize(
+    ("first", "n_runs", "error"),
+    [
+        (-1, 1, ValueError),
+        (1 << 32, 1, ValueError),
+        ((1 << 32) - 1, 2, ValueError),
+        (0, 0, ValueError),
+        (0.5, 1, TypeError),
+        (0, "1", TypeError),
+    ],
+)
+def test_replicates_that_are_none_or_would_repeat_are_refused(first, n_runs, error):
+    """Replicate 2**32 was computed as replicate 0."""
+    with pytest.raises(error, match="expected"):
+        run_replicates(CONDITIONS[0], first, n_runs)

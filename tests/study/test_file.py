@@ -1,9 +1,10 @@
 """Study files: read by name and by path, mistakes said all at once."""
 
+import numpy as np
 import pytest
 
 from realitygap.errors import StudyError
-from realitygap.study import load_study, named_studies, parse_study
+from realitygap.study import Study, load_study, named_studies, parse_study
 
 MINIMAL = """
 [study]
@@ -181,13 +182,22 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("noise = -0.1", "condition[1] 'a'.noise", "expected at least 0"),
         ('platform = "sim"', "condition[1] 'a'.platform", "came 'sim'"),
         ('baseline = "b"', "condition 'a'.baseline", "there is no condition 'b'"),
-        ("published = [0.1, 2]", "condition[1] 'a'.published", "expected at most 1"),
+        ("published = [0.1, 2]", "condition[1] 'a'.published[2]", "expected at most 1.0, came 2."),
+        ('published = ["x"]', "condition[1] 'a'.published[1]", "expected a number, came 'x'."),
+        ('arena.start = [0.3, "x", 0.0]', "condition[1] 'a'.arena.start", "a number as value 2"),
+        ('change = "a\\u0007b"', "condition[1] 'a'.change", "without control characters"),
         ("wheels = 2", "condition[1] 'a'.wheels", "unknown setting"),
         ("neat = 3", "condition[1] 'a'.neat", "expected a table"),
         ("arena.start = [9.0, 0.3, 0.0]", "condition[1] 'a'.arena.start", "outside the arena"),
         ("arena.start = [0.1, 0.3]", "condition[1] 'a'.arena.start", "expected"),
         ("arena.start = [0.1, 0.05, 0.0]", "condition[1] 'a'", "does not fit at the start"),
         ("jyro.steps = 0", "condition[1] 'a'.jyro.steps", "expected at least 1"),
+        ("neat.settings = []", "condition[1] 'a'.neat.settings", "unknown set []"),
+        (
+            "neat.population = 1000000\nneat.generations = 1000000",
+            "condition[1] 'a'",
+            "1,000,000,000,000 trials a run, expected at most 5,000,000",
+        ),
         ("novelty.archive_size = 0", "condition[1] 'a'.novelty.archive_size", "expected at least 1"),
     ],
 )
@@ -213,9 +223,21 @@ def test_a_file_that_is_no_study_is_refused(text, message):
     assert message in str(caught.value)
 
 
+def test_what_follows_from_a_mistake_is_no_second_one():
+    """`study = 4` was said to lack a name, too."""
+    assert mistakes('study = 4\n[[condition]]\nname = "y"') == ["study: expected a table, came 4."]
+    assert mistakes('condition = [3]\n[study]\nname = "x"') == ["condition[1]: expected a table, came 3."]
+
+
 def test_the_same_mistake_in_a_shared_section_is_said_once():
     text = MINIMAL + '[[condition]]\nname = "b"\n[neat]\nadd_link = 7\n'
     assert mistakes(text) == ["neat.add_link: expected at most 1.0, came 7."]
+
+
+def test_a_set_of_settings_that_is_no_name_is_one_mistake():
+    """A list for a name ended in a traceback."""
+    (line,) = mistakes(MINIMAL + "[neat]\nsettings = []\n")
+    assert line.startswith("neat.settings: unknown set []. Known: default")
 
 
 def test_unknown_study_names_the_nearest():
@@ -231,8 +253,59 @@ def test_missing_file_says_how_to_write_one():
 def test_binary_file_is_refused(tmp_path):
     path = tmp_path / "x.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(StudyError, match="cannot be read"):
+    with pytest.raises(StudyError, match=r"x\.toml is not a text file in UTF-8 \(byte 0 is not\)"):
         load_study(path)
+
+
+def test_a_folder_is_no_study_file(tmp_path):
+    with pytest.raises(StudyError, match=r"cannot be read: Is a directory\. Expected a study file"):
+        load_study(tmp_path)
+
+
+def test_no_name_is_an_unknown_one():
+    with pytest.raises(StudyError, match="Unknown study ''"):
+        load_study("")
+
+
+@pytest.mark.parametrize("study", [None, 3, {}, ["paper"]])
+def test_what_is_neither_name_nor_path_is_refused(study):
+    with pytest.raises(TypeError, match="expected the name of one, or the path of a study file"):
+        load_study(study)
+
+
+def test_advice_can_be_pasted_into_a_shell():
+    with pytest.raises(StudyError, match=r"`realitygap new-study 'my studies/a\.toml'`"):
+        load_study("my studies/a.toml")
+
+
+def test_numpy_s_whole_numbers_are_taken():
+    study = load_study("paper", seed=np.int64(4), replicates=np.uint8(7))
+    assert study == load_study("paper", seed=4, replicates=7)
+    with pytest.raises(StudyError, match="expected a whole number, came True"):
+        load_study("paper", replicates=True)
+
+
+@pytest.mark.parametrize("key", ["title", "note"])
+@pytest.mark.parametrize("letters", ["\\n", "\\u001b[31m", "\\u0000"])
+def test_a_line_has_no_control_characters(key, letters):
+    """They went to the terminal and into the report as they were."""
+    (line,) = mistakes(f'[study]\nname = "x"\n{key} = "a{letters}b"\n[[condition]]\nname = "a"')
+    assert line.startswith(f"study.{key}: expected a text on one line, without control characters, came 'a")
+
+
+def test_conditions_whose_files_some_disks_take_for_one_are_refused():
+    (line,) = mistakes(MINIMAL + '[[condition]]\nname = "A"')
+    assert line.startswith("condition[2] 'A': differs from 'a' in capitals only")
+
+
+def test_a_study_made_in_python_is_whole():
+    study = parse_study(MINIMAL, "mine.toml")
+    parts = {"about": study.about, "report": study.report, "conditions": study.conditions}
+    with pytest.raises(ValueError, match="there are 0 notes, expected 1: one a condition"):
+        Study(**parts, notes=())
+    both = (study.conditions[0], study.conditions[0].model_copy(update={"name": "A"}))
+    with pytest.raises(ValueError, match="conditions 'a' and 'A' would share files"):
+        Study(**{**parts, "conditions": both}, notes=study.notes * 2)
 
 
 def test_conditions_override_sections_and_named_sets_fill_the_rest():

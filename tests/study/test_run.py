@@ -137,6 +137,33 @@ def test_a_changed_condition_is_refused_with_the_difference(study, undisturbed, 
     assert ResultsFolder.open(tmp_path / "r").digest() == undisturbed.digest()
 
 
+@pytest.mark.parametrize(
+    ("change", "difference"),
+    [
+        (('name = "small"', 'name = "other"'), "the study's name is 'small' there, 'other' here"),
+        (("seed = 3", "seed = 4"), "the study's seed is 3 there, 4 here"),
+        (("seed = 3", "seed = 3\npair = false"), "the study's pair is True there, False here"),
+    ],
+)
+def test_another_study_does_not_take_a_folder_over(study, undisturbed, tmp_path, change, difference):
+    """Its conditions were added, and the folder then went by its name and seed."""
+    run_study(study, tmp_path / "r")
+    other = SMALL.split("[[condition]]")[0].replace(*change) + '[[condition]]\nname = "new"\n'
+    with pytest.raises(StudyError, match=difference):
+        run_study(parse_study(other, "other.toml"), tmp_path / "r")
+    there = ResultsFolder.open(tmp_path / "r")
+    assert there.digest() == undisturbed.digest()
+    assert (there.description["name"], there.description["seed"]) == ("small", 3)
+
+
+def test_a_study_may_get_another_name_with_all_its_conditions(study, undisturbed, tmp_path):
+    run_study(study, tmp_path / "r")
+    renamed = run_study(parse_study(SMALL.replace('"small"', '"renamed"'), "small.toml"), tmp_path / "r")
+    assert renamed.n_computed == 0
+    assert renamed.folder.description["name"] == "renamed"
+    assert renamed.folder.digest() == undisturbed.digest()
+
+
 def test_fresh_starts_anew(study, undisturbed, tmp_path):
     run_study(parse_study(SMALL, "small.toml", seed=4), tmp_path / "r")
     result = run_study(study, tmp_path / "r", fresh=True)
@@ -216,6 +243,13 @@ def test_progress_counts_what_was_there(study, tmp_path):
 def test_a_count_below_one_is_refused(study, tmp_path, wrong):
     with pytest.raises(ValueError, match="expected at least 1"):
         run_study(study, tmp_path / "r", **wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"threads": 1.5}, {"threads": "2"}, {"chunk": 1.5}, {"chunk": True}])
+def test_a_count_that_is_no_whole_number_is_refused(study, tmp_path, wrong):
+    with pytest.raises(TypeError, match="expected a whole number"):
+        run_study(study, tmp_path / "r", **wrong)
+    assert not (tmp_path / "r").exists()
 
 
 def test_seed_beside_a_resolved_study_is_refused(study, tmp_path):

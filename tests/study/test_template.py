@@ -2,6 +2,8 @@
 
 import re
 
+import pytest
+
 from realitygap.runs import Condition
 from realitygap.study import (
     SECTIONS,
@@ -35,3 +37,18 @@ def test_settings_shown_as_defaults_can_be_switched_on_and_change_nothing():
     assert on != until_conditions
     rest = text[len(until_conditions) :]
     assert parse_study(on + rest, "on.toml").conditions == parse_study(text, "off.toml").conditions
+
+
+def test_every_line_of_the_template_can_be_switched_on():
+    """`baseline = ""` named a condition that there is not."""
+    on = re.sub(r"^# (\w+ = )", r"\1", study_template("mine"), flags=re.MULTILINE)
+    study = parse_study(on, "on.toml")
+    assert study.notes[0].published == [0.154, 0.222, 0.166]
+    assert study.notes[1].baseline == study.conditions[0].name
+
+
+@pytest.mark.parametrize("name", ["", "a b", 'a"b', "a\n", "ä", "x" * 81, None])
+def test_a_name_that_no_study_can_have_is_refused(name):
+    """The file that came could not be read again."""
+    with pytest.raises(ValueError, match="expected at most 80 letters"):
+        study_template(name)

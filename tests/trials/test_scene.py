@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -157,9 +158,9 @@ def test_a_failure_while_writing_leaves_the_old_file(tmp_path: Path, monkeypatch
 
 def test_a_place_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
     track = simulate_case(Case.from_dict(small_case()))
-    with pytest.raises(CaseError, match="cannot be written"):
+    with pytest.raises(CaseError, match="Could not write"):
         track.write_csv(tmp_path / "nowhere" / "out.csv")
-    with pytest.raises(CaseError, match="cannot be written"):
+    with pytest.raises(CaseError, match="Could not write"):
         track.write_csv(tmp_path)
 
 
@@ -169,3 +170,31 @@ def test_the_case_itself_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="would overwrite the case itself"):
         simulate_file(case, tmp_path / "." / "case.json")
     assert case.read_text() == "{}"
+
+
+def test_numbers_beyond_float64_are_refused(tmp_path: Path) -> None:
+    """A file full of nan and inf was written, and all was well."""
+    case = small_case(dt=1e308, steps=3)
+    case["robots"][0]["commands"] = [[1.0, 1.0]] * 3
+    with pytest.raises(CaseError, match=r"no finite numbers from step \d on: dt 1e\+308"):
+        simulate_case(Case.from_dict(case))
+
+
+@pytest.mark.parametrize("name", ["track.json", "track.html", "track.CSV.png"])
+def test_a_track_is_a_csv_file(tmp_path: Path, name: str) -> None:
+    case = tmp_path / "case.json"
+    case.write_text(json.dumps(small_case()))
+    with pytest.raises(CaseError, match=r"expected \.csv"):
+        simulate_file(case, tmp_path / name)
+    assert list(tmp_path.iterdir()) == [case]
+    simulate_file(case, tmp_path / "track.CSV")
+
+
+def test_a_track_never_takes_the_place_of_results(tmp_path: Path) -> None:
+    (tmp_path / "study.json").write_text("{}")
+    (tmp_path / "trials").mkdir()
+    track = simulate_case(Case.from_dict(small_case()))
+    for name in ("study.json", "trials/a.csv"):
+        with pytest.raises(CaseError, match="nothing was written"):
+            track.write_csv(tmp_path / name)
+    assert (tmp_path / "study.json").read_text() == "{}"

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from realitygap.report import Audit
+    from realitygap.report import Audit, AuditProgress
+
+MANY_RUNS = 1000
+"""From so many on an audit takes longer than a breath, and says how far it is."""
 
 
 def audit_results(
@@ -24,8 +27,9 @@ def audit_results(
 ) -> None:
     """Say what a small table of results can show, and what it cannot.
 
-    For each two conditions: how likely a run of one is above a run of the other (A12), the exact p, the
-    smallest p that so many runs can give, and what they would find. Runs are taken as independent.
+    For each two conditions: how likely a run of one is above a run of the other (A12), the p of a permutation
+    test (exact up to ten runs against ten, drawn beyond), the smallest p that so many runs can give, and what
+    they would find. Runs are taken as independent. Tables of thousands of runs take minutes.
 
     Example: realitygap audit-results examples/table-2.csv --denominator 72
 
@@ -33,11 +37,17 @@ def audit_results(
     """
     from realitygap.report import audit_results as audit_table
 
-    audit = audit_table(table, denominator=denominator)
+    audit = audit_table(table, denominator=denominator, tell=_tell)
     if as_json:
         typer.echo(json.dumps(audit.to_dict(), indent=2))
         return
     _print(audit, table)
+
+
+def _tell(progress: AuditProgress) -> None:
+    """A line for each two conditions of a table that takes its time."""
+    if progress.n_runs >= MANY_RUNS:
+        typer.echo(f"Comparing pair {progress.n_done + 1} of {progress.n_pairs} ...", err=True)
 
 
 def _print(audit: Audit, path: Path) -> None:

@@ -10,7 +10,9 @@ import typer
 
 def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
-    seconds: Annotated[float, typer.Option(min=0.01, help="How long each figure is measured.")] = 2.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.01, max=3600, help="How long each figure is measured.")
+    ] = 2.0,
 ) -> None:
     """Measure robot-steps and whole paper runs a second, on one core and on all.
 

@@ -45,7 +45,7 @@ def digest(folder: Folder) -> None:
     """Print the digest of a study's rows.
 
     It is equal for any number of threads, any chunks and any interruption; another digest means other
-    results.
+    results. That runs are missing is said on standard error.
 
     Example: realitygap digest results/paper
 
@@ -53,4 +53,7 @@ def digest(folder: Folder) -> None:
     """
     from realitygap.records import ResultsFolder
 
-    typer.echo(ResultsFolder.open(folder).digest())
+    results = ResultsFolder.open(folder)
+    typer.echo(results.digest())
+    if results.missing_note is not None:
+        typer.echo(f"realitygap: note: {results.missing_note}", err=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,7 +91,7 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
     if what in subjects:
         if name is None:
             raise StudyError(
-                f"Of which results? Name a folder: realitygap show {what} results/paper -o {out}"
+                f"Of which results? Name a folder: realitygap show {what} results/paper -o {shlex.quote(str(out))}"
             )
         return subjects[what], name
     if name is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -105,7 +105,7 @@ def new_study(
         raise StudyError(f"{path} exists already and was left as it is. Choose another name.") from None
     except OSError as error:
         raise StudyError(f"{path} cannot be written: {error.strerror}.") from error
-    typer.echo(f"Written: {path}. Carry it out with: realitygap run {path}")
+    typer.echo(f"Written: {path}. Carry it out with: realitygap run {shlex.quote(str(path))}")
 
 
 def _as_name(stem: str) -> str:
@@ -147,7 +147,8 @@ class _ProgressBar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        if self._progress.live.is_started:  # else it would print an empty line
+            self._progress.stop()
 
     def show(self, progress: Progress) -> None:
         """Show how far the study is; nothing where nothing is missing."""
@@ -177,18 +178,14 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
 
     summary = summarize(result.folder)
     if as_json:
-        json.dump(
-            {
-                "folder": str(result.folder.path),
-                "runs": result.n_runs,
-                "computed": result.n_computed,
-                "seconds": result.seconds,
-                "conditions": summary.to_dicts(),
-            },
-            sys.stdout,
-            indent=2,
-        )
-        typer.echo()
+        found = {
+            "folder": str(result.folder.path),
+            "runs": result.n_runs,
+            "computed": result.n_computed,
+            "seconds": result.seconds,
+            "conditions": summary.to_dicts(),
+        }
+        typer.echo(json.dumps(found, indent=2))
         return
     from rich.console import Console
 
@@ -208,5 +205,5 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
         )
     else:
         typer.echo(f"All {result.n_runs} runs were there already.")
-    typer.echo(f"Results: {path}   in Python: polars.scan_parquet('{path}/trials/*.parquet')")
-    typer.echo(f"Report:  realitygap report {path}")
+    typer.echo(f"Results: {path}   in Python: polars.scan_parquet({f'{path}/trials/*.parquet'!r})")
+    typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")

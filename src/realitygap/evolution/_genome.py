@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
-from realitygap.kernels._network import Networks, activate, decode, make_networks
+from realitygap.kernels._network import Networks, activate, decode_rows, make_networks
 
 
 @dataclass(frozen=True)
@@ -167,8 +167,13 @@ def decode_all(genomes: Sequence[Genome]) -> Networks:
     room = max(genome._genomes.innovation.shape[1] for genome in genomes)
     hidden_room = max(genome._genomes.hidden.shape[1] for genome in genomes)
     networks: Networks = make_networks(len(genomes), genomes[0].rules, room, hidden_room)
+    if all(genome._genomes is genomes[0]._genomes for genome in genomes):
+        rows = np.array([genome._row for genome in genomes])
+        decode_rows(genomes[0]._genomes, rows, genomes[0].rules, networks)
+        return networks
     for k, genome in enumerate(genomes):
-        decode(genome._genomes, genome._row, genome.rules, networks, k)
+        one = Networks(*(part if part is networks.ends else part[k : k + 1] for part in networks))
+        decode_rows(genome._genomes, np.array([genome._row]), genome.rules, one)
     return networks
 
 

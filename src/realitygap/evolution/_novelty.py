@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -61,7 +62,10 @@ def largest_cell_distance(columns: int, rows: int) -> float:
 def _sorted_points(
     cells: Cells, columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
 ) -> NDArray[np.uint8]:
-    numbers = np.unique(np.asarray(cells, np.int64))
+    given = np.asarray(cells)
+    if given.size and given.dtype.kind not in "iu":
+        raise TypeError(f"A behavior is {reprlib.repr(cells)}, expected whole numbers: those of its cells.")
+    numbers = np.unique(given.astype(np.int64))
     if numbers.size and (numbers[0] < 0 or numbers[-1] >= columns * rows):
         raise ValueError(
             f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
@@ -91,6 +95,7 @@ def sorted_cells_distance(
         sort: By which coordinate first.
 
     Raises:
+        TypeError: A cell that is not a whole number.
         ValueError: A cell outside the grid.
 
     Source: Rosenzweig & Remy, section 2.4.
@@ -129,6 +134,7 @@ class PaperArchive:
             (n,) float64 [cells]; 0 where there is nothing to compare with.
 
         Raises:
+            TypeError: A cell that is not a whole number.
             ValueError: A cell outside the grid.
         """
         points, n_points = _pack(behaviors, self._columns, self._rows, self.settings.sort)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import reprlib
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.errors import whole_number
 from realitygap.kernels._evolve import next_generation
 from realitygap.kernels._genome import Genomes, first_genomes, make_genomes
 from realitygap.kernels._mutation import Innovations, make_innovations
@@ -48,21 +51,27 @@ class Population:
             n_inputs: Inputs that the task gives, >= 1.
             n_outputs: Outputs that it reads, >= 1.
             settings: NEAT's settings; the set 'default', which is `NeatSettings()`, when not given.
-            seed: Of the random numbers.
-            replicate: Which of many runs from one seed.
+            seed: Of the random numbers, 0 to 2**63 - 1.
+            replicate: Which of many runs from one seed, 0 to 2**32 - 1.
             bias: Whether networks have a constant input as their last (EC02, section 4.1).
-            key: The key of the random numbers in place of the seed's.
+            key: The key of the random numbers in place of the seed's, 0 to 2**64 - 1.
 
         Raises:
-            ValueError: A count below 1.
+            TypeError: A number is not a whole one, or the settings are something else.
+            ValueError: A count below 1, or a number out of its range, beyond which random numbers would repeat.
         """
-        if n_inputs < 1 or n_outputs < 1:
-            raise ValueError(
-                f"n_inputs is {n_inputs} and n_outputs {n_outputs}, expected at least 1 of each."
+        n_inputs = whole_number("n_inputs", n_inputs, 1)
+        n_outputs = whole_number("n_outputs", n_outputs, 1)
+        replicate = whole_number("replicate", replicate, 0, 2**32 - 1)
+        seed = whole_number("seed", seed, 0, 2**63 - 1)
+        key = random_key(seed) if key is None else whole_number("key", key, 0, 2**64 - 1)
+        if not isinstance(settings, NeatSettings | None):
+            raise TypeError(
+                f"settings is {settings!r}, expected NeatSettings, such as NeatSettings.named('default')."
             )
-        self.settings = settings or NeatSettings.named("default")
+        self.settings = settings or NeatSettings()
         self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
-        self._key = np.uint64(random_key(seed) if key is None else key)
+        self._key = np.uint64(key)
         self._replicate = replicate
         self.generation = 0
         n = self.settings.population
@@ -115,10 +124,11 @@ class Population:
             fitness: (n,) finite; more is fitter.
 
         Raises:
-            ValueError: Another shape, or a value that is not finite; the population stays as it is.
+            TypeError: Something else than real numbers.
+            ValueError: Another shape, or a value that is not finite. The population stays as it is.
         """
-        told = np.ascontiguousarray(fitness, np.float64)
         n = len(self)
+        told = _as_numbers(fitness, n)
         if told.shape != (n,):
             raise ValueError(
                 f"fitness has shape {told.shape}, expected ({n},): one number for each genome asked."
@@ -153,3 +163,15 @@ class Population:
         self._genomes, self._innovations, self._species = children, innovations, species
         self._species_of, self._parents = species_of, parents
         self.generation += 1
+
+
+def _as_numbers(fitness: ArrayLike, n: int) -> NDArray[np.float64]:
+    try:
+        given = np.asarray(fitness)
+        if given.dtype.kind not in "biufO":  # of an object, such as a Fraction, its number is taken
+            raise TypeError
+        return np.ascontiguousarray(given, np.float64)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"fitness is {reprlib.repr(fitness)}, expected {n} real numbers, one for each genome asked."
+        ) from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from realitygap.errors import did_you_mean
 from realitygap.kernels._genome import NeatRules
@@ -36,7 +36,7 @@ class NeatSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    settings: str = Field("default", description="The named set that these settings began from.")
+    settings: str = Field("default", description="The named set that fills in what is not given.")
     population: int = Field(
         150, ge=2, le=1_000_000, description="Individuals in each generation (EC02 4.1: 150)."
     )
@@ -231,20 +231,39 @@ class NeatSettings(BaseModel):
         "negative ones 0.0001 ('clip', C++).",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_the_named_set(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        name = data.get("settings", "default")
+        return {**NAMED_SETTINGS[name], **data} if _is_known(name) else data
+
+    @field_validator("settings")
+    @classmethod
+    def _set_is_known(cls, name: str) -> str:
+        if not _is_known(name):
+            raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(name, NAMED_SETTINGS)}")
+        return name
+
     @classmethod
     def named(cls, name: str, **changes: Any) -> NeatSettings:
-        """A named set of settings, some of them changed.
+        """A named set of settings, some of them changed; the same as `NeatSettings(settings=name, **changes)`.
 
         Args:
             name: 'default', 'stanley-2002', 'rosenzweig-remy' or 'rosenzweig-remy-neat-python'.
             changes: Settings by name.
 
         Raises:
-            ValueError: No such set, or a setting is wrong (pydantic's message names it).
+            ValueError: No such set, a second name for it, or a setting is wrong (pydantic's message names it).
         """
-        if name not in NAMED_SETTINGS:
-            raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(name, NAMED_SETTINGS)}")
-        return cls.model_validate({**NAMED_SETTINGS[name], **changes})
+        if "settings" in changes:
+            raise ValueError(
+                f"The set is named twice: {name!r} and {changes['settings']!r}. Leave out `settings`."
+            )
+        if not _is_known(name):
+            raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}")
+        return cls.model_validate({"settings": name, **changes})
 
     def rules(self, n_inputs: int, n_outputs: int, *, bias_input: int = -1) -> NeatRules:
         """The settings in the form that the kernels read.
@@ -298,6 +317,10 @@ class NeatSettings(BaseModel):
             population_stagnation=self.population_stagnation,
             clip_negative=self.negative_fitness == "clip",
         )
+
+
+def _is_known(name: object) -> bool:
+    return isinstance(name, str) and name in NAMED_SETTINGS
 
 
 # The paper's text alone, and Stanley's C++ only where the paper is silent.

@@ -158,6 +158,13 @@ def decode(genomes, row, rules, networks, to_row):
 IDENTITY_LIMIT = 1e18
 
 
+@kernel
+def decode_rows(genomes, rows, rules, networks):
+    """Decode the genomes of some rows, in their order."""
+    for k in range(rows.size):
+        decode(genomes, rows[k], rules, networks, k)
+
+
 @inlined
 def activation_of(kind, slope, x):
     """A node's activation function at x, in the precision of x."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ._compile import kernel, stage
 from ._lanes import LANES
-from ._network import SIGMOID, TANH, IDENTITY_LIMIT
 from ._math import sigmoid, tanh
+from ._network import IDENTITY_LIMIT, SIGMOID, TANH
 
 
 class Wiring(NamedTuple):

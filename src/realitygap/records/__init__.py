@@ -9,6 +9,7 @@ studies.
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
 from realitygap.records._folder import ResultsFolder
+from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 __all__ = [  # noqa: RUF022 - grouped by subject
@@ -24,4 +25,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Column",
     "column_table",
     "list_column",
+    # other files
+    "write_whole",
+    "refuse_results",
+    "is_special",
 ]

@@ -19,7 +19,7 @@ from realitygap.records._seal import BrokenSeal, check_seal, seal
 from realitygap.records._version import RESULTS_VERSION
 
 _FORMAT = "simulated trials 1"
-_MAX_REPLICATE = 10**9 - 1
+MAX_REPLICATE = 10**9 - 1
 _MAX_CONDITION = 150
 """Longest name of a condition; file systems allow 255 bytes, and a chunk's temporary file adds some 50."""
 
@@ -109,8 +109,8 @@ def encode_chunk(
     if not isinstance(condition_hash, str):
         raise TypeError(f"The condition's hash is {condition_hash!r}, expected text.")
     last = check_rows(frame, condition, first)
-    if last > _MAX_REPLICATE:
-        raise ValueError(f"Replicate {last} is too large, expected at most {_MAX_REPLICATE}.")
+    if last > MAX_REPLICATE:
+        raise ValueError(f"Replicate {last} is too large, expected at most {MAX_REPLICATE}.")
     frame = frame.select(list(SCHEMA))
     path = folder / str(ChunkName(condition, first, last))
     chunk = Chunk(

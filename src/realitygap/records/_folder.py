@@ -15,6 +15,7 @@ import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError, did_you_mean
 from realitygap.records._chunk import (
+    MAX_REPLICATE,
     Chunk,
     ChunkName,
     check_condition,
@@ -27,12 +28,17 @@ from realitygap.records._columns import SCHEMA
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._digest import RowsDigest, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
-from realitygap.records._listing import TRIALS_NAME, is_temporary, is_trace, list_chunks, listed
+from realitygap.records._listing import (
+    LEDGER_NAME,
+    TRIALS_NAME,
+    is_temporary,
+    is_trace,
+    list_chunks,
+    listed,
+)
 from realitygap.records._lock import LOCK_NAME, FolderLock
 from realitygap.records._log import LOG_NAME, append_line, read_lines
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
-
-LEDGER_NAME = "ledger.sqlite"
 
 
 class ResultsFolder:
@@ -129,6 +135,21 @@ class ResultsFolder:
         return (
             f"The results in {self._path} were computed by results version {self.results_version}; "
             f"this realitygap computes version {RESULTS_VERSION}, whose numbers may differ."
+        )
+
+    @property
+    def missing_note(self) -> str | None:
+        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
+        replicates = self._description.study.get("replicates")
+        if not isinstance(replicates, int):
+            return None
+        n_runs = replicates * len(self.conditions)
+        n_there = sum(max(0, min(name.last + 1, replicates) - name.first) for name in self._names())
+        if n_there >= n_runs:
+            return None
+        return (
+            f"{n_there:,} of {n_runs:,} runs are there, and the digest is theirs alone. The command that ran the study "
+            "goes on with what is missing."
         )
 
     def update_description(self, description: Mapping[str, Any]) -> None:
@@ -278,7 +299,9 @@ class ResultsFolder:
         if replicates is None:
             parts = list(self._frames(names, columns))
         else:
-            wanted = pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+            # what is beyond any chunk may be beyond polars' numbers, too
+            possible = {number for number in replicates if 0 <= number <= MAX_REPLICATE}
+            wanted = pl.Series(sorted(possible), dtype=pl.Int64)
             names = [name for name in names if wanted.is_between(name.first, name.last).any()]
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())

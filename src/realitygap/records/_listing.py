@@ -13,6 +13,7 @@ from realitygap.records._files import reading
 from realitygap.records._lock import LOCK_NAME
 
 TRIALS_NAME = "trials"
+LEDGER_NAME = "ledger.sqlite"
 
 _TEMPORARY = re.compile(r"\.(?P<target>.+)\.[0-9]+\.tmp")
 """What `write_durably` names a file before it is renamed to its target."""

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from realitygap._version import __version__
+from realitygap.errors import RecordVersionError
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import WIDE, Drawing, house_style, new_figure, place_axes, to_svg
 from realitygap.report._shapes_drawing import draw_picture
@@ -42,7 +41,8 @@ def draw_tally_arena(
     """As `draw_arena_and_robot`, of what was read already, in several widths; ids begin with `name`.
 
     Raises:
-        ValueError: there is no such condition, or its settings are not those of this version.
+        ValueError: there is no such condition.
+        RecordVersionError: its settings are not those of this version.
     """
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
@@ -88,7 +88,7 @@ def content(tally: Tally, widths: Sequence[float]) -> list[Drawing] | str:
     condition = tally.runs["condition"][0]
     try:
         return draw_tally_arena(tally, condition, widths=widths, name="figure-2")
-    except ValidationError:
+    except RecordVersionError:
         return (
             f"Figure 2 is missing: this realitygap ({__version__}) cannot read the settings of condition {condition}. "
             "Use the version that ran the study."

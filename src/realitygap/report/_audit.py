@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-from collections.abc import Sequence
+import reprlib
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from realitygap.errors import TableError
+from realitygap.errors import TableError, whole_number
 from realitygap.report._effects import (
     POWER,
     USUAL_EFFECTS,
@@ -169,7 +170,25 @@ class _Row:
         return float(self.text)
 
 
-def audit_results(table: str | Path, *, denominator: int | None = None) -> Audit:
+@dataclass(frozen=True)
+class AuditProgress:
+    """How far an audit is.
+
+    Attributes:
+        n_done: pairs of conditions compared.
+        n_pairs: pairs in all.
+        n_runs: lines of the table; thousands take minutes.
+    """
+
+    n_done: int
+    n_pairs: int
+    n_runs: int
+
+
+Tell = Callable[[AuditProgress], None]
+
+
+def audit_results(table: str | Path, *, denominator: int | None = None, tell: Tell | None = None) -> Audit:
     """What a small table of results can show, and what it cannot.
 
     Runs are taken as independent. Every two conditions are compared by a permutation test of the difference
@@ -179,6 +198,7 @@ def audit_results(table: str | Path, *, denominator: int | None = None) -> Audit
     Args:
         table: a CSV file with the columns condition, run and value; others are not looked at.
         denominator: N, where values must be k/N, such as a share of N cells.
+        tell: called with the progress before each two conditions are compared.
 
     Returns:
         The audit.
@@ -186,14 +206,14 @@ def audit_results(table: str | Path, *, denominator: int | None = None) -> Audit
     Raises:
         TableError: the file cannot be read, or its columns or rows are not as expected; all rows that are
             wrong are named at once.
-        ValueError: `denominator` is below 1.
+        TypeError, ValueError: `denominator` is not a whole number, or below 1.
     """
-    if denominator is not None and denominator < 1:
-        raise ValueError(f"denominator is {denominator}, expected 1 or more.")
-    return _audit(_read(Path(table)), denominator)
+    if denominator is not None:
+        denominator = whole_number("denominator", denominator, 1)
+    return _audit(_read(Path(table)), denominator, tell)
 
 
-def _audit(rows: Sequence[_Row], denominator: int | None) -> Audit:
+def _audit(rows: Sequence[_Row], denominator: int | None, tell: Tell | None = None) -> Audit:
     names = list(dict.fromkeys(row.condition for row in rows))
     values = {name: np.array([row.value for row in rows if row.condition == name]) for name in names}
     doubtful = []
@@ -205,7 +225,7 @@ def _audit(rows: Sequence[_Row], denominator: int | None) -> Audit:
         conditions=[_condition(name, values[name]) for name in names],
         denominator=denominator,
         doubtful=doubtful,
-        pairs=compare_samples(values),
+        pairs=compare_samples(values, tell),
         runs_needed={
             name: runs_needed(effect_of_a12(share), paired=False) or 0
             for name, share in USUAL_EFFECTS.items()
@@ -226,10 +246,17 @@ def _condition(name: str, values: npt.NDArray[np.float64]) -> AuditedCondition:
     )
 
 
-def compare_samples(values: dict[str, npt.NDArray[np.float64]]) -> list[AuditedPair]:
+def compare_samples(
+    values: dict[str, npt.NDArray[np.float64]], tell: Tell | None = None
+) -> list[AuditedPair]:
     """Every two of the conditions, of independent runs, in the order given."""
     names = list(itertools.combinations(values, 2))
-    raw = np.array([permutation_p(values[one], values[other]) for one, other in names])
+    n_runs = sum(map(len, values.values()))
+    raw = np.empty(len(names))
+    for k, (name, other_name) in enumerate(names):
+        if tell is not None:
+            tell(AuditProgress(k, len(names), n_runs))
+        raw[k] = permutation_p(values[name], values[other_name])
     floors = np.array([smallest_p(len(values[one]), len(values[other])) for one, other in names])
     corrected, best = holm(raw), holm(floors)
     pairs = []
@@ -331,7 +358,7 @@ def _places(path: Path, header: Sequence[str]) -> list[int]:
     found = [name.strip().lower() for name in header]
     missing = [name for name in COLUMNS if name not in found]
     if missing:
-        listed = ", ".join(repr(name.strip()) for name in header)
+        listed = reprlib.repr([name.strip() for name in header])[1:-1]
         raise TableError(
             f"{path}: has no column {' and no column '.join(missing)}. Expected {', '.join(COLUMNS)} in the first "
             f"line, which has {listed}."

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
-from pydantic import ValidationError
 
-from realitygap.errors import RecordError
+from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records import ResultsFolder
 from realitygap.report._effects import Interval, bca_interval, difference_of_means, mean_interval
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
@@ -100,7 +99,7 @@ def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
         condition = Condition.from_settings(name, dict(settings_of(described)))
         rows = _champion_rows(tally, name)
         reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
-    except ValidationError:
+    except RecordVersionError:
         none = np.empty(0)
         return Champions(
             name, label, none, none.reshape(0, FRESH_TRIALS), "its settings are another version’s"

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from pydantic import ValidationError
-
 from realitygap._version import __version__
+from realitygap.errors import RecordVersionError
 from realitygap.report import _arena_figure, _networks_figure
 from realitygap.report._drawing import Drawing
 from realitygap.report._individuals_figure import draw_tally_better, draw_tally_individuals
@@ -47,7 +46,7 @@ def content(
         if condition is not None:
             try:
                 drawn: list[Drawing] | str = draw(tally, condition, widths=widths, name=f"figure-{number}")
-            except ValidationError:
+            except RecordVersionError:
                 drawn = (
                     f"Figure {number} is missing: this realitygap ({__version__}) cannot read the settings of "
                     f"condition {condition}. Use the version that ran the study."

@@ -100,7 +100,8 @@ def draw_tally_individuals(
     """As `draw_individuals`, of what was read already, in several widths; ids begin with `name`.
 
     Raises:
-        ValueError: there is no such condition or run, or its settings are not those of this version.
+        ValueError: there is no such condition or run.
+        RecordVersionError: its settings are not those of this version.
     """
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
@@ -175,7 +176,8 @@ def draw_tally_better(
     """As `draw_better_individuals`, of what was read already, in several widths.
 
     Raises:
-        ValueError: there is no such condition or run, or its settings are not those of this version.
+        ValueError: there is no such condition or run.
+        RecordVersionError: its settings are not those of this version.
     """
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
-from pydantic import ValidationError
 
 from realitygap._version import __version__
 from realitygap.drawing import Ink, Picture
@@ -45,7 +44,7 @@ def draw_networks(folder: ResultsFolder | str | Path, *, width: float = WIDE) ->
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
-        ValueError: the settings are not those of this version.
+        RecordVersionError: the settings are not those of this version.
     """
     tally = read_tally(folder)
     (drawing,) = draw_tally_networks(tally, count_structures(tally), widths=[width])
@@ -62,7 +61,7 @@ def draw_tally_networks(
     """As `draw_networks`, of what was read already, in several widths; ids begin with `name`.
 
     Raises:
-        ValueError: the settings are not those of this version.
+        RecordVersionError: the settings are not those of this version.
     """
     condition = _first_objective(tally)
     group = next(each for each in structures if condition in each.conditions)
@@ -198,7 +197,7 @@ def content(tally: Tally, widths: Sequence[float]) -> tuple[list[Drawing] | str,
     structures = count_structures(tally)
     try:
         return draw_tally_networks(tally, structures, widths=widths, name="figure-7"), structures
-    except (ValidationError, ValueError, RealityGapError):
+    except (ValueError, RealityGapError):
         return (
             f"Figure 7 is missing: this realitygap ({__version__}) cannot read the genomes. Use the version that ran "
             "the study.",

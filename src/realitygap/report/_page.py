@@ -11,17 +11,22 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
-from pydantic import ValidationError
 
 from realitygap._version import __version__
-from realitygap.errors import RealityGapError
-from realitygap.records import RecordWarning, ResultsFolder, column_table
+from realitygap.errors import RealityGapError, RecordError, RecordVersionError
+from realitygap.records import (
+    RecordWarning,
+    ResultsFolder,
+    column_table,
+    is_special,
+    refuse_results,
+    write_whole,
+)
 from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
 from realitygap.report._export import export_page
-from realitygap.report._formats import write_whole
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_tally_paths
@@ -69,8 +74,8 @@ def write_report(
     Args:
         folder: the results of a study, or the path to them. They are only read; trials that are drawn are
             recomputed.
-        out: the file to write; `report.html` in the folder when not given. A file that is there gives way,
-            and stays as it is until the new one is complete.
+        out: the file to write, ending in .html; `report.html` in the folder when not given. A file that is there
+            gives way, and stays as it is until the new one is complete.
         figures: a folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
             Nothing but the page is written when not given.
 
@@ -79,8 +84,11 @@ def write_report(
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the page
-            or another file cannot be written.
+            or another file cannot be written, ends in something else, or would take the place of
+            a file of a study's results.
     """
+    if out is not None:
+        _check_out(Path(out))
     with warnings.catch_warnings():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
@@ -93,6 +101,13 @@ def write_report(
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
     write_whole(path, page.encode("utf-8", "replace"))
     return path
+
+
+def _check_out(path: Path) -> None:
+    """Refuse a wrong place before minutes are spent on the page."""
+    refuse_results(path)
+    if path.suffix.lower() not in (".html", ".htm", "") and not is_special(path):
+        raise RecordError(f"{path} ends in {path.suffix}, expected .html: a report is a page.")
 
 
 def _render(content: Mapping[str, Any]) -> str:
@@ -181,7 +196,7 @@ def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
                 draw_tally_paths(tally, condition, width=width, name=f"{anchor}-{name}")
                 for width, name in ((WIDE, "wide"), (NARROW, "narrow"))
             )
-        except ValidationError:
+        except RecordVersionError:
             found.append(
                 f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."

@@ -87,7 +87,7 @@ def draw_tally_paths(
 
     Raises:
         ValueError: there is no such condition or run.
-        pydantic.ValidationError: the condition's settings are not those of this version (a `ValueError`).
+        RecordVersionError: the condition's settings are not those of this version.
     """
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))

@@ -6,12 +6,9 @@ import warnings
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ValidationError
-
-from realitygap._version import __version__
 from realitygap.drawing import Picture
-from realitygap.errors import RecordError, did_you_mean
-from realitygap.records import RecordWarning, ResultsFolder
+from realitygap.errors import did_you_mean
+from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
 from realitygap.report._networks_figure import draw_network
@@ -59,35 +56,28 @@ def save_view(
     """
     out = Path(out)
     ending = check_ending(out, (".gif", *_STILL) if subject == "run" else _STILL)
+    refuse_results(out)
     with warnings.catch_warnings():
         if not isinstance(folder, ResultsFolder):
             warnings.simplefilter("default", RecordWarning)
         tally = read_tally(folder)
-    try:
-        if subject == "species":
-            if generation is not None or individual is not None:
-                raise ValueError(
-                    "Species are shown over all generations: leave out generation and individual."
-                )
-            (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate)
-            return _save(drawing, out, "Species")
-        if subject == "network":
-            trial = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
-            return _save(
-                draw_network(trial.condition, trial.row, trial.measure), out, f"Network of {trial.title}"
-            )
-        if generation is None and individual is None and ending != ".gif":
-            name = condition or str(tally.runs["condition"][0])
-            return _save(draw_tally_paths(tally, name, replicate), out, f"A run of {name}")
-        trial = choose_trial(tally, condition, replicate, generation, individual)
-        if ending == ".gif":
-            return animate_trial(trial, out)
-        return _save(draw_chosen_trial(trial), out, trial.title)
-    except ValidationError as error:
-        raise RecordError(
-            f"This realitygap ({__version__}) cannot read the settings of the condition: {error.errors()[0]['msg']}. "
-            "Use the version that ran the study."
-        ) from error
+    if subject == "species":
+        if generation is not None or individual is not None:
+            raise ValueError("Species are shown over all generations: leave out generation and individual.")
+        (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate)
+        return _save(drawing, out, "Species")
+    if subject == "network":
+        trial = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
+        return _save(
+            draw_network(trial.condition, trial.row, trial.measure), out, f"Network of {trial.title}"
+        )
+    if generation is None and individual is None and ending != ".gif":
+        name = condition or str(tally.runs["condition"][0])
+        return _save(draw_tally_paths(tally, name, replicate), out, f"A run of {name}")
+    trial = choose_trial(tally, condition, replicate, generation, individual)
+    if ending == ".gif":
+        return animate_trial(trial, out)
+    return _save(draw_chosen_trial(trial), out, trial.title)
 
 
 def _save(drawing: Drawing, out: Path, title: str) -> Path:

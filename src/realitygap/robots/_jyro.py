@@ -56,6 +56,12 @@ class JyroPlatform(BaseModel):
         "before adding noise and does not say what happens after.",
     )
 
+    precision: Literal["single", "double"] = Field(
+        "single",
+        description="Of the arithmetic of trials: 32 or 64 bits. Single is about a third faster; rounding changes "
+        "what one in several hundred trials visits.",
+    )
+
     @property
     def label(self) -> str:
         """What every figure of this platform says."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from realitygap._version import __version__
+from realitygap.errors import RecordVersionError
 from realitygap.evolution import NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform
@@ -17,6 +20,9 @@ from realitygap.world import ArenaSettings, is_inside
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+
+# Trials of a run: with some 600 bytes for the row of each, 3 GB.
+MOST_TRIALS = 5_000_000
 
 Selection = Literal["coverage", "novelty", "random"]
 
@@ -71,6 +77,16 @@ class Condition(BaseModel):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _a_run_fits_into_memory(self) -> Self:
+        n_trials = self.neat.population * self.neat.generations
+        if n_trials > MOST_TRIALS:
+            raise ValueError(
+                f"population {self.neat.population:,} x generations {self.neat.generations:,} are {n_trials:,} "
+                f"trials a run, expected at most {MOST_TRIALS:,}: a run is held in memory until it is written"
+            )
+        return self
+
     @property
     def label(self) -> str:
         """What every figure of this condition says: SIM."""
@@ -106,5 +122,33 @@ class Condition(BaseModel):
 
     @classmethod
     def from_settings(cls, name: str, settings: dict[str, Any]) -> Condition:
-        """The condition that `settings` described."""
-        return cls.model_validate({"name": name, **settings})
+        """The condition that `settings` described.
+
+        Raises:
+            RecordVersionError: They are not the settings of this version: one is missing, unknown or out of its
+                range. None is filled in: a default of today may not be what the study was run with.
+        """
+        try:
+            condition = cls.model_validate({"name": name, **settings})
+        except ValidationError as error:
+            mistakes = [
+                f"{'.'.join(str(part) for part in each['loc'])}: {each['msg']}" for each in error.errors()
+            ]
+        else:
+            mistakes = [f"{place} is missing" for place in _missing(settings, condition.settings())]
+        if mistakes:
+            more = f" and {len(mistakes) - 3} more" if len(mistakes) > 3 else ""
+            raise RecordVersionError(
+                f"This realitygap ({__version__}) cannot read the settings of condition {name!r} "
+                f"({'; '.join(mistakes[:3])}{more}). Use the version that ran the study."
+            )
+        return condition
+
+
+def _missing(given: Mapping[str, Any], full: Mapping[str, Any], place: str = "") -> Iterator[str]:
+    """The settings, and those within them, that are not given."""
+    for key, value in full.items():
+        if key not in given:
+            yield place + key
+        elif isinstance(value, Mapping) and isinstance(given[key], Mapping):
+            yield from _missing(given[key], value, f"{place}{key}.")

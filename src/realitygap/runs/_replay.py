@@ -11,6 +11,12 @@ from realitygap.trials import NoiseKey, Trajectory, trace_genome
 
 from ._condition import Condition
 
+_COLUMNS = (
+    *("condition", "replicate", "generation", "individual", "genome", "key"),
+    *("cells", "coverage_line", "coverage_ends", "stalls"),
+)
+"""What a trial is computed from, and what must come out."""
+
 
 def genome_of(condition: Condition, row: Mapping[str, Any]) -> Genome:
     """The genome of a row of results."""
@@ -21,18 +27,30 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
     """Recompute the trial of a row of results, step by step.
 
     Args:
-        condition: As resolved, or its settings as kept in `study.json`.
+        condition: As resolved, or its entry in `study.json`, or the settings in that.
         row: The row, as `DataFrame.row(k, named=True)` gives it.
 
     Returns:
         The trajectory.
 
     Raises:
-        RecordError: The trial comes out otherwise than the row says: the row and the condition do not
-            belong together, or another version computed it.
+        RecordError: The row lacks a column, or the trial comes out otherwise than the row says: the row and the
+            condition do not belong together, or another version computed it. Cells in their order, both
+            coverages, blocked steps and the key are compared.
+        RecordVersionError: The settings are not those of this version.
+        TypeError: The condition is something else.
     """
+    lacking = [column for column in _COLUMNS if column not in row]
+    if lacking:
+        raise RecordError(
+            f"The row lacks {', '.join(lacking)}: expected a row with all columns of the records."
+        )
     if not isinstance(condition, Condition):
-        condition = Condition.from_settings(row["condition"], dict(condition))
+        if not isinstance(condition, Mapping):
+            raise TypeError(
+                f"condition is {condition!r}, expected a Condition, or its settings as in study.json."
+            )
+        condition = Condition.from_settings(row["condition"], dict(condition.get("settings", condition)))
     trajectory = trace_genome(
         condition.jyro,
         condition.arena.arena(),
@@ -40,10 +58,39 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
         noise=condition.noise,
         noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
     )
-    if list(trajectory.cells) != list(row["cells"]):
+    difference = _difference(condition, trajectory, row)
+    if difference:
         raise RecordError(
             f"Condition {row['condition']!r}, replicate {row['replicate']}, generation {row['generation']}, "
-            f"individual {row['individual']}: the trial visits {len(trajectory.cells)} cells when run "
-            f"again, its row has {len(row['cells'])}. Was the row computed by another version, or changed?"
+            f"individual {row['individual']}: {difference}. Does the row belong to this condition, and was it "
+            "computed by this version and not changed?"
         )
     return trajectory
+
+
+def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, Any]) -> str:
+    """How a trial run again differs from its row; empty where it does not."""
+    if row["key"] != condition.key:
+        return f"its random numbers have the key {row['key']}, those of the condition {condition.key}"
+    cells = list(row["cells"])
+    if list(trajectory.cells) != cells:
+        pairs = zip(trajectory.cells, cells, strict=False)
+        place = next(
+            (k for k, (one, other) in enumerate(pairs) if one != other),
+            min(len(cells), len(trajectory.cells)),
+        )
+        return (
+            f"the trial visits other cells when run again than its row has (first difference at place {place} of "
+            f"{len(trajectory.cells)} and {len(cells)})"
+        )
+    again = {
+        "coverage_line": trajectory.coverage_line,
+        "coverage_ends": trajectory.coverage_ends,
+        "stalls": int(trajectory.stalled.sum()),
+    }
+    differing = [
+        f"{name} is {value} when run again, {row[name]} in its row"
+        for name, value in again.items()
+        if value != row[name]
+    ]
+    return "; ".join(differing)

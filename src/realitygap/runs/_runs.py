@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from realitygap.errors import whole_number
 from realitygap.kernels import _run
 from realitygap.kernels._run import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
@@ -18,6 +19,9 @@ from ._condition import Condition
 # Room for genes beyond the first ones; doubled and run again where it was not enough.
 FIRST_ROOM = 16
 FIRST_HIDDEN_ROOM = 4
+
+# The number of a replicate is a word of the random numbers' counter.
+MAX_REPLICATES = 1 << 32
 
 
 def run_rules(condition: Condition) -> RunRules:
@@ -73,11 +77,17 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
     Args:
         condition: As resolved.
         first_replicate: Number of the first run.
-        n_runs: How many.
+        n_runs: How many, >= 1.
 
     Returns:
         Arrays (n_runs, generations, individuals, ...).
+
+    Raises:
+        TypeError: A number is not a whole one.
+        ValueError: No run, or one beyond replicate 4,294,967,295, where random numbers would repeat.
     """
+    first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
+    n_runs = whole_number("n_runs", n_runs, 1, MAX_REPLICATES - first_replicate)
     arena = condition.arena.arena()
     scene = jyro_scene(condition.jyro, arena)
     neat = condition.neat_rules
@@ -116,6 +126,9 @@ def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> p
     Returns:
         One row an individual tried, with the columns of the records, sorted by replicate, generation and
         individual. The rows of a replicate do not depend on which others are asked for.
+
+    Raises:
+        TypeError, ValueError: As `run_rows`.
     """
     return frame_of(condition, first_replicate, run_rows(condition, first_replicate, n_runs))
 

@@ -26,6 +26,7 @@ from ._run import machine_facts, usable_processors
 
 TRIALS_PER_CALL = 500
 RUNS_PER_CALL = 50
+MOST_SECONDS = 3600
 
 
 def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
@@ -39,7 +40,12 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
         `paper_runs_recorded_per_second` (their rows written as well), each with `per_core` and `all_cores`;
         `machine` and `versions`. A robot-step holds its noise and its line coverage; its networks have no
         hidden node.
+
+    Raises:
+        ValueError: `seconds` is not more than 0 and at most 3600.
     """
+    if not 0 < seconds <= MOST_SECONDS:
+        raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
     study = load_study("paper")
     condition = next(item for item in study.conditions if item.name == "coverage-50")
     with tempfile.TemporaryDirectory() as temporary:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from importlib import resources
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings
 
 from ._problems import Problems
-from ._study import ConditionNotes, ReportSection, Study, StudySection
+from ._study import ConditionNotes, ReportSection, Study, StudySection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
 PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform}
@@ -51,15 +53,17 @@ def load_study(study: str | Path, *, seed: int | None = None, replicates: int | 
         StudyError: No such study, a file that cannot be read, or mistakes in it: all of them, each with its
             place.
     """
+    if not isinstance(study, str | Path):
+        raise TypeError(f"study is {study!r}, expected the name of one, or the path of a study file.")
     name = str(study)
     if name in named_studies():
         text = (resources.files(__package__) / "studies" / f"{name}.toml").read_text("utf-8")
         return parse_study(text, name, seed=seed, replicates=replicates)
     path = Path(study)
-    if not path.exists():
+    if not name or not path.exists():
         if path.suffix == ".toml" or len(path.parts) > 1:
             raise StudyError(
-                f"There is no file {path}. `realitygap new-study {path}` writes one to start from."
+                f"There is no file {path}. `realitygap new-study {shlex.quote(str(path))}` writes one to start from."
             )
         raise StudyError(
             f"Unknown study {name!r}. {did_you_mean(name, named_studies())} A file of your own ends in .toml; "
@@ -67,8 +71,16 @@ def load_study(study: str | Path, *, seed: int | None = None, replicates: int | 
         )
     try:
         text = path.read_text("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"{path} cannot be read as a text file: {error}.") from error
+    except UnicodeDecodeError as error:
+        raise StudyError(
+            f"{path} is not a text file in UTF-8 (byte {error.start} is not). Expected a study file, as "
+            "`realitygap new-study` writes one."
+        ) from error
+    except OSError as error:
+        raise StudyError(
+            f"{path} cannot be read: {error.strerror or error}. Expected a study file, as `realitygap new-study` "
+            "writes one."
+        ) from error
     return parse_study(text, str(path), seed=seed, replicates=replicates)
 
 
@@ -85,12 +97,18 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
     problems = Problems()
-    study = _resolve(data, problems, {"seed": seed, "replicates": replicates})
+    study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyError("\n  ".join([head, *problems.lines]))
     return study
+
+
+def _plain(number: Any) -> Any:
+    """Numpy's whole numbers as Python's; anything else as it is, to be checked with the rest."""
+    is_whole = isinstance(number, Integral) and not isinstance(number, bool)
+    return int(number) if is_whole else number
 
 
 def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) -> Study | None:
@@ -102,7 +120,8 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
         problems.add("study", "missing. Expected a section [study] with at least a name.")
     about_values = problems.table("study", data.get("study", {}))
     about_values |= {key: value for key, value in changes.items() if value is not None}
-    about = problems.check(StudySection, about_values, "study") if "study" in data else None
+    is_table = isinstance(data.get("study"), dict)
+    about = problems.check(StudySection, about_values, "study") if is_table else None
     report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")
     base = {
         section: problems.table(section, data.get(section, {}))
@@ -126,10 +145,16 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     names: list[str] = []
     for index, value in enumerate(listed):
         values = problems.table(f"condition[{index + 1}]", value)
+        if not isinstance(value, dict):
+            continue
         name = values.get("name")
         place = f"condition[{index + 1}]" + (f" {name!r}" if isinstance(name, str) else "")
         if name in names:
             problems.add(place, "this name is taken by an earlier condition; each needs its own.")
+        elif isinstance(name, str) and (alike := same_file(name, names)) is not None:
+            problems.add(
+                place, f"differs from {alike!r} in capitals only, and some disks take their files for one."
+            )
         names.append(name if isinstance(name, str) else "")
         condition, note = _condition(values, base, about, place, problems)
         if condition is not None and note is not None:
@@ -150,23 +175,15 @@ def _place(section: str) -> str:
     return f"platform.{section}" if section in PLATFORMS else section
 
 
-def _neat_values(values: dict[str, Any], name: Any) -> dict[str, Any]:
-    """Settings of NEAT on top of the named set; an unknown name is left for the caller to find."""
-    if isinstance(name, str) and name in NAMED_SETTINGS:
-        return {**NAMED_SETTINGS[name], **values, "settings": name}
-    return {**NAMED_SETTINGS[DEFAULT_NEAT], **values}
-
-
 def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:
     """Note the mistakes of one section alone, so that each is said where it was made."""
     if section == "neat":
         name = values.get("settings", DEFAULT_NEAT)
-        if name not in NAMED_SETTINGS:
+        if not isinstance(name, str) or name not in NAMED_SETTINGS:
             problems.add(
                 f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}"
             )
-            values = {key: value for key, value in values.items() if key != "settings"}
-        values = _neat_values(values, name)
+            values = {**values, "settings": DEFAULT_NEAT}
     problems.check(SECTIONS[section], values, place)
 
 
@@ -192,10 +209,8 @@ def _condition(
         changed = problems.table(f"{place}.{section}", values.get(section, {}))
         if changed:
             _check_section(section, changed, f"{place}.{section}", problems)
-        both = {**base.get(section, {}), **changed}
-        merged[section] = (
-            _neat_values(both, both.get("settings", DEFAULT_NEAT)) if section == "neat" else both
-        )
+        merged[section] = {**base.get(section, {}), **changed}
+    merged["neat"] = {"settings": DEFAULT_NEAT, **merged["neat"]}
     if "name" in own:
         problems.check(Condition, own, place)
     if len(problems.lines) > before or about is None:

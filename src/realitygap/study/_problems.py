@@ -42,7 +42,9 @@ class Problems:
     def _note(self, model: type[M], values: Mapping[str, Any], place: str, error: ValidationError) -> None:
         fields: dict[str, list[str]] = {}
         for problem in error.errors(include_url=False):
-            field = str(problem["loc"][0]) if problem["loc"] else ""
+            field = ".".join(str(part) for part in problem["loc"][:1])
+            if len(problem["loc"]) == 2 and isinstance(problem["loc"][1], int):
+                field += f"[{problem['loc'][1] + 1}]"
             fields.setdefault(field, []).append(_explain(problem, model))
         for field, texts in fields.items():
             where = f"{place}.{field}" if place and field else place or field
@@ -97,4 +99,6 @@ def _explain(problem: Any, model: type[BaseModel]) -> str:
         expected = f"expected {words} {limit}"
     if kind in ("too_long", "too_short"):
         expected = f"expected {context.get('max_length', context.get('min_length'))} values"
+    if len(problem["loc"]) > 2 and isinstance(problem["loc"][-1], int):
+        expected = f"{expected or problem['msg']} as value {problem['loc'][-1] + 1}"
     return f"{expected or problem['msg']}, came {came}."

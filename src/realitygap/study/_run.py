@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import StudyError
+from realitygap.errors import StudyError, whole_number
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
 
@@ -90,11 +90,11 @@ def run_study(
         StudyError: The study cannot be carried out as written, or the folder holds another one: the
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
+        TypeError: A count is not a whole number, or the study is none of these.
         ValueError: A count below 1.
     """
-    for name, count in (("threads", threads), ("chunk", chunk)):
-        if count is not None and count < 1:
-            raise ValueError(f"{name} is {count}, expected at least 1.")
+    threads = None if threads is None else whole_number("threads", threads, 1)
+    chunk = None if chunk is None else whole_number("chunk", chunk, 1)
     if not isinstance(study, Study):
         study = load_study(study, seed=seed, replicates=replicates)
     elif seed is not None or replicates is not None:
@@ -159,7 +159,7 @@ def _open_folder(path: Path, study: Study, *, fresh: bool) -> ResultsFolder:
 
 
 def _adopt(folder: ResultsFolder, study: Study) -> None:
-    """Bring the folder's description up to date; refuse a condition that has changed."""
+    """Bring the folder's description up to date; refuse another study, and a condition that has changed."""
     old = folder.description
     new = study.description()
     there = {condition["name"]: condition for condition in old["conditions"]}
@@ -169,6 +169,13 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
+    if there:
+        # conditions that this study lacks may stay in a folder of its own, but not in that of another
+        differences = [
+            f"the study's {key} is {old.get(key)!r} there, {new[key]!r} here"
+            for key in ("name", "seed", "pair")
+            if old.get(key) != new[key]
+        ] + differences
     if differences:
         shown = differences[:20] + (
             [f"... and {len(differences) - 20} more"] if len(differences) > 20 else []

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import unicodedata
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from realitygap._version import __version__
 from realitygap.runs import NAME_PATTERN, Condition
+
+
+def _printable(text: str) -> str:
+    if any(unicodedata.category(letter) == "Cc" for letter in text):
+        raise ValueError("expected a text on one line, without control characters")
+    return text
+
+
+Line = Annotated[str, AfterValidator(_printable)]
 
 
 class StudySection(BaseModel):
@@ -20,11 +31,13 @@ class StudySection(BaseModel):
         max_length=80,
         description="Letters, digits, dot, dash, underscore; names the folder.",
     )
-    title: str = Field("", max_length=200, description="What the report is headed with; the name when empty.")
-    note: str = Field("", max_length=500, description="A remark for whoever reads the summary.")
+    title: Line = Field(
+        "", max_length=200, description="What the report is headed with; the name when empty."
+    )
+    note: Line = Field("", max_length=500, description="A remark for whoever reads the summary.")
     seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
     replicates: int = Field(
-        100, ge=1, le=4_000_000_000, description="Runs of each condition. More extend what is there."
+        100, ge=1, le=1_000_000_000, description="Runs of each condition. More extend what is there."
     )
     pair: bool = Field(
         True,
@@ -51,9 +64,14 @@ class ConditionNotes(BaseModel):
     published: list[Annotated[float, Field(ge=0, le=1)]] | None = Field(
         None, description="Published values of the best coverage of a run, shown beside ours."
     )
-    published_source: str | None = Field(None, max_length=200, description="Where they were published.")
+    published_source: Line | None = Field(None, max_length=200, description="Where they were published.")
     baseline: str | None = Field(None, description="The condition that this one is compared with.")
-    change: str | None = Field(None, max_length=200, description="How it differs from that, in a few words.")
+    change: Line | None = Field(None, max_length=200, description="How it differs from that, in a few words.")
+
+
+def same_file(name: str, others: Iterable[str]) -> str | None:
+    """Which of the other names stands for the same file on a disk that does not tell capitals; None where none does."""
+    return next((other for other in others if other.casefold() == name.casefold()), None)
 
 
 class Study(BaseModel):
@@ -65,6 +83,21 @@ class Study(BaseModel):
     report: ReportSection
     conditions: tuple[Condition, ...]
     notes: tuple[ConditionNotes, ...]
+
+    @model_validator(mode="after")
+    def _conditions_are_whole_and_apart(self) -> Self:
+        if len(self.notes) != len(self.conditions):
+            raise ValueError(
+                f"there are {len(self.notes)} notes, expected {len(self.conditions)}: one a condition, such as "
+                "ConditionNotes()"
+            )
+        names = [condition.name for condition in self.conditions]
+        for k, name in enumerate(names):
+            if (alike := same_file(name, names[:k])) is not None:
+                raise ValueError(
+                    f"conditions {alike!r} and {name!r} would share files; give one another name"
+                )
+        return self
 
     @model_validator(mode="after")
     def _conditions_share_the_seed(self) -> Self:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -9,20 +11,33 @@ from typing import Any
 from pydantic import BaseModel
 
 from realitygap.evolution import NAMED_SETTINGS
-from realitygap.runs import Condition
+from realitygap.runs import NAME_PATTERN, Condition
 
 from ._file import DEFAULT_NEAT, PLATFORMS, SECTIONS
 from ._study import ConditionNotes, ReportSection, StudySection
 
 WIDTH = 100
+_EXAMPLES = {
+    "published": [0.154, 0.222, 0.166],
+    "published_source": "Table 2",
+    "baseline": "coverage-10",
+    "change": "trials begin in the center",
+}
 
 
 def study_template(name: str) -> str:
     """A study file with two conditions in which every setting stands with its meaning and its default.
 
     Args:
-        name: Of the study.
+        name: Of the study: letters, digits, dot, dash and underscore.
+
+    Raises:
+        ValueError: It cannot be the name of a study.
     """
+    if not (isinstance(name, str) and len(name) <= 80 and re.fullmatch(NAME_PATTERN, name)):
+        raise ValueError(
+            f"name is {name!r}, expected at most 80 letters, digits, '.', '-' and '_', a letter or digit first."
+        )
     parts = [
         _comment(
             "A study for `realitygap run`. A line that begins with '# key = value' shows the default: take the "
@@ -45,20 +60,13 @@ def study_template(name: str) -> str:
             "[condition.arena], [condition.task], [condition.neat], [condition.novelty] or [condition.jyro]."
         )
     )
-    notes = {field: (info.description or "") for field, info in ConditionNotes.model_fields.items()}
     own = ["name", "selection", "platform", "noise"]
     first = {"name": "coverage-10", "selection": "coverage", "platform": "jyro", "noise": 0.1}
     lines = ["[[condition]]"]
     for key in own:
         lines += [_comment(Condition.model_fields[key].description or ""), f"{key} = {_toml(first[key])}"]
-    examples = {
-        "published": [0.154, 0.222, 0.166],
-        "published_source": "Table 2",
-        "baseline": "",
-        "change": "",
-    }
-    for key, description in notes.items():
-        lines += [_comment(description), f"# {key} = {_toml(examples[key])}"]
+    for key in ("published", "published_source"):
+        lines += _example(key)
     parts.append("\n".join(lines))
     parts.append(
         "\n".join(
@@ -67,6 +75,8 @@ def study_template(name: str) -> str:
                 'name = "coverage-10-center"',
                 'selection = "coverage"',
                 "noise = 0.1",
+                *_example("baseline"),
+                *_example("change"),
                 "",
                 "[condition.arena]",
                 'start = "center"',
@@ -74,6 +84,14 @@ def study_template(name: str) -> str:
         )
     )
     return "\n\n".join(parts) + "\n"
+
+
+def _example(key: str) -> list[str]:
+    """What may be said of a condition beside its settings, to be switched on."""
+    return [
+        _comment(ConditionNotes.model_fields[key].description or ""),
+        f"# {key} = {_toml(_EXAMPLES[key])}",
+    ]
 
 
 def _section(
@@ -98,5 +116,5 @@ def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return f'"{value}"'
+        return json.dumps(value, ensure_ascii=False)
     return repr(value)

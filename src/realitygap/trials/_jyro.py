@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import whole_number
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._math import sin_cos
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
@@ -17,8 +18,6 @@ from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_block,
 from realitygap.robots import STEP_S, JyroPlatform
 from realitygap.world import Arena
 
-
-Precision = Literal["single", "double"]
 REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
 # How near to a border of cells [cells] is on it: beyond what rounding does to a position in a long trial.
@@ -73,10 +72,10 @@ def is_enclosed(platform: JyroPlatform, walls: NDArray[np.float64], heading: flo
         return False
     if (inside[:, :2] @ mounts.T - inside[:, 2:]).min() < 0:
         return False
-    return platform.speed * STEP_S < 2 * -inside[:, 2].max()
+    return bool(platform.speed * STEP_S < 2 * -inside[:, 2].max())
 
 
-def jyro_scene(platform: JyroPlatform, arena: Arena, precision: Precision = "single") -> TrialScene:
+def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
     """Arena, body and sensors in the form that kernels read.
 
     Raises:
@@ -84,7 +83,7 @@ def jyro_scene(platform: JyroPlatform, arena: Arena, precision: Precision = "sin
     """
     if arena.grid.n_cells > 256:
         raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
-    real = REAL[precision]
+    real = REAL[platform.precision]
     start = arena.start
     walls = np.array(arena.walls, np.float64).reshape(-1, 4) - [start.x, start.y, start.x, start.y]
     sensors = np.empty((len(platform.sensors.mounts), 4))
@@ -101,7 +100,7 @@ def jyro_scene(platform: JyroPlatform, arena: Arena, precision: Precision = "sin
         body=np.array(platform.body.corners, real),
         sensors=sensors.astype(real),
         heading=np.array([start.heading / math.tau], real),
-        grid=np.array([*cells, 1 / grid.cell, SNAP[precision]], real),
+        grid=np.array([*cells, 1 / grid.cell, SNAP[platform.precision]], real),
         columns=grid.columns,
         rows=grid.rows,
     )
@@ -113,10 +112,15 @@ def jyro_rules(
     noise: float,
     bias_input: bool,
     bias_value: float,
-    precision: Precision = "single",
 ) -> TrialRules:
-    """How a trial on `jyro` is run, in the form that kernels read."""
-    real = REAL[precision]
+    """How a trial on `jyro` is run, in the form that kernels read.
+
+    Raises:
+        ValueError: The noise is not a finite number from 0 on.
+    """
+    if not (math.isfinite(noise) and noise >= 0):
+        raise ValueError(f"noise is {noise}, expected a finite number, 0 or more.")
+    real = REAL[platform.precision]
     return TrialRules(
         n_steps=platform.steps,
         clip=platform.noisy_reading == "clip",
@@ -195,7 +199,12 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class NoiseKey:
-    """Which random numbers a trial draws: those of one individual of one run."""
+    """Which random numbers a trial draws: those of one individual of one run.
+
+    Raises:
+        TypeError: One of them is not a whole number.
+        ValueError: One is out of its range, beyond which numbers would repeat.
+    """
 
     key: int
     replicate: int = 0
@@ -212,22 +221,15 @@ class NoiseKey:
             "repeat": MAX_REPEATS,
         }
         for name, limit in limits.items():
-            value = getattr(self, name)
-            if not 0 <= value < limit:
-                raise ValueError(
-                    f"{name} is {value}, expected 0 to {limit - 1}: beyond it numbers would repeat."
-                )
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), 0, limit - 1))
 
 
-def _counters(keys: Sequence[NoiseKey]) -> NDArray[np.uint32]:
-    """(n, 3) the fixed words of each trial's random numbers."""
-    counters = np.empty((len(keys), 3), np.uint32)
-    for k, key in enumerate(keys):
-        counters[k] = (
-            key.individual << 8 | int(PURPOSE_NOISE),
-            key.generation << 12 | key.repeat,
-            key.replicate,
-        )
+def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
+    """(n, 3) the fixed words of the random numbers of n individuals from that of the key on."""
+    counters = np.empty((n, 3), np.uint32)
+    counters[:, 0] = np.arange(key.individual, key.individual + n) << 8 | int(PURPOSE_NOISE)
+    counters[:, 1] = key.generation << 12 | key.repeat
+    counters[:, 2] = key.replicate
     return counters
 
 
@@ -235,22 +237,21 @@ def run_all(
     platform: JyroPlatform,
     arena: Arena,
     genomes: Sequence[Genome],
-    rows: Sequence[int],
+    rows: NDArray[np.int32],
     noise: float,
-    keys: Sequence[NoiseKey],
-    precision: Precision,
+    key: int,
+    counters: NDArray[np.uint32],
     kept_steps: int = -1,
 ) -> tuple[TrialBatch, Trace]:
-    """Trial k is one of genome `rows[k]` under `keys[k]`, all of the same `key`; the trace is of the first."""
+    """Trial k is one of genome `rows[k]` with the random numbers of `counters[k]`; the trace is of the first."""
     _check_sizes(genomes)
     rules = genomes[0].rules
-    scene = jyro_scene(platform, arena, precision)
+    scene = jyro_scene(platform, arena)
     trial = jyro_rules(
         platform,
         noise=noise,
         bias_input=rules.bias_input >= 0,
         bias_value=genomes[0].bias_value,
-        precision=precision,
     )
     trace = make_trace(scene.heading, scene.sensors.shape[0], rules.n_inputs, kept_steps, 1)
     cells = np.zeros((len(rows), arena.grid.n_cells), np.uint8)
@@ -263,9 +264,9 @@ def run_all(
             trial,
             rules,
             networks,
-            np.array(rows, np.int32),
-            np.uint64(keys[0].key),
-            _counters(keys),
+            rows,
+            np.uint64(key),
+            counters,
             lanes,
             wiring,
             cells,
@@ -282,24 +283,29 @@ def try_genomes(
     *,
     noise: float,
     noise_key: NoiseKey,
-    precision: Precision = "single",
 ) -> TrialBatch:
     """Try each of n genomes of one population once.
 
     Args:
         platform: The robot as simulated.
         arena: Where.
-        genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs.
+        genomes: With 3 inputs (largest reading, stall, time), or 4 with the constant one, and 2 outputs; all of
+            one kind: constant input, activation, recurrence and biases of nodes are the same.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
-        precision: Of the arithmetic: "single" (32 bits, as studies use unless they say otherwise) or "double".
 
     Raises:
-        ValueError: No genome, or one with other inputs or outputs.
+        ValueError: No genome, one with other inputs or outputs, genomes of several kinds, noise that is not a
+            finite number from 0 on, or more individuals than there are numbers for.
     """
-    first = noise_key.individual
-    keys = [replace(noise_key, individual=first + k) for k in range(len(genomes))]
-    return run_all(platform, arena, genomes, range(len(genomes)), noise, keys, precision)[0]
+    n = len(genomes)
+    if noise_key.individual + len(genomes) > MAX_INDIVIDUALS:
+        raise ValueError(
+            f"The last of {len(genomes)} genomes from individual {noise_key.individual} on is beyond "
+            f"{MAX_INDIVIDUALS - 1}: its numbers would repeat. Begin lower, or try fewer in a call."
+        )
+    rows, counters = np.arange(n, dtype=np.int32), counters_of(noise_key, n)
+    return run_all(platform, arena, genomes, rows, noise, noise_key.key, counters)[0]
 
 
 def trace_genome(
@@ -309,10 +315,10 @@ def trace_genome(
     *,
     noise: float,
     noise_key: NoiseKey,
-    precision: Precision = "single",
 ) -> Trajectory:
     """Try one genome once and keep every step; arguments as in `try_genomes`."""
-    batch, trace = run_all(platform, arena, [genome], [0], noise, [noise_key], precision, platform.steps)
+    rows, counters = np.zeros(1, np.int32), counters_of(noise_key)
+    batch, trace = run_all(platform, arena, [genome], rows, noise, noise_key.key, counters, platform.steps)
     poses = trace.poses[:, :, 0].astype(np.float64)
     poses *= [1.0, 1.0, math.tau]
     poses += [arena.start.x, arena.start.y, 0.0]
@@ -340,3 +346,17 @@ def _check_sizes(genomes: Sequence[Genome]) -> None:
                 f"A genome has {given} inputs and {genome.rules.n_outputs} outputs, expected 3 inputs (largest "
                 "reading, stall, time; a constant one is extra) and 2 outputs (move, turn)."
             )
+    first = _kind(genomes[0])
+    for k, genome in enumerate(genomes):
+        for name, value in _kind(genome).items():
+            if value != first[name]:
+                raise ValueError(
+                    f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "
+                    "those of each kind in a call of their own."
+                )
+
+
+def _kind(genome: Genome) -> dict[str, float]:
+    """What all genomes of a call share: the kernels read it once."""
+    names = ("n_inputs", "bias_input", "activation", "activation_slope", "recurrent", "node_bias")
+    return {name: getattr(genome.rules, name) for name in names} | {"bias_value": genome.bias_value}

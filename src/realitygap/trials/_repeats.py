@@ -12,7 +12,7 @@ from realitygap.kernels._philox import MAX_REPEATS
 from realitygap.robots import JyroPlatform
 from realitygap.world import Arena
 
-from ._jyro import NoiseKey, Precision, TrialBatch, _check_sizes, run_all
+from ._jyro import NoiseKey, TrialBatch, _check_sizes, counters_of, run_all
 
 
 def retry_genomes(
@@ -23,26 +23,23 @@ def retry_genomes(
     noise: float,
     noise_keys: Sequence[NoiseKey],
     repeats: range,
-    precision: Precision = "single",
 ) -> TrialBatch:
     """Try each of n genomes once for each number in `repeats`, r in all.
 
     Args:
         platform: The robot as simulated.
         arena: Where.
-        genomes: Of the same rules, as in `try_genomes`; they may come from different runs.
+        genomes: Of one kind, as in `try_genomes`; they may come from different runs.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
-
-        precision: As in `try_genomes`.
 
     Returns:
         n * r trials, those of a genome together: `coverage_line.reshape(n, r)` has a row per genome.
 
     Raises:
-        ValueError: No genome, one with other inputs or outputs, another number of keys than of genomes, or a
-            repeat below 0 or beyond 4095.
+        ValueError: No genome, one with other inputs or outputs, genomes of several kinds, another number of
+            keys than of genomes, a repeat below 0 or beyond 4095, or noise that is not a finite number from 0 on.
     """
     _check_sizes(genomes)
     if len(noise_keys) != len(genomes):
@@ -54,8 +51,20 @@ def retry_genomes(
     counts = np.zeros((3, len(genomes), n_repeats), np.int32)
     for key in {noise_key.key for noise_key in noise_keys}:
         rows = [row for row, noise_key in enumerate(noise_keys) if noise_key.key == key]
-        keys = [replace(noise_keys[row], repeat=repeat) for row in rows for repeat in repeats]
-        batch, _ = run_all(platform, arena, genomes, np.repeat(rows, n_repeats), noise, keys, precision)
+        counters = [
+            counters_of(replace(noise_keys[row], repeat=repeat)) for row in rows for repeat in repeats
+        ]
+        if not counters:
+            continue
+        batch, _ = run_all(
+            platform,
+            arena,
+            genomes,
+            np.repeat(np.array(rows, np.int32), n_repeats),
+            noise,
+            key,
+            np.concatenate(counters),
+        )
         cells[rows] = batch.cells.reshape(len(rows), n_repeats, -1)
         counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))
     return TrialBatch(cells.reshape(-1, arena.grid.n_cells), *counts.reshape(3, -1))

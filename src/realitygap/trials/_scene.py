@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import CaseError
+from ..errors import CaseError, RecordError
 from ..kernels import _scene as kernel
 from ..world._case import Case, CaseDevice
 
@@ -57,9 +55,14 @@ class SceneTrack:
         sensors than another leaves its last columns empty.
 
         Raises:
-            CaseError: The file cannot be written.
+            CaseError: The file cannot be written, or belongs to a study's results.
         """
-        _write_whole(path, (line + "\n" for line in self._lines()))
+        from ..records import write_whole
+
+        try:
+            write_whole(path, (f"{line}\n".encode() for line in self._lines()))
+        except RecordError as error:
+            raise CaseError(str(error)) from error
 
     def _lines(self) -> Iterator[str]:
         n_sensors = [readings.shape[1] for readings in self.readings]
@@ -84,11 +87,15 @@ def simulate_case(case: Case) -> SceneTrack:
     Returns:
         The track of all robots over all steps.
 
+    Raises:
+        CaseError: A number grows beyond what a float64 holds.
+
     Source: Jyro 0.3.2. Differs: sensors are read at the start when all robots are in place, and not
     while they are being added.
     """
     scene = _as_arrays(case)
     times, poses, stalls, commands, energies, readings = kernel.run_scene(scene, case.dt, case.steps)
+    _refuse_beyond_numbers(case, {"poses": poses, "times": times, "readings": readings, "commands": commands})
     parts = [
         readings[:, first:last]
         for first, last in zip(scene.sensor_rows[:-1], scene.sensor_rows[1:], strict=True)
@@ -96,19 +103,38 @@ def simulate_case(case: Case) -> SceneTrack:
     return SceneTrack(times, poses, stalls, commands, energies, parts)
 
 
+def _refuse_beyond_numbers(case: Case, found: dict[str, NDArray[np.float64]]) -> None:
+    for name, values in found.items():
+        steps = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+        if len(steps):
+            raise CaseError(
+                f"The {name} are no finite numbers from step {steps[0]} on: dt {case.dt:g}, a command or a place is "
+                "too large. Make it smaller."
+            )
+
+
 def simulate_file(case: str | Path, out: str | Path) -> tuple[Case, SceneTrack]:
     """Run the case in the JSON file `case` and write its track to `out`, a CSV file.
 
     Raises:
-        CaseError: The case cannot be carried out as written, or `out` cannot be written.
+        CaseError: The case cannot be carried out as written, or `out` ends in something else than .csv, cannot
+            be written, or belongs to a study's results.
     """
     case, out = Path(case), Path(out)
     if case.exists() and out.exists() and case.samefile(out):
         raise CaseError(f"{out}: would overwrite the case itself. Name another file for the result.")
+    _check_ending(out)
     described = Case.read(case)
     track = simulate_case(described)
     track.write_csv(out)
     return described, track
+
+
+def _check_ending(out: Path) -> None:
+    from ..records import is_special
+
+    if out.suffix.lower() not in (".csv", "") and not is_special(out):
+        raise CaseError(f"{out} ends in {out.suffix}, expected .csv: a track is a CSV file.")
 
 
 def _as_arrays(case: Case) -> kernel.Scene:
@@ -174,27 +200,3 @@ def _table(rows: Iterable[Iterable[float]], n_columns: int) -> NDArray[np.float6
 def _row_starts(counts: Iterable[int]) -> NDArray[np.int64]:
     """(r + 1,) where the rows of each robot begin, from how many rows each has."""
     return np.cumsum([0, *counts]).astype(np.int64)
-
-
-def _write_whole(path: Path, lines: Iterable[str]) -> None:
-    """Write a file beside its place and rename it, so that the place holds the old file or the new one."""
-    is_special = path.exists() and not path.is_file()  # a terminal, a pipe: nothing to be renamed
-    place = path.resolve()
-    beside = path if is_special else place.with_name(f".{place.name}.{os.getpid()}.tmp")
-    try:
-        with beside.open("w", encoding="utf-8", newline="") as file:
-            file.writelines(lines)
-            if not is_special:
-                file.flush()
-                os.fsync(file.fileno())
-        if not is_special:
-            beside.replace(place)
-    except OSError as error:
-        raise CaseError(
-            f"{path}: cannot be written ({error.strerror}). "
-            "Name a file in a folder that exists and can be written."
-        ) from None
-    finally:
-        if not is_special:
-            with contextlib.suppress(OSError):
-                beside.unlink(missing_ok=True)

@@ -1,0 +1,82 @@
+"""Files beside the results, such as a report or a track: written whole, and never over the results themselves."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from realitygap.errors import RecordError
+from realitygap.records._description import DESCRIPTION_NAME
+from realitygap.records._listing import LEDGER_NAME, TRIALS_NAME
+from realitygap.records._lock import LOCK_NAME
+from realitygap.records._log import LOG_NAME
+
+_OWN_NAMES = (DESCRIPTION_NAME, LOCK_NAME, LOG_NAME)
+"""Of the files of a study; a ledger has files beside it whose names begin with its own."""
+
+
+def refuse_results(path: Path) -> None:
+    """Return when a file may be written at `path`: it is not one that a study or a ledger lives in.
+
+    Raises:
+        RecordError: it is, under whatever name (a link, other letter case), whether it is there yet or not.
+    """
+    place = path.resolve()
+    if place.parent.name.casefold() == TRIALS_NAME and _holds_results(place.parent.parent):
+        raise RecordError(
+            f"{path} is where a study keeps its trials; nothing was written. Name a file elsewhere."
+        )
+    name = place.name.casefold()
+    if (name in _OWN_NAMES or name.startswith(LEDGER_NAME)) and _holds_results(place.parent):
+        raise RecordError(
+            f"{path} is part of a study's results, and stays as it is; nothing was written. Name another file."
+        )
+
+
+def is_special(path: Path) -> bool:
+    """Whether it is a terminal, a device or a pipe: written to, and never replaced."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def write_whole(path: Path, data: bytes | Iterable[bytes]) -> None:
+    """Write a file beside its place and rename it, so that the place holds the old file or the new one.
+
+    A link stays and what it leads to is written; a terminal, a device or a pipe is written to as it is.
+
+    Raises:
+        RecordError: it belongs to a study's results, or cannot be written; a file that was there is as it was.
+    """
+    refuse_results(path)
+    parts = [data] if isinstance(data, bytes) else data
+    try:
+        if is_special(path):
+            with path.open("wb") as file:
+                file.writelines(parts)
+        else:
+            _replace(path.resolve(), parts)
+    except OSError as error:
+        raise RecordError(
+            f"Could not write {path}: {error.strerror or error}. Name a file in a folder that exists and can be "
+            "written."
+        ) from error
+
+
+def _replace(place: Path, parts: Iterable[bytes]) -> None:
+    if place.is_dir():
+        raise IsADirectoryError(0, "it is a folder")
+    beside = place.with_name(f".{place.name}.{os.getpid()}.tmp")
+    try:
+        with beside.open("wb") as file:
+            file.writelines(parts)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(place)
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def _holds_results(folder: Path) -> bool:
+    return any((folder / name).exists() for name in (DESCRIPTION_NAME, LEDGER_NAME))

@@ -335,9 +335,7 @@ def test_single_precision_seldom_changes_what_a_trial_visits() -> None:
     genomes = [as_genome(neat, grown(neat, seed, seed % 3)) for seed in range(cases(2_000, 64))]
     trial = {"noise": 0.5, "noise_key": NoiseKey(11)}
     single = try_genomes(JyroPlatform(), paper_arena(), genomes, **trial)
-    double = try_genomes(
-        JyroPlatform(precision="double"), paper_arena(), genomes, precision="double", **trial
-    )
+    double = try_genomes(JyroPlatform(precision="double"), paper_arena(), genomes, **trial)
     assert (single.n_line != double.n_line).mean() < (0.02 if COMPILED else 0.1)
 
 

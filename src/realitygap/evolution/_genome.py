@@ -172,7 +172,7 @@ def decode_all(genomes: Sequence[Genome]) -> Networks:
         decode_rows(genomes[0]._genomes, rows, genomes[0].rules, networks)
         return networks
     for k, genome in enumerate(genomes):
-        one = Networks(*(part if part is networks.ends else part[k : k + 1] for part in networks))
+        one = Networks._make(part if part is networks.ends else part[k : k + 1] for part in networks)
         decode_rows(genome._genomes, np.array([genome._row]), genome.rules, one)
     return networks
 

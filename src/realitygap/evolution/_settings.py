@@ -21,8 +21,7 @@ class NeatSettings(BaseModel):
     *C++*, Stanley's own release 1.2.1, where it is the only source; *JAIR04*, Stanley & Miikkulainen (2004),
     appendix. Where neither says, the choice is ours and said to be.
 
-    What is fixed: a genome is node genes and connection genes; all start fully wired from inputs to outputs
-    without hidden nodes (EC02 3.4); structures that arise twice in a generation get the same innovation
+    What is fixed: a genome is node genes and connection genes; structures that arise twice in a generation get the same innovation
     numbers and are forgotten after it (3.2); a split leaves the old gene disabled, with weight 1 into the
     new node and the old weight out of it (3.1); fitness is shared within a species, whose share of the
     children is its mean fitness (3.3); the whole population is replaced (3.3), and its size is exact, by
@@ -63,6 +62,18 @@ class NeatSettings(BaseModel):
         description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5).",
     )
 
+    start_hidden: int = Field(
+        0,
+        ge=0,
+        le=1000,
+        description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; its network "
+        "without growth, 4.4: 10).",
+    )
+    start_topology: Literal["full", "random"] = Field(
+        "full",
+        description="'full': all start with the same links. 'random': each starts with a random number of the hidden "
+        "nodes, at least one, and with each link by coin (EC02 4.4, for comparison).",
+    )
     initial_weight: float = Field(
         1.0,
         ge=0,
@@ -261,6 +272,8 @@ class NeatSettings(BaseModel):
             bias_input=bias_input,
             activation={"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}[self.activation],
             activation_slope=float(self.activation_slope),
+            start_hidden=self.start_hidden,
+            start_random=self.start_topology == "random",
             initial_weight=float(self.initial_weight),
             weight_limit=float(self.weight_limit),
             mutate_weights=float(self.mutate_weights),

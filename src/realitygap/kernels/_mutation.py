@@ -46,8 +46,9 @@ N_SPLITS = 3
 def make_innovations(rules, n):
     """No innovation yet, with room for the n children of a generation."""
     counters = np.zeros(4, np.int64)
-    counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs
-    counters[NEXT_NODE] = rules.n_inputs + rules.n_outputs
+    first_node = rules.n_inputs + rules.n_outputs
+    counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs + rules.start_hidden * first_node
+    counters[NEXT_NODE] = first_node + rules.start_hidden
     return Innovations(
         counters,
         np.empty(n, np.int32),

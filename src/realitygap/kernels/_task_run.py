@@ -63,9 +63,7 @@ def _next_to_test(fitness, species_of, species, tested, n_tested):
     for k in range(species.counts[N_SPECIES]):
         champion = -1
         for row in range(fitness.size):
-            if species_of[row] == species.identity[k] and (
-                champion < 0 or fitness[row] > fitness[champion]
-            ):
+            if species_of[row] == species.identity[k] and (champion < 0 or fitness[row] > fitness[champion]):
                 champion = row
         seen = False
         for i in range(n_tested):
@@ -169,9 +167,7 @@ def run_task(rules, neat, key, replicate, room, hidden_room, outcome):
                 shaking,
             )
             if actions == LONG_TRIAL:
-                starts = generalization(
-                    networks, FIRST, neat, rules.bias_value, values, before, shaking
-                )
+                starts = generalization(networks, FIRST, neat, rules.bias_value, values, before, shaking)
                 if starts >= ENOUGH_STARTS:
                     _note(outcome, genomes, row, (generation + 1) * n, starts, generation)
                     return True

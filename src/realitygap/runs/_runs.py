@@ -91,8 +91,8 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
         bias_value=condition.neat.bias_value,
     )
     rules = run_rules(condition)
-    room = neat.n_inputs * neat.n_outputs + FIRST_ROOM
-    hidden_room = FIRST_HIDDEN_ROOM
+    room = neat.n_first_genes + FIRST_ROOM
+    hidden_room = neat.start_hidden + FIRST_HIDDEN_ROOM
     while True:
         rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
         if _run.run_replicates(scene, trial, neat, rules, np.uint64(condition.key), first_replicate, rows):

@@ -21,12 +21,12 @@ class NeatSettings(BaseModel):
     *C++*, Stanley's own release 1.2.1, where it is the only source; *JAIR04*, Stanley & Miikkulainen (2004),
     appendix. Where neither says, the choice is ours and said to be.
 
-    What is fixed: a genome is node genes and connection genes; structures that arise twice in a generation get the same innovation
-    numbers and are forgotten after it (3.2); a split leaves the old gene disabled, with weight 1 into the
-    new node and the old weight out of it (3.1); fitness is shared within a species, whose share of the
-    children is its mean fitness (3.3); the whole population is replaced (3.3), and its size is exact, by
-    largest remainder (ours: C++ gives what is missing to the largest species). A link out of an output node
-    counts as recurrent (C++).
+    What is fixed: a genome is node genes and connection genes; structures that arise twice in a generation
+    get the same innovation numbers and are forgotten after it (EC02 3.2); a split leaves the old gene
+    disabled, with weight 1 into the new node and the old weight out of it (3.1); fitness is shared within a
+    species, whose share of the children is its mean fitness (3.3); the whole population is replaced (3.3),
+    and its size is exact, by largest remainder (ours: C++ gives what is missing to the largest species). A
+    link out of an output node counts as recurrent (C++).
 
     Differs from C++: no traits; a new link's weight is drawn anew also when another genome made the same
     link in the generation; no "severe" half in weight mutation; no worst species marked for removal every 30
@@ -66,8 +66,8 @@ class NeatSettings(BaseModel):
         0,
         ge=0,
         le=1000,
-        description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; its network "
-        "without growth, 4.4: 10).",
+        description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; without "
+        "growth, 4.4: 10).",
     )
     start_topology: Literal["full", "random"] = Field(
         "full",

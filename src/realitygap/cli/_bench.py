@@ -101,7 +101,6 @@ def _bench_task(
         return
     published = figures["published"]
     names = {
-        "solved": "runs that solved it",
         "mean_evaluations": "mean evaluations",
         "median_evaluations": "median",
         "sd_evaluations": "standard deviation",
@@ -110,12 +109,15 @@ def _bench_task(
         "mean_connections": "mean enabled connections",
         "mean_generalization": "mean generalization, of 625",
     }
-    typer.echo(f"{task}, {figures['settings']}, {seeds} runs from seed {seed}")
+    typer.echo(f"{task}, {figures['settings']}, seed {seed}")
     typer.echo(f"{'':28} {'ours':>10} {'published':>10}")
+    ours = f"{figures['solved']} of {seeds}"
+    source = f"{published['solved']} of {published['n']}"
+    typer.echo(f"{'solved':28} {ours:>10} {source:>10}")
     for key, name in names.items():
         if key in figures:
             typer.echo(f"{name:28} {_shown(key, figures[key]):>10} {_shown(key, published.get(key)):>10}")
-    typer.echo(f"Published: n = {published['n']}; {published['source']}.")
+    typer.echo(f"Published: {published['source']}.")
 
 
 def _shown(key: str, value: float | None) -> str:

@@ -11,8 +11,8 @@ from realitygap.kernels import _task_run
 from realitygap.tasks import ClassicalTask
 
 # Room for genes and hidden nodes beyond the first ones; doubled and run again where it was not enough.
-FIRST_ROOM = 32
-FIRST_HIDDEN_ROOM = 8
+FIRST_ROOM = 128
+FIRST_HIDDEN_ROOM = 32
 
 _NUMBERS = {
     "xor": _task_run.XOR,

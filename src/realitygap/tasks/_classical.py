@@ -53,7 +53,7 @@ _TASKS = (
         "Double pole with velocities",
         6,
         {"population": 150, "generations": 1000, "bias_value": 0.5, "recurrent": False},
-        {"n": 120, "solved": 120, "mean_evaluations": 3600, "sd_evaluations": 2704},
+        {"n": 120, "solved": 120, "mean_evaluations": 3600, "sd_evaluations": 2700},
         "Stanley & Miikkulainen (2002), section 4.3, table 1",
     ),
     ClassicalTask(

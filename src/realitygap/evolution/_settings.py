@@ -313,14 +313,35 @@ class NeatSettings(BaseModel):
         )
 
 
-# The paper's text alone, and Stanley's C++ only where the paper is silent.
+# The paper's text alone, and Stanley's C++ only where the paper is silent; every value in which `default` may differ.
 _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
     "generations": 100,
+    "initial_weight": 1.0,
+    "mutate_weights": 0.8,
+    "replace_weight": 0.1,
+    "weight_step": 2.5,
+    "replaced_weight": 2.5,
+    "weight_limit": 8.0,
+    "add_node": 0.03,
     "add_link": 0.05,
+    "structural_mutations": "one",
+    "split_bias_links": False,
+    "reenable": 0.0,
+    "crossover": 0.75,
+    "crossover_only": 0.2,
+    "average_weights": 0.0,
+    "equal_parents": "mix",
+    "weight_coefficient": 0.4,
     "normalize_genes": "large",
+    "threshold": 3.0,
+    "representative": "random",
+    "target_species": 0,
+    "survival": 0.2,
+    "champion_from": 6,
     "champion_counts": "members",
+    "stagnation": 15,
     "stagnation_factor": 0.0,
     "best_species_spared": False,
 }

@@ -75,13 +75,13 @@ class NeatSettings(BaseModel):
         "nodes, at least one, and with each link by coin (EC02 4.4, for comparison).",
     )
     initial_weight: float = Field(
-        1.0,
+        2.5,
         ge=0,
         le=100,
         description="First weights, and those of new links, are uniform within +- this (C++: 1).",
     )
     mutate_weights: float = Field(
-        0.8, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
+        1.0, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
     )
     replace_weight: float = Field(
         0.1,
@@ -90,10 +90,10 @@ class NeatSettings(BaseModel):
         description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
     )
     weight_step: float = Field(
-        2.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+        0.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        2.5,
+        6.0,
         ge=0,
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
@@ -106,7 +106,7 @@ class NeatSettings(BaseModel):
         0.03, ge=0, le=1, description="Share of mutated children that split a link (EC02 4.1: 0.03)."
     )
     add_link: float = Field(
-        0.3,
+        0.5,
         ge=0,
         le=1,
         description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
@@ -115,7 +115,7 @@ class NeatSettings(BaseModel):
         20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
     )
     structural_mutations: Literal["one", "independent"] = Field(
-        "one",
+        "independent",
         description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, "
         "link and weights are drawn apart, as in neat-python.",
     )
@@ -123,21 +123,21 @@ class NeatSettings(BaseModel):
         False, description="Whether links out of the constant input may be split (C++: no)."
     )
     reenable: float = Field(
-        0.0,
+        0.2,
         ge=0,
         le=1,
         description="Share of mutated children whose oldest disabled gene is switched on (C++: 0).",
     )
 
     crossover: float = Field(
-        0.75,
+        0.5,
         ge=0,
         le=1,
         description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone). Where both draws "
         "name the same one, as in a species with a single parent, the child comes from mutation alone.",
     )
     crossover_only: float = Field(
-        0.2, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
+        0.0, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
     )
     average_weights: float = Field(
         0.0,
@@ -187,7 +187,7 @@ class NeatSettings(BaseModel):
         "(C++).",
     )
     target_species: int = Field(
-        0,
+        10,
         ge=0,
         le=1_000_000,
         description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10.",

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import typer
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from scipy import stats
 
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
@@ -23,10 +24,11 @@ from realitygap.records import column_table
 from realitygap.robots import JyroPlatform
 from realitygap.runs import Condition
 from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CLASSICAL_TASKS, CoverageTask
 from realitygap.world import ArenaSettings
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
+TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
 CONDITION_KEYS = ("name", "selection", "platform", "noise")
 TABLES: dict[str, type[BaseModel]] = {
     "[study]": StudySection,
@@ -50,6 +52,9 @@ def write_all(folder: Path) -> None:
     }
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
+    pages["parts/classical-tasks.md"] = classical_tasks()
+    pages["parts/open-choices.md"] = open_choices()
+    pages["parts/ablations.md"] = ablations()
     pages |= {f"commands/{name}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -417,3 +422,96 @@ def conditions_to_try() -> list[str]:
     return [
         c.name for c, note in zip(study.conditions, study.notes, strict=True) if note.baseline is not None
     ]
+
+
+# --- classical tasks ----------------------------------------------------------------------------------------
+
+# Evaluations and failures [%] of the paper's ablations (EC02, table 3).
+PUBLISHED_ABLATIONS = {
+    "full": (3_600, 0),
+    "no mating": (5_557, 0),
+    "random start": (23_033, 5),
+    "no speciation": (25_600, 25),
+    "no growth": (30_239, 80),
+}
+
+
+def task_rows(group: str) -> list[dict[str, str]]:
+    """What `make_classical_tasks.py` wrote: tasks, open choices or ablations."""
+    with TASKS_DATA.open(newline="", encoding="utf-8") as file:
+        return [row for row in csv.DictReader(file) if row["group"] == group]
+
+
+def mean_with_interval(row: Mapping[str, Any], n: int) -> str:
+    """The mean number of evaluations and its 95 % interval; `n` runs solved the task."""
+    if not row.get("mean_evaluations"):
+        return ""
+    mean = float(row["mean_evaluations"])
+    if not row.get("sd_evaluations"):
+        return f"{mean:,.0f}"
+    half = float(stats.t.ppf(0.975, n - 1)) * float(row["sd_evaluations"]) / n**0.5
+    return f"{mean:,.0f} [{mean - half:,.0f}, {mean + half:,.0f}]"
+
+
+def figure(value: Any, digits: int = 0) -> str:
+    """A number in a table; nothing where there is none."""
+    return f"{float(value):,.{digits}f}" if value not in (None, "") else ""
+
+
+def task_line(name: str, row: Mapping[str, Any], n: int) -> str:
+    """One line of the table of tasks."""
+    solved = int(row["solved"])
+    cells = [name, f"{solved} of {n}", mean_with_interval(row, solved)]
+    cells += [figure(row.get(f"{each}_evaluations")) for each in ("median", "sd", "worst")]
+    cells += [figure(row.get(f"mean_{each}"), 2) for each in ("hidden", "connections")]
+    cells.append(figure(row.get("mean_generalization")))
+    return "| " + " | ".join(cells) + " |"
+
+
+def classical_tasks() -> str:
+    """Our results on the classical tasks below the published ones."""
+    rows = task_rows("tasks")
+    lines = [
+        "| | solved | mean evaluations [95 %] | median | sd | worst | hidden nodes | connections | of 625 |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for task in CLASSICAL_TASKS.values():
+        lines.append(f"| **{task.title}** | | | | | | | | |")
+        lines.append(task_line("published", task.published, task.published["n"]))
+        lines += [
+            task_line(f"`{row['settings']}`", row, int(row["seeds"]))
+            for row in rows
+            if row["task"] == task.name
+        ]
+    seeds = sorted({row["seed"] for row in rows})
+    return "\n".join([*lines, "", f"Seed {', '.join(seeds)}."]) + "\n"
+
+
+def open_choices() -> str:
+    """What values that the paper leaves open do to XOR."""
+    ours = [row for row in task_rows("tasks") if (row["task"], row["settings"]) == ("xor", "stanley-2002")]
+    lines = ["| `stanley-2002` with | solved | mean evaluations [95 %] | median |", "|---|---|---|---|"]
+    for row in ours + task_rows("open"):
+        n, solved = int(row["seeds"]), int(row["solved"])
+        name = f"`{row['name']}`" if row["name"] else "nothing changed"
+        lines.append(
+            f"| {name} | {solved} of {n} | {mean_with_interval(row, solved)} "
+            f"| {figure(row['median_evaluations'])} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def ablations() -> str:
+    """What NEAT loses without each of its parts, beside the published losses."""
+    lines = [
+        "| | evaluations [95 %] | failures | published evaluations | published failures |",
+        "|---|---|---|---|---|",
+    ]
+    for row in task_rows("ablations"):
+        n, solved = int(row["seeds"]), int(row["solved"])
+        evaluations, failures = PUBLISHED_ABLATIONS[row["name"]]
+        lines.append(
+            f"| {row['ablation']} | {mean_with_interval(row, solved)} | {100 * (n - solved) / n:.0f} % of {n} "
+            f"| {evaluations:,} | {failures} % |"
+        )
+    return "\n".join(lines) + "\n"

@@ -314,9 +314,27 @@ def test_bench_ends(seconds):
     assert "Invalid value for '--seconds'" in done.stderr
 
 
+def test_bench_of_a_task_prints_its_figures_beside_the_published_ones():
+    words = ("bench", "xor", "--settings", "stanley-2002", "--seeds", "2", "--change", "generations=3")
+    words += ("--change", "start_topology=random")
+    figures = json.loads(realitygap(*words, "--json").stdout)
+    assert figures["settings"] == "stanley-2002 generations=3 start_topology=random"
+    assert (figures["task"], figures["seeds"]) == ("xor", 2)
+    assert figures["published"]["mean_evaluations"] == 4755
+    table = realitygap(*words).stdout
+    assert re.search(r"mean evaluations +\S+ +4,755", table)
+    assert f"{figures['solved']} of 2" in table
+
+
 @pytest.mark.parametrize(
     ("words", "texts"),
     [
+        ("bench xr", ["Unknown task 'xr'", "Did you mean 'xor'?"]),
+        ("bench xor --settings stanley", ["Unknown NEAT settings 'stanley'"]),
+        ("bench xor --change crossover", ["expected KEY=VALUE"]),
+        ("bench xor --change crossover=2", ["crossover: expected at most 1.0, came 2"]),
+        ("bench xor --seconds 1", ["--seconds goes with the measurement of speed"]),
+        ("bench --seeds 3", ["--seeds goes with a task"]),
         ("run papr", ["Unknown study 'papr'", "Did you mean 'paper'?"]),
         ("run nowhere.toml", ["no file nowhere.toml", "new-study"]),
         ("digest nowhere", ["nowhere does not exist"]),

@@ -22,6 +22,8 @@ def random_settings(rng: random.Random) -> NeatSettings:
         "population": [2, 3, 5, 8, 12],
         "recurrent": [False, True],
         "node_bias": [False, True],
+        "start_hidden": [0, 0, 1, 4],
+        "start_topology": ["full", "full", "random"],
         "initial_weight": [0.0, 1.0, 2.5],
         "mutate_weights": [0.0, 0.8, 1.0],
         "replace_weight": [0.0, 0.1, 1.0],

@@ -114,17 +114,34 @@ class Neat:
         return sorted(node for node in genome.biases if node >= self.first_hidden)
 
     def history(self) -> History:
-        return History(self.n_inputs * self.n_outputs, self.first_hidden)
+        hidden = self.settings.start_hidden
+        n_genes = self.n_inputs * self.n_outputs + hidden * (self.n_inputs + self.n_outputs)
+        return History(n_genes, self.first_hidden + hidden)
+
+    def first_links(self) -> list[tuple[int, int]]:
+        """Links that a start can have, by number: input to output; by hidden node, those into it and out of it."""
+        inputs = range(self.n_inputs)
+        links = [(source, target) for target in self.outputs for source in inputs]
+        for node in range(self.first_hidden, self.first_hidden + self.settings.start_hidden):
+            links += [(source, node) for source in inputs]
+            links += [(node, target) for target in self.outputs]
+        return links
 
     def first_genome(self, stream: Stream) -> Genome:
-        """Inputs fully wired to outputs; draws: weights by output, then input; biases."""
-        reach = self.settings.initial_weight
+        """Draws: hidden nodes where that is random; by link whether, where that is, and its weight; biases."""
+        settings = self.settings
+        reach = settings.initial_weight
+        is_random = settings.start_topology == "random"
+        n_hidden = settings.start_hidden
+        if is_random and n_hidden:
+            n_hidden = 1 + stream.below(n_hidden)
+        end = self.first_hidden + n_hidden
         genome = Genome()
-        for target in self.outputs:
-            for source in range(self.n_inputs):
-                genome.genes[len(genome.genes)] = Gene(source, target, stream.signed(reach))
-        for node in self.outputs:
-            genome.biases[node] = stream.signed(reach) if self.settings.node_bias else 0.0
+        for number, link in enumerate(self.first_links()):
+            if max(link) < end and not (is_random and not stream.chance(0.5)):
+                genome.genes[number] = Gene(*link, stream.signed(reach))
+        for node in range(self.n_inputs, end):
+            genome.biases[node] = stream.signed(reach) if settings.node_bias else 0.0
         return genome
 
     # --- mutation -------------------------------------------------------------------------------------------

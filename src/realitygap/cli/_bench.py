@@ -1,28 +1,132 @@
-"""`realitygap bench`: how fast this machine is."""
+"""`realitygap bench`: how fast this machine is, and how good NEAT."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated
+import tomllib
+from typing import Annotated, Any
 
 import typer
 
+from realitygap.errors import StudyError
+
+DEFAULT_SEEDS = 100
+
 
 def bench(
+    task: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[TASK]", help="xor, double-pole or double-pole-no-velocity; without it, speed."
+        ),
+    ] = None,
+    settings: Annotated[
+        str | None, typer.Option(help="With a task: a named set of NEAT's settings. [default: default]")
+    ] = None,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="With a task: of the random numbers. [default: 1]")
+    ] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY=VALUE", help="With a task: a setting changed; may be given again."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     seconds: Annotated[
-        float, typer.Option(min=0.01, max=3600, help="How long each figure is measured.")
-    ] = 2.0,
+        float | None, typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]")
+    ] = None,
 ) -> None:
-    """Measure robot-steps and whole paper runs a second, on one core and on all.
+    """Measure how fast this machine is or, with a task, how many evaluations NEAT needs for it.
 
-    A robot-step holds its noise and its line coverage; a paper run its NEAT; a recorded one the writing of
-    its rows. Compilation is not counted.
+    Speed: robot-steps and whole paper runs a second, on one core and on all. A robot-step holds its noise and
+    its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted.
+
+    A task: runs of NEAT from many seeds, beside the results of Stanley & Miikkulainen (2002). An evaluation is
+    one network tried once, counted up to and with the first that solves the task; figures are over the runs that
+    solved it.
 
     Example: realitygap bench --json
 
+    Example: realitygap bench xor --settings stanley-2002 --seeds 100
+
+    Example: realitygap bench double-pole --seeds 20 --change crossover=0
+
     In Python: realitygap.study.measure_speed()
+
+    In Python: realitygap.study.measure_task("xor", "stanley-2002", seeds=100)
     """
+    if task is None:
+        given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change}
+        for option, value in given.items():
+            if value:
+                raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
+        _bench_speed(2.0 if seconds is None else seconds, as_json=as_json)
+        return
+    if seconds is not None:
+        raise StudyError("--seconds goes with the measurement of speed, which has no task.")
+    _bench_task(
+        task,
+        "default" if settings is None else settings,
+        DEFAULT_SEEDS if seeds is None else seeds,
+        1 if seed is None else seed,
+        dict(map(_changed_setting, change or [])),
+        as_json=as_json,
+    )
+
+
+def _changed_setting(text: str) -> tuple[str, Any]:
+    """A setting's name and its value, which is written as in a study file or is a word."""
+    key, sign, value = text.partition("=")
+    if not key or not sign:
+        raise StudyError(f"--change {text}: expected KEY=VALUE, such as crossover=0.")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
+def _bench_task(
+    task: str, settings: str, seeds: int, seed: int, changes: dict[str, Any], *, as_json: bool
+) -> None:
+    from realitygap.study import measure_task
+
+    from ._study import RunsBar
+
+    with RunsBar(quiet=as_json) as bar:
+        figures = measure_task(task, settings, seeds=seeds, seed=seed, changes=changes, tell=bar.show)
+    if as_json:
+        typer.echo(json.dumps(figures, indent=2))
+        return
+    published = figures["published"]
+    names = {
+        "mean_evaluations": "mean evaluations",
+        "median_evaluations": "median",
+        "sd_evaluations": "standard deviation",
+        "worst_evaluations": "worst",
+        "mean_hidden": "mean hidden nodes",
+        "mean_connections": "mean enabled connections",
+        "mean_generalization": "mean generalization, of 625",
+    }
+    typer.echo(f"{task}, {figures['settings']}, seed {seed}")
+    typer.echo(f"{'':28} {'ours':>10} {'published':>10}")
+    ours = f"{figures['solved']} of {seeds}"
+    source = f"{published['solved']} of {published['n']}"
+    typer.echo(f"{'solved':28} {ours:>10} {source:>10}")
+    for key, name in names.items():
+        if key in figures:
+            typer.echo(f"{name:28} {_shown(key, figures[key]):>10} {_shown(key, published.get(key)):>10}")
+    typer.echo(f"Published: {published['source']}.")
+
+
+def _shown(key: str, value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:,.2f}" if key in ("mean_hidden", "mean_connections") else f"{value:,.0f}"
+
+
+def _bench_speed(seconds: float, *, as_json: bool) -> None:
     from realitygap.study import measure_speed
 
     figures = measure_speed(seconds)

@@ -58,7 +58,7 @@ def run(
     from realitygap.study import run_study
 
     try:
-        with _ProgressBar(quiet=as_json) as bar:
+        with RunsBar(quiet=as_json) as bar:
             result = run_study(
                 study,
                 out,
@@ -115,7 +115,7 @@ def _as_name(stem: str) -> str:
     return name.lstrip(".-_") or "my-study"
 
 
-class _ProgressBar:
+class RunsBar:
     """Runs done, rate and time left, on standard error where that is a terminal."""
 
     def __init__(self, *, quiet: bool) -> None:
@@ -143,7 +143,7 @@ class _ProgressBar:
         )
         self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
 
-    def __enter__(self) -> _ProgressBar:
+    def __enter__(self) -> RunsBar:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -75,8 +75,9 @@ class Population:
         self._replicate = replicate
         self.generation = 0
         n = self.settings.population
-        room = self._rules.n_inputs * n_outputs + FIRST_ROOM
-        self._genomes: Genomes = make_genomes(n, n_outputs, room, FIRST_HIDDEN_ROOM)
+        room = self._rules.n_first_genes + FIRST_ROOM
+        hidden_room = self._rules.start_hidden + FIRST_HIDDEN_ROOM
+        self._genomes: Genomes = make_genomes(n, n_outputs, room, hidden_room)
         self._innovations: Innovations = make_innovations(self._rules, n)
         self._species: SpeciesTable = make_species(self._rules, n)
         self._species_of = np.zeros(n, np.int32)

@@ -21,13 +21,12 @@ class NeatSettings(BaseModel):
     *C++*, Stanley's own release 1.2.1, where it is the only source; *JAIR04*, Stanley & Miikkulainen (2004),
     appendix. Where neither says, the choice is ours and said to be.
 
-    What is fixed: a genome is node genes and connection genes; all start fully wired from inputs to outputs
-    without hidden nodes (EC02 3.4); structures that arise twice in a generation get the same innovation
-    numbers and are forgotten after it (3.2); a split leaves the old gene disabled, with weight 1 into the
-    new node and the old weight out of it (3.1); fitness is shared within a species, whose share of the
-    children is its mean fitness (3.3); the whole population is replaced (3.3), and its size is exact, by
-    largest remainder (ours: C++ gives what is missing to the largest species). A link out of an output node
-    counts as recurrent (C++).
+    What is fixed: a genome is node genes and connection genes; structures that arise twice in a generation
+    get the same innovation numbers and are forgotten after it (EC02 3.2); a split leaves the old gene
+    disabled, with weight 1 into the new node and the old weight out of it (3.1); fitness is shared within a
+    species, whose share of the children is its mean fitness (3.3); the whole population is replaced (3.3),
+    and its size is exact, by largest remainder (ours: C++ gives what is missing to the largest species). A
+    link out of an output node counts as recurrent (C++).
 
     Differs from C++: no traits; a new link's weight is drawn anew also when another genome made the same
     link in the generation; no "severe" half in weight mutation; no worst species marked for removal every 30
@@ -63,14 +62,26 @@ class NeatSettings(BaseModel):
         description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5).",
     )
 
+    start_hidden: int = Field(
+        0,
+        ge=0,
+        le=1000,
+        description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; without "
+        "growth, 4.4: 10).",
+    )
+    start_topology: Literal["full", "random"] = Field(
+        "full",
+        description="'full': all start with the same links. 'random': each starts with a random number of the hidden "
+        "nodes, at least one, and with each link by coin (EC02 4.4, for comparison).",
+    )
     initial_weight: float = Field(
-        1.0,
+        2.5,
         ge=0,
         le=100,
         description="First weights, and those of new links, are uniform within +- this (C++: 1).",
     )
     mutate_weights: float = Field(
-        0.8, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
+        1.0, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
     )
     replace_weight: float = Field(
         0.1,
@@ -79,10 +90,10 @@ class NeatSettings(BaseModel):
         description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
     )
     weight_step: float = Field(
-        2.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+        0.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        2.5,
+        6.0,
         ge=0,
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
@@ -95,7 +106,7 @@ class NeatSettings(BaseModel):
         0.03, ge=0, le=1, description="Share of mutated children that split a link (EC02 4.1: 0.03)."
     )
     add_link: float = Field(
-        0.3,
+        0.5,
         ge=0,
         le=1,
         description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
@@ -104,7 +115,7 @@ class NeatSettings(BaseModel):
         20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
     )
     structural_mutations: Literal["one", "independent"] = Field(
-        "one",
+        "independent",
         description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, "
         "link and weights are drawn apart, as in neat-python.",
     )
@@ -112,21 +123,21 @@ class NeatSettings(BaseModel):
         False, description="Whether links out of the constant input may be split (C++: no)."
     )
     reenable: float = Field(
-        0.0,
+        0.2,
         ge=0,
         le=1,
         description="Share of mutated children whose oldest disabled gene is switched on (C++: 0).",
     )
 
     crossover: float = Field(
-        0.75,
+        0.5,
         ge=0,
         le=1,
         description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone). Where both draws "
         "name the same one, as in a species with a single parent, the child comes from mutation alone.",
     )
     crossover_only: float = Field(
-        0.2, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
+        0.0, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
     )
     average_weights: float = Field(
         0.0,
@@ -176,7 +187,7 @@ class NeatSettings(BaseModel):
         "(C++).",
     )
     target_species: int = Field(
-        0,
+        10,
         ge=0,
         le=1_000_000,
         description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10.",
@@ -280,6 +291,8 @@ class NeatSettings(BaseModel):
             bias_input=bias_input,
             activation={"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}[self.activation],
             activation_slope=float(self.activation_slope),
+            start_hidden=self.start_hidden,
+            start_random=self.start_topology == "random",
             initial_weight=float(self.initial_weight),
             weight_limit=float(self.weight_limit),
             mutate_weights=float(self.mutate_weights),
@@ -323,14 +336,35 @@ def _is_known(name: object) -> bool:
     return isinstance(name, str) and name in NAMED_SETTINGS
 
 
-# The paper's text alone, and Stanley's C++ only where the paper is silent.
+# The paper's text alone, and Stanley's C++ only where the paper is silent; every value in which `default` may differ.
 _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
     "generations": 100,
+    "initial_weight": 1.0,
+    "mutate_weights": 0.8,
+    "replace_weight": 0.1,
+    "weight_step": 2.5,
+    "replaced_weight": 2.5,
+    "weight_limit": 8.0,
+    "add_node": 0.03,
     "add_link": 0.05,
+    "structural_mutations": "one",
+    "split_bias_links": False,
+    "reenable": 0.0,
+    "crossover": 0.75,
+    "crossover_only": 0.2,
+    "average_weights": 0.0,
+    "equal_parents": "mix",
+    "weight_coefficient": 0.4,
     "normalize_genes": "large",
+    "threshold": 3.0,
+    "representative": "random",
+    "target_species": 0,
+    "survival": 0.2,
+    "champion_from": 6,
     "champion_counts": "members",
+    "stagnation": 15,
     "stagnation_factor": 0.0,
     "best_species_spared": False,
 }

@@ -41,6 +41,8 @@ class NeatRules(NamedTuple):
     bias_input: int  # id of the input that is constant, -1 where there is none
     activation: int
     activation_slope: float
+    start_hidden: int
+    start_random: bool
     initial_weight: float
     weight_limit: float
     mutate_weights: float
@@ -77,6 +79,11 @@ class NeatRules(NamedTuple):
     best_species_spared: bool
     population_stagnation: int
     clip_negative: bool
+
+    @property
+    def n_first_genes(self) -> int:
+        """The most connection genes that a genome of the first generation has."""
+        return self.n_inputs * self.n_outputs + self.start_hidden * (self.n_inputs + self.n_outputs)
 
 
 def make_genomes(n, n_outputs, room, hidden_room):
@@ -126,27 +133,51 @@ def next_signed(stream, cursor, size):
 
 @kernel
 def first_genomes(genomes, rules, key, replicate, generation):
-    """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4)."""
+    """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4).
+
+    Where the settings want hidden nodes at the start, each is wired from all inputs and to all outputs; a
+    random start has some of these nodes, and each link with a chance of one half. The same link has the same
+    number in all. Sets `full` where there is no room.
+    """
     cursor = genomes.cursor
     n = genomes.n_connections.size
     for row in range(n):
         stream = make_stream(key, replicate, generation, row, FIRST, PURPOSE_GENOME)
         cursor[0] = 0
-        gene = 0
+        genomes.n_connections[row] = 0
+        genomes.n_hidden[row] = 0
+        n_hidden = rules.start_hidden
+        if rules.start_random and n_hidden > 0:
+            n_hidden = 1 + next_below(stream, cursor, n_hidden)
+        number = np.int32(0)
         for output in range(rules.n_outputs):
             for source in range(rules.n_inputs):
-                genomes.innovation[row, gene] = gene
-                genomes.source[row, gene] = source
-                genomes.target[row, gene] = rules.n_inputs + output
-                genomes.weight[row, gene] = next_signed(stream, cursor, rules.initial_weight)
-                genomes.enabled[row, gene] = True
-                gene += 1
-        genomes.n_connections[row] = gene
-        genomes.n_hidden[row] = 0
-        for output in range(rules.n_outputs):
-            genomes.bias[row, output] = (
+                target = rules.n_inputs + output
+                _first_link(genomes, row, rules, number, source, target, stream, cursor)
+                number += 1
+        for k in range(n_hidden):
+            node = rules.n_inputs + rules.n_outputs + k
+            insert_hidden(genomes, row, node, 0.0)
+            for source in range(rules.n_inputs):
+                _first_link(genomes, row, rules, number, source, node, stream, cursor)
+                number += 1
+            for output in range(rules.n_outputs):
+                target = rules.n_inputs + output
+                _first_link(genomes, row, rules, number, node, target, stream, cursor)
+                number += 1
+        for node in range(rules.n_outputs + genomes.n_hidden[row]):
+            genomes.bias[row, node] = (
                 next_signed(stream, cursor, rules.initial_weight) if rules.node_bias else 0.0
             )
+
+
+@inlined
+def _first_link(genomes, row, rules, number, source, target, stream, cursor):
+    """Put a link of the start into a genome; into a random one with a chance of one half."""
+    if rules.start_random and next_uniform(stream, cursor) >= 0.5:
+        return
+    weight = next_signed(stream, cursor, rules.initial_weight)
+    insert_gene(genomes, row, number, source, target, weight, ENABLED)
 
 
 @inlined

@@ -45,8 +45,9 @@ N_SPLITS = 3
 @kernel
 def clear_innovations(rules, innovations):
     """No innovation yet: the next numbers are those after the first genomes'."""
-    innovations.counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs
-    innovations.counters[NEXT_NODE] = rules.n_inputs + rules.n_outputs
+    first_node = rules.n_inputs + rules.n_outputs
+    innovations.counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs + rules.start_hidden * first_node
+    innovations.counters[NEXT_NODE] = first_node + rules.start_hidden
     start_generation(innovations)
 
 

@@ -384,6 +384,8 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
         n_runs = min(together, total - first_run)
         for run in range(n_runs):
             _begin(runs, genomes, run, neat, rules, key, first_replicate + first_run + run)
+        if genomes.full[0]:
+            return False
         for generation in range(rules.n_generations):
             for run in range(n_runs):
                 for row in range(n):

@@ -1,5 +1,6 @@
 """One evolution from one seed, and many of them at once."""
 
+from ._classical import TaskRun, run_task
 from ._condition import NAME_PATTERN, Condition, Selection
 from ._replay import genome_of, replay
 from ._runs import frame_of, prepare_kernels, run_replicates, run_rows
@@ -8,10 +9,12 @@ __all__ = [
     "NAME_PATTERN",
     "Condition",
     "Selection",
+    "TaskRun",
     "frame_of",
     "genome_of",
     "prepare_kernels",
     "replay",
     "run_replicates",
     "run_rows",
+    "run_task",
 ]

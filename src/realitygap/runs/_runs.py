@@ -98,8 +98,8 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
         bias_value=condition.neat.bias_value,
     )
     rules = run_rules(condition)
-    room = neat.n_inputs * neat.n_outputs + FIRST_ROOM
-    hidden_room = FIRST_HIDDEN_ROOM
+    room = neat.n_first_genes + FIRST_ROOM
+    hidden_room = neat.start_hidden + FIRST_HIDDEN_ROOM
     while True:
         rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
         space = _run.make_run_room(scene, neat, rules, n_runs, room, hidden_room)

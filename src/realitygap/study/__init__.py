@@ -4,6 +4,7 @@ from ._bench import measure_speed
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._run import Progress, StudyResult, machine_facts, run_study, usable_processors
 from ._study import ConditionNotes, ReportSection, Study, StudySection
+from ._task import measure_task, task_settings
 from ._template import study_template
 
 __all__ = [
@@ -18,9 +19,11 @@ __all__ = [
     "load_study",
     "machine_facts",
     "measure_speed",
+    "measure_task",
     "named_studies",
     "parse_study",
     "run_study",
     "study_template",
+    "task_settings",
     "usable_processors",
 ]

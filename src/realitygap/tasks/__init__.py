@@ -1,5 +1,6 @@
 """What is rewarded."""
 
+from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
 
-__all__ = ["CoverageTask"]
+__all__ = ["CLASSICAL_TASKS", "ClassicalTask", "CoverageTask"]

@@ -1,0 +1,107 @@
+"""NEAT on the classical tasks beside the published results: the numbers of the page "Classical tasks".
+
+    uv run python docs/make_classical_tasks.py
+
+Carries out what `realitygap bench TASK` does, with seeds on which no setting was tuned, and writes
+docs/data/classical-tasks.csv, from which the page's tables are made. Takes minutes. `--seed` takes another seed,
+`--out` another file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+from realitygap.study import measure_task
+
+DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
+SEED = 2002
+COLUMNS = [
+    "task",
+    "group",
+    "name",
+    "settings",
+    "seed",
+    "seeds",
+    "solved",
+    "mean_evaluations",
+    "median_evaluations",
+    "sd_evaluations",
+    "worst_evaluations",
+    "mean_hidden",
+    "mean_connections",
+    "mean_generalization",
+]
+RANDOM_START = {"start_hidden": 10, "start_topology": "random"}
+# One compatible species takes all: no distance reaches the threshold.
+ABLATIONS: dict[str, dict[str, Any]] = {
+    "full": {},
+    "no mating": {"crossover": 0},
+    "random start": RANDOM_START,
+    "no speciation": {"threshold": 1_000_000, **RANDOM_START},
+    "no growth": {"add_node": 0, "add_link": 0, "start_hidden": 10},
+}
+# Values that the paper leaves open, each changed alone in `stanley-2002`.
+OPEN_CHOICES: list[dict[str, Any]] = [
+    {"weight_step": 1.0},
+    {"weight_step": 4.0, "replaced_weight": 4.0},
+    {"crossover_only": 0},
+    {"survival": 0.4},
+    {"representative": "champion"},
+    {"disabled_rule": "inherit"},
+    {"equal_parents": "smaller"},
+    {"split_bias_links": True},
+    {"structural_mutations": "independent"},
+]
+RUNS = [("xor", 100), ("double-pole", 100), ("double-pole-no-velocity", 50)]
+ABLATION_RUNS = 100
+
+
+def measured(task: str, settings: str, seeds: int, seed: int, **changes: Any) -> dict[str, Any]:
+    """One row of the data, but for its group and name."""
+    print(f"{task}, {settings} {changes or ''}", flush=True)
+    figures = measure_task(task, settings, seeds=seeds, seed=seed, changes=changes)
+    row = {**figures, "settings": settings, "seed": seed}
+    return {key: rounded(row.get(key)) for key in COLUMNS}
+
+
+def all_rows(seed: int) -> list[dict[str, Any]]:
+    """Every row of the data: tasks, open choices, ablations."""
+    rows = [
+        {**measured(task, settings, seeds, seed), "group": "tasks"}
+        for task, seeds in RUNS
+        for settings in ("stanley-2002", "default")
+    ]
+    for changes in OPEN_CHOICES:
+        name = ", ".join(f"{key} = {json.dumps(value)}" for key, value in changes.items())
+        rows.append({**measured("xor", "stanley-2002", 100, seed, **changes), "group": "open", "name": name})
+    for name, changes in ABLATIONS.items():
+        row = measured("double-pole", "stanley-2002", ABLATION_RUNS, seed, **changes)
+        rows.append({**row, "group": "ablations", "name": name})
+    return rows
+
+
+def rounded(value: Any) -> Any:
+    """A number as it stands in the data."""
+    return f"{value:.2f}" if isinstance(value, float) else "" if value is None else value
+
+
+def main() -> None:
+    """Measure everything and write it."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--seed", type=int, default=SEED, help="of the random numbers")
+    parser.add_argument("--out", type=Path, default=DATA, help="file to write")
+    wanted = parser.parse_args()
+    rows = all_rows(wanted.seed)
+    with wanted.out.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"Written: {wanted.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,139 @@
+"""NEAT on a classical task, from many seeds, beside the published results."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import Any
+
+from realitygap.errors import StudyError, did_you_mean
+from realitygap.evolution import NAMED_SETTINGS, NeatSettings
+from realitygap.runs import TaskRun, run_task
+from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
+
+from ._problems import Problems
+from ._run import Progress, usable_processors
+
+
+def measure_task(
+    task: str,
+    settings: str = "default",
+    *,
+    seeds: int = 100,
+    seed: int = 1,
+    changes: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    tell: Callable[[Progress], None] | None = None,
+) -> dict[str, Any]:
+    """How many evaluations NEAT needs for a classical task, from many seeds, beside what was published.
+
+    An evaluation is one network tried once; a run counts them up to and with the first network that solves the
+    task. The results do not depend on the threads.
+
+    Args:
+        task: 'xor', 'double-pole' or 'double-pole-no-velocity'.
+        settings: A named set of NEAT's settings; population, generations, recurrence and the constant input's
+            value are the task's.
+        seeds: How many runs, >= 1.
+        seed: Of the random numbers from which all runs draw.
+        changes: Settings by name, in place of the set's and the task's.
+        threads: Runs at once; as many as there are processors when not given.
+        tell: Called with the progress after each run.
+
+    Returns:
+        `task`, `settings`, `seeds`, `solved` (runs); over the runs that solved it, `mean_evaluations`,
+        `median_evaluations`, `sd_evaluations`, `worst_evaluations`, and of the networks that did `mean_hidden`,
+        `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts); None where too
+        few solved it. `published` holds the same of the source, as far as it is given.
+
+    Raises:
+        StudyError: No such task or set, or a setting that cannot be.
+        ValueError: A count below 1.
+    """
+    for name, count in (("seeds", seeds), ("threads", threads)):
+        if count is not None and count < 1:
+            raise ValueError(f"{name} is {count}, expected at least 1.")
+    chosen = task_settings(task, settings, changes)
+    runs = _run_all(CLASSICAL_TASKS[task], chosen, seeds, seed, threads or usable_processors(), tell)
+    changed = "".join(f" {name}={value}" for name, value in (changes or {}).items())
+    return summarize_runs(CLASSICAL_TASKS[task], settings + changed, runs)
+
+
+def task_settings(
+    task: str, settings: str = "default", changes: Mapping[str, Any] | None = None
+) -> NeatSettings:
+    """The settings that NEAT has in a classical task: of a named set, of the task, and changed.
+
+    Raises:
+        StudyError: No such task or set, or a setting that cannot be.
+    """
+    if task not in CLASSICAL_TASKS:
+        raise StudyError(f"Unknown task {task!r}. {did_you_mean(task, CLASSICAL_TASKS)}")
+    if settings not in NAMED_SETTINGS:
+        raise StudyError(f"Unknown NEAT settings {settings!r}. {did_you_mean(settings, NAMED_SETTINGS)}")
+    chosen = {**NAMED_SETTINGS[settings], **CLASSICAL_TASKS[task].settings}
+    if settings == "stanley-2002":
+        chosen |= CLASSICAL_TASKS[task].published_settings
+    problems = Problems()
+    checked = problems.check(NeatSettings, {**chosen, **(changes or {})}, "")
+    if checked is None:
+        raise StudyError("These settings cannot be:\n  " + "\n  ".join(problems.lines))
+    return checked
+
+
+def summarize_runs(task: ClassicalTask, settings: str, runs: Sequence[TaskRun]) -> dict[str, Any]:
+    """The figures of `measure_task` for these runs."""
+    solvers = [run for run in runs if run.solved]
+    evaluations = [run.evaluations for run in solvers]
+    figures: dict[str, Any] = {
+        "task": task.name,
+        "settings": settings,
+        "seeds": len(runs),
+        "solved": len(solvers),
+        "mean_evaluations": _mean(evaluations),
+        "median_evaluations": statistics.median(evaluations) if evaluations else None,
+        "sd_evaluations": statistics.stdev(evaluations) if len(evaluations) > 1 else None,
+        "worst_evaluations": max(evaluations, default=None),
+        "mean_hidden": _mean([run.n_hidden for run in solvers]),
+        "mean_connections": _mean([run.n_connections for run in solvers]),
+    }
+    if "mean_generalization" in task.published:
+        figures["mean_generalization"] = _mean([run.generalization for run in solvers])
+    figures["published"] = {**task.published, "source": task.source}
+    return figures
+
+
+def _mean(values: Sequence[int]) -> float | None:
+    return statistics.fmean(values) if values else None
+
+
+def _run_all(
+    task: ClassicalTask,
+    settings: NeatSettings,
+    seeds: int,
+    seed: int,
+    threads: int,
+    tell: Callable[[Progress], None] | None,
+) -> list[TaskRun]:
+    """All runs, on threads, in the order of their replicates."""
+    if tell is not None:
+        tell(Progress(0, seeds, 0, 0.0))
+    run_task(task, settings.model_copy(update={"population": 2, "generations": 1}), seed, 0)  # compiles
+    since = time.perf_counter()
+    with ThreadPoolExecutor(threads, thread_name_prefix="run") as pool:
+        futures = [pool.submit(run_task, task, settings, seed, replicate) for replicate in range(seeds)]
+        try:
+            left = set(futures)
+            while left:
+                # The time-out lets Ctrl-C through on every system.
+                _, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
+                done = seeds - len(left)
+                if tell is not None and done:
+                    tell(Progress(done, seeds, done, time.perf_counter() - since))
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+    return [future.result() for future in futures]

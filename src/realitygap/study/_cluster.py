@@ -21,7 +21,7 @@ from realitygap.records import Delivery, ResultsFolder
 
 from ._executors import ChunkTask, Listener
 from ._job_queue import JobQueue
-from ._order import carry_out_order, make_order
+from ._order import CARRY_OUT, make_order
 
 # How long a scheduler named by its address may take to answer, and be gone in the middle of the work [s].
 CONNECT_S = 10.0
@@ -213,7 +213,7 @@ class _Sitting:
         key = f"{each.task.condition.name}-{each.task.first}-{self._inbox.name}-{self._n_sent}"
         self._under_way[key] = each
         each.future = self._cluster.client.submit(
-            carry_out_order, make_order(each.task, self._inbox), key=key, pure=False
+            eval, CARRY_OUT, {"order": make_order(each.task, self._inbox)}, key=key, pure=False
         )
         each.future.add_done_callback(lambda _: self._ended.put(key))
 
@@ -256,11 +256,11 @@ class _Sitting:
                 f"that began them, {each.n_given_up} times over. Is its memory too small? Try --chunk with a smaller "
                 f"number. {_GO_ON}"
             )
-        if isinstance(error, (ImportError, AttributeError)) or "deserializ" in str(error).lower():
+        if isinstance(error, (ImportError, AttributeError)):
             raise ClusterError(
-                f"The scheduler or a worker of {self._cluster.name} cannot load this realitygap ({error}). Install "
-                "the same one, with its extra `cluster`, for all of them (simplest: one environment in a shared "
-                "folder), start them anew, and run the same command again."
+                f"A worker of {self._cluster.name} cannot load this realitygap ({error}). Install the same one for "
+                "all workers (simplest: one environment in a shared folder), start them anew, and run the same "
+                "command again."
             )
         raise error
 

@@ -34,6 +34,11 @@ def software() -> dict[str, str | int]:
     }
 
 
+# What a worker evaluates. A function of ours would be loaded where a message arrives: by the scheduler, which has no
+# use for it, and by a worker that lacks it, which ends without a word.
+CARRY_OUT = f"__import__({__name__!r}, fromlist=['carry_out_order']).carry_out_order(order)"
+
+
 def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
     """The order for a chunk that is to be delivered to `inbox`."""
     condition = task.condition

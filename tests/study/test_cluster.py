@@ -207,16 +207,20 @@ def test_ctrl_c_leaves_what_is_published_and_says_how_to_go_on(study, digest, da
 def test_a_late_worker_cannot_publish_after_its_command_has_ended(study, digest, dask, tmp_path):
     """It holds a chunk of the first command while the second goes on with other chunks."""
     dask.scheduler()
-    mark = tmp_path / "go"
+    holding, mark = tmp_path / "holding", tmp_path / "go"
     slow = (
         "import os, time\nimport realitygap.study._order as o\nreal = o.deliver\n"
-        f"def late(*a):\n    while not os.path.exists({str(mark)!r}): time.sleep(0.01)\n    return real(*a)\n"
+        f"def late(*a):\n    open({str(holding)!r}, 'w').close()\n"
+        f"    while not os.path.exists({str(mark)!r}): time.sleep(0.01)\n    return real(*a)\n"
         "o.deliver = late"
     )
     worker = dask.worker(slow)
-    timer = threading.Timer(12.0, os.kill, (os.getpid(), signal.SIGINT))
 
-    timer.start()
+    def interrupt():
+        wait_until(holding.exists)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         run_study(study, tmp_path / "r", chunk=5, cluster=dask.address)
     assert n_published(tmp_path) == 0
@@ -227,7 +231,14 @@ def test_a_late_worker_cannot_publish_after_its_command_has_ended(study, digest,
     assert_whole(other.folder, digest)
 
 
-@pytest.mark.parametrize("changed", ["_version.py", "kernels/_trial.py", "records/_version.py"])
+@pytest.mark.parametrize(
+    "changed",
+    [
+        "kernels/_trial.py",
+        pytest.param("_version.py", marks=pytest.mark.long),
+        pytest.param("records/_version.py", marks=pytest.mark.long),
+    ],
+)
 def test_a_worker_with_other_software_is_refused(study, dask, tmp_path, changed):
     copy = tmp_path / "other"
     shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
@@ -275,6 +286,7 @@ def test_a_worker_that_cannot_write_is_told(study, dask, tmp_path):
     assert n_published(tmp_path) == 0
 
 
+@pytest.mark.long
 def test_a_chunk_that_ends_every_worker_is_told(study, dask, tmp_path, monkeypatch):
     monkeypatch.setattr(_cluster, "TRIES", 1)
     dask.scheduler("import dask\ndask.config.set({'distributed.scheduler.allowed-failures': 1})")

@@ -7,6 +7,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+import make_billion  # noqa: E402
 import reference_pages  # noqa: E402
 
 from realitygap import __version__  # noqa: E402
@@ -95,6 +96,6 @@ def in_section(lines):
 
 def setup(app):
     """Write the generated pages before Sphinx looks for pages."""
-    reference_pages.write_all(HERE / "generated")
+    reference_pages.write_all(HERE / "generated", {"parts/billion.md": make_billion.page_tables()})
     app.connect("autodoc-skip-member", skip_pydantic)
     app.connect("autodoc-process-docstring", as_restructured, priority=1)

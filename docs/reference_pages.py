@@ -43,9 +43,10 @@ TABLES: dict[str, type[BaseModel]] = {
 }
 
 
-def write_all(folder: Path) -> None:
-    """Write all generated pages, and parts of pages, into a folder; files that did not change stay untouched."""
+def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
+    """Write all generated pages, parts of pages, and `more`, into a folder; what did not change stays untouched."""
     pages = {
+        **(more or {}),
         "parts/settings.md": settings_page(),
         "parts/neat-sets.md": neat_sets(),
         "parts/columns.md": columns(),

@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import json
 import re
 import subprocess
 import sys
@@ -119,6 +120,37 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
     tables, figures = make_reproduced.make(tmp_path)
     assert {path.name: path.read_text("utf-8") for path in make_reproduced.TABLES.iterdir()} == tables
     assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
+
+
+def test_figures_on_the_page_of_a_billion_runs_are_those_that_its_command_measures(tmp_path):
+    """Times differ from sitting to sitting; which figures there are and what a run takes on disk do not."""
+    make_billion = _load("make_billion")
+    committed = json.loads(make_billion.DATA.read_text("utf-8"))
+    measured = make_billion.measure(replicates=8, chunks=5, names=100, seconds=0.05)
+    assert measured.keys() == committed.keys()
+    assert measured["runs_per_chunk"] == committed["runs_per_chunk"]
+    folder = run_study("paper", tmp_path / "r", replicates=200, chunk=200).folder
+    n_bytes = sum(path.stat().st_size for path in (folder.path / "trials").iterdir())
+    assert committed["bytes_per_run"] == pytest.approx(n_bytes / (9 * 200), rel=0.1)
+
+
+def test_tables_on_the_page_of_a_billion_runs_follow_from_its_figures(tmp_path, monkeypatch):
+    make_billion = _load("make_billion")
+    figures = json.loads(make_billion.DATA.read_text("utf-8")) | {
+        "runs_per_second_a_core": 1000.0,
+        "bytes_per_run": 2000.0,
+        "runs_per_chunk": 500,
+        "report_memory_bytes_per_run": 6400.0,
+    }
+    monkeypatch.setattr(make_billion, "DATA", tmp_path / "billion.json")
+    make_billion.DATA.write_text(json.dumps(figures), "utf-8")
+    page = make_billion.page_tables()
+    assert "A billion runs are 2.0 TB in 2,000,000 chunks." in page
+    assert "| 2 | 5.8 days | 4.0 MB/s | 4.0 |" in page
+    assert "| 1,024 | 16.3 minutes | 2.0 GB/s | 2,048.0 |" in page
+    assert "| memory of the report | 6.4 TB | 1e+02 |" in page
+    shares = [share for _, share, _, _ in make_billion.limits(figures)]
+    assert shares == sorted(shares, reverse=True)
 
 
 def _rows(name):

@@ -23,6 +23,10 @@ class RecordVersionError(RecordError):
     """Results were computed by a version whose numbers may differ."""
 
 
+class ClusterError(RealityGapError):
+    """A cluster cannot be reached, or cannot compute what was asked; what was published before is safe."""
+
+
 class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
 

@@ -31,7 +31,7 @@ def test_first_genomes_equal_the_reference(node_bias: bool, start: dict[str, obj
 def test_first_genomes_are_fully_wired_with_the_same_numbers_and_uniform_weights() -> None:
     """Mean and variance of 8,000 weights in +-1; four standard errors each: 1 in 8,000 by chance."""
     n = cases(1_000, 100)
-    neat = Neat(settings(), 4, 2, 3)
+    neat = Neat(settings(initial_weight=1.0), 4, 2, 3)
     genomes = _genome.make_genomes(n, 2, 8, 1)
     _genome.first_genomes(genomes, rules_of(neat), np.uint64(1), np.int64(0), np.int64(0))
     assert (genomes.n_connections == 8).all()

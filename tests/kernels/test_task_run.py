@@ -26,7 +26,7 @@ class Tries:
         self.rules, self.bias_value = genome.rules, genome.bias_value
         self.velocities = task == "double-pole"
         self.networks = decode_all([genome])
-        self.values = np.zeros(self.rules.n_inputs + self.networks.order.shape[1])
+        self.values = np.zeros(self.rules.n_inputs + self.networks.bias.shape[1])
         self.before = np.zeros_like(self.values)
         self.shaking = np.zeros(_double_pole.SHAKE_ACTIONS)
 

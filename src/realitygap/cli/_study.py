@@ -41,6 +41,14 @@ def run(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Delete the study that is in the folder and start anew.")
     ] = False,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHERE",
+            help="Compute on a Dask cluster: tcp://HOST:8786, or slurm (pbs, sge, lsf, oar, htcondor, moab); "
+            "slurm:20 asks for 20 jobs.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
@@ -49,7 +57,7 @@ def run(
     """Carry out a simulated study, or what is missing of it, and print a summary.
 
     Interrupt it at any moment: the same command goes on where it stopped. More replicates or new conditions
-    extend what is there. The results do not depend on threads, chunks or interruptions.
+    extend what is there. The results do not depend on threads, clusters, chunks or interruptions.
 
     Example: realitygap run paper --replicates 1000
 
@@ -57,6 +65,11 @@ def run(
     """
     from realitygap.study import run_study
 
+    if threads is not None and cluster is not None:
+        raise StudyError(
+            "--threads and --cluster exclude each other. How many threads a worker of a cluster has is said where it "
+            "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
+        )
     try:
         with RunsBar(quiet=as_json) as bar:
             result = run_study(
@@ -67,6 +80,7 @@ def run(
                 threads=threads,
                 chunk=chunk,
                 fresh=fresh,
+                cluster=cluster,
                 tell=bar.show,
             )
     except KeyboardInterrupt:
@@ -158,15 +172,20 @@ class RunsBar:
             if not self._console.is_terminal:
                 self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
             self._progress.start()
+        if progress.waiting_for and not self._console.is_terminal:
+            self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
         started = progress.n_computed > 0
         rate = (
             f"{progress.n_computed / progress.seconds:,.0f} runs/s"
             if started and progress.seconds > 0
             else ""
         )
+        description = "running" if started else "compiling or loading the kernels"
+        if progress.waiting_for:
+            description = f"waiting for {progress.waiting_for}"
         self._progress.update(
             self._task,
-            description="running" if started else "compiling or loading the kernels",
+            description=description,
             completed=progress.n_done,
             total=progress.n_runs,
             rate=rate,

@@ -9,6 +9,7 @@ studies.
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
 from realitygap.records._folder import ResultsFolder
+from realitygap.records._inbox import Delivery, MissingInboxError, deliver
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
@@ -16,6 +17,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # the folder and what is in it
     "ResultsFolder",
     "Chunk",
+    "Delivery",
+    "MissingInboxError",
+    "deliver",
     "RESULTS_VERSION",
     "RecordWarning",
     # the columns of its frames

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import secrets
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,7 +29,8 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
     Raises:
         RecordError: the file is there and shall not be replaced, or the system refused; nothing stays.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    # processes on several machines may have the same number
+    temporary = path.with_name(f".{path.name}.{secrets.randbits(63)}.tmp")
     try:
         with writing(path):
             with temporary.open("xb") as file:

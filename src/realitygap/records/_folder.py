@@ -28,6 +28,7 @@ from realitygap.records._columns import SCHEMA
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._digest import RowsDigest, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
+from realitygap.records._inbox import Delivery, is_inbox, make_inbox, remove_inbox
 from realitygap.records._listing import (
     LEDGER_NAME,
     TRIALS_NAME,
@@ -38,6 +39,8 @@ from realitygap.records._listing import (
 )
 from realitygap.records._lock import LOCK_NAME, FolderLock
 from realitygap.records._log import LOG_NAME, append_line, read_lines
+from realitygap.records._published import PublishedNames
+from realitygap.records._seal import BrokenSeal, check_ends
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 
@@ -54,6 +57,7 @@ class ResultsFolder:
         self._description = description
         self._lock = FolderLock(path)
         self._publishing = threading.Lock()
+        self._published: PublishedNames | None = None
         self._checked: dict[str, tuple[tuple[int, ...], Chunk]] = {}
 
     # making and opening
@@ -226,11 +230,50 @@ class ResultsFolder:
         chunk, data = encode_chunk(self._trials, condition, first, frame, condition_hash)
         with self._hold(), self._publishing:
             self._refuse_other_version()
-            self._refuse_overlap(chunk)
+            name = ChunkName(condition, first, chunk.last)
+            self._refuse_overlap(name, condition_hash)
             with writing(self._trials):
                 self._trials.mkdir(exist_ok=True)
             write_durably(chunk.path, data, replace=False)
+            self._names_published().add(name)
         return chunk
+
+    @contextlib.contextmanager
+    def inbox(self) -> Iterator[Path]:
+        """A folder into which processes without the lock, on any machine that sees it, `deliver` chunks.
+
+        It is removed on the way out, and with it what was not accepted; one that a killed process left, when
+        the lock is next taken.
+
+        Raises:
+            RecordError: another process writes to the folder, or it cannot be written.
+        """
+        with self._hold():
+            inbox = make_inbox(self._path)
+            try:
+                yield inbox
+            finally:
+                remove_inbox(inbox)
+
+    def accept(self, inbox: Path, deliveries: Sequence[Delivery]) -> None:
+        """Publish chunks out of an inbox of this folder; once this returns, they survive a crash.
+
+        Both ends of a file are looked at here, and all of it whenever it is read.
+
+        Raises:
+            RecordError: a file is not there or not whole, replicates are published already, a
+                condition's hash is another, or the system refused. What was published stays.
+            RecordVersionError: another version computed what is in the folder.
+            ValueError: a condition is not in the description.
+        """
+        with self._hold(), self._publishing:
+            self._refuse_other_version()
+            with writing(self._trials):
+                self._trials.mkdir(exist_ok=True)
+            for delivery in deliveries:
+                self._accept_one(inbox, delivery)
+            with writing(self._trials):
+                sync_folder(self._trials)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -395,6 +438,22 @@ class ResultsFolder:
         finally:
             self._lock.release()
 
+    def _accept_one(self, inbox: Path, delivery: Delivery) -> None:
+        self._check_known(delivery.condition)
+        name = delivery.name
+        self._refuse_overlap(name, delivery.condition_hash)
+        path = inbox / str(name)
+        try:
+            with reading(path):
+                check_ends(path)
+        except BrokenSeal as error:
+            raise RecordError(
+                f"{path} {error}. Run the same command again: it goes on with what is missing."
+            ) from None
+        with writing(self._trials / str(name)):
+            path.rename(self._trials / str(name))
+        self._names_published().add(name)
+
     def _settle(self) -> None:
         """On taking the lock: another process may have written since this object was made."""
         self._description = Description.read(self._path / DESCRIPTION_NAME)
@@ -402,7 +461,11 @@ class ResultsFolder:
 
     def _sweep(self) -> None:
         """Remove what killed writers left; the lock says that nobody is writing."""
+        self._published = None
         with writing(self._path):
+            for entry in self._path.iterdir():
+                if is_inbox(entry.name):
+                    remove_inbox(entry)
             for folder in (self._path, self._trials):
                 for entry in folder.iterdir() if folder.is_dir() else ():
                     if is_temporary(entry.name):
@@ -433,19 +496,26 @@ class ResultsFolder:
                 "Start anew with --fresh, or name another folder."
             )
 
-    def _refuse_overlap(self, chunk: Chunk) -> None:
-        others = [name for name in self._names() if name.condition == chunk.condition]
-        for other in others:
-            if other.first <= chunk.last and chunk.first <= other.last:
-                raise RecordError(
-                    f"Replicates {chunk.first} to {chunk.last} of {chunk.condition!r} overlap with "
-                    f"{self._trials / str(other)}; what is published is never overwritten."
-                )
-        if others and self._load(others[0]).condition_hash != chunk.condition_hash:
+    def _refuse_overlap(self, name: ChunkName, condition_hash: str) -> None:
+        published = self._names_published()
+        other = published.overlapping(name)
+        if other is not None:
             raise RecordError(
-                f"{self._path} holds trials of condition {chunk.condition!r} with other settings. "
+                f"Replicates {name.first} to {name.last} of {name.condition!r} overlap with "
+                f"{self._trials / str(other)}; what is published is never overwritten."
+            )
+        first = published.first(name.condition)
+        if first is not None and self._load(first).condition_hash != condition_hash:
+            raise RecordError(
+                f"{self._path} holds trials of condition {name.condition!r} with other settings. "
                 "Start anew (--fresh), name another folder, or give the condition another name."
             )
+
+    def _names_published(self) -> PublishedNames:
+        """What is published, listed once after the lock was taken: nobody else publishes while it is held."""
+        if self._published is None:
+            self._published = PublishedNames(self._names())
+        return self._published
 
     def _names(self, condition: str | None = None) -> list[ChunkName]:
         """What is published, by name and in key order, after all that names can tell was checked."""
@@ -536,3 +606,4 @@ class ResultsFolder:
                 path.unlink(missing_ok=True)
             sync_folder(self._path)
         self._checked.clear()
+        self._published = None

@@ -10,6 +10,8 @@ the file's start, so any Parquet reader opens a sealed file.
 from __future__ import annotations
 
 import hashlib
+import os
+from pathlib import Path
 
 _MAGIC = b"PAR1"
 _MARK = b"realitygap seal\n"
@@ -49,6 +51,25 @@ def check_seal(sealed: bytes) -> None:
     found.update(view[footer:])
     if found.digest() != sealed[start + len(_MARK) : footer]:
         raise BrokenSeal("is damaged: its bytes are not those that were written")
+
+
+def check_ends(path: Path) -> None:
+    """Return when a file begins and ends as a sealed one, in a time that does not depend on its length.
+
+    Raises:
+        BrokenSeal: it does not.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        head = file.read(len(_MAGIC))
+        n_bytes = file.seek(0, os.SEEK_END)
+        file.seek(max(n_bytes - _TAIL_SIZE, 0))
+        tail = file.read()
+        start = n_bytes - _TAIL_SIZE - int.from_bytes(tail[:4], "little") - _SEAL_SIZE
+        file.seek(max(start, 0))
+        mark = file.read(len(_MARK))
+    if head != _MAGIC or tail[4:] != _MAGIC or mark != _MARK:
+        raise BrokenSeal("does not begin and end like a chunk")
 
 
 def _footer_start(parquet: bytes) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-RESULTS_VERSION = 1
+RESULTS_VERSION = 2
 """Raised whenever the same study would give other numbers; results of another version are never extended."""
 
 

@@ -1,8 +1,9 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
-from ._run import Progress, StudyResult, machine_facts, run_study, usable_processors
+from ._run import Progress, StudyResult, machine_facts, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection
 from ._task import measure_task, task_settings
 from ._template import study_template

@@ -21,8 +21,9 @@ from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
 from realitygap.trials import NoiseKey, try_genomes
 
+from ._executors import usable_processors
 from ._file import load_study
-from ._run import machine_facts, usable_processors
+from ._run import machine_facts
 
 TRIALS_PER_CALL = 500
 RUNS_PER_CALL = 50

@@ -1,20 +1,20 @@
-"""Carrying out a study: chunks on threads, published as they are done."""
+"""Carrying out a study: chunks on threads or on a cluster, published as they are done."""
 
 from __future__ import annotations
 
-import os
+import contextlib
 import platform
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from realitygap.errors import StudyError, whole_number
 from realitygap.records import ResultsFolder
-from realitygap.runs import Condition, prepare_kernels, run_replicates
+from realitygap.runs import Condition
 
+from ._executors import ChunkTask, Executor, Threads, usable_processors
 from ._file import load_study
 from ._study import Study
 
@@ -34,12 +34,14 @@ class Progress:
         n_runs: Runs in all.
         n_computed: Runs computed in this sitting.
         seconds: Since this sitting began to compute.
+        waiting_for: What a cluster lacks before anything goes on, such as a worker; empty otherwise.
     """
 
     n_done: int
     n_runs: int
     n_computed: int
     seconds: float
+    waiting_for: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ def run_study(
     threads: int | None = None,
     chunk: int | None = None,
     fresh: bool = False,
+    cluster: str | None = None,
     tell: Callable[[Progress], None] | None = None,
 ) -> StudyResult:
     """Carry out a simulated study, or what is missing of it.
@@ -84,14 +87,19 @@ def run_study(
         threads: Kernels at once; as many as there are processors when not given.
         chunk: Runs computed and written together; chosen by their length when not given.
         fresh: Delete the study that is in the folder first; never where a ledger of physical trials is.
+        cluster: Where to compute, in place of this machine's threads: `tcp://HOST:PORT` of a running Dask
+            scheduler, or `slurm`, `pbs`, `sge`, `lsf`, `oar`, `htcondor` or `moab` for jobs of that batch
+            system, set up in the user's Dask configuration; `slurm:20` asks for 20 jobs. All workers must
+            see `out` under the same path.
         tell: Called with the progress after each chunk.
 
     Raises:
         StudyError: The study cannot be carried out as written, or the folder holds another one: the
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
+        RealityGapError: The cluster cannot be reached, or has other software.
         TypeError: A count is not a whole number, or the study is none of these.
-        ValueError: A count below 1.
+        ValueError: A count below 1, or both threads and a cluster.
     """
     threads = None if threads is None else whole_number("threads", threads, 1)
     chunk = None if chunk is None else whole_number("chunk", chunk, 1)
@@ -100,33 +108,55 @@ def run_study(
     elif seed is not None or replicates is not None:
         raise ValueError("seed and replicates go with a study's name or path; this study has its own.")
     path = Path(out) if out is not None else Path("results") / study.about.name
-    folder = _open_folder(path, study, fresh=fresh)
-    n_threads = threads or usable_processors()
-    with folder.locked():
-        _adopt(folder, study)
-        missing = {
-            condition.name: folder.missing(condition.name, study.about.replicates)
-            for condition in study.conditions
-        }
-        n_missing = sum(len(gap) for gaps in missing.values() for gap in gaps)
-        folder.append_log(
-            {"event": "start", "missing_runs": n_missing, "threads": n_threads, "machine": machine_facts()}
-        )
-        progress = _Counter(study.n_runs, study.n_runs - n_missing, tell)
-        if n_missing:
-            prepare_kernels()
-            _compute(study, folder, missing, n_threads, chunk, progress)
-        folder.append_log(
-            {"event": "end", "computed_runs": progress.n_computed, "seconds": round(progress.seconds, 3)}
-        )
+    with _executor(threads, cluster) as executor:
+        folder = _open_folder(path, study, fresh=fresh)
+        with folder.locked():
+            _adopt(folder, study)
+            progress = _carry_out(study, folder, executor, chunk, tell)
     return StudyResult(folder, study.n_runs, progress.n_computed, progress.seconds)
 
 
-def usable_processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+@contextlib.contextmanager
+def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
+    """What computes; a cluster is reached before anything in the folder is touched."""
+    if cluster is None:
+        yield Threads(threads or usable_processors())
+        return
+    if threads is not None:
+        raise ValueError(
+            "threads and cluster exclude each other: how many threads a worker of a cluster has is said where it is "
+            "started (`dask worker --nthreads`, or `cores` in the settings of its jobs)."
+        )
+    from ._cluster import Cluster
+
+    with Cluster(cluster) as executor:
+        yield executor
+
+
+def _carry_out(
+    study: Study,
+    folder: ResultsFolder,
+    executor: Executor,
+    chunk: int | None,
+    tell: Callable[[Progress], None] | None,
+) -> _Counter:
+    """Compute what is missing in a folder that is locked, and note it in the log."""
+    missing = {
+        condition.name: folder.missing(condition.name, study.about.replicates)
+        for condition in study.conditions
+    }
+    n_missing = sum(len(gap) for gaps in missing.values() for gap in gaps)
+    start = {"event": "start", "missing_runs": n_missing, **executor.facts(), "machine": machine_facts()}
+    folder.append_log(start)
+    progress = _Counter(study.n_runs, study.n_runs - n_missing, tell)
+    if n_missing:
+        executor.prepare()
+        progress.begin()
+        executor.carry_out(folder, _chunks(study, missing, chunk), progress)
+    seconds = round(progress.seconds, 3)
+    end = {"event": "end", "computed_runs": progress.n_computed, "seconds": seconds, **executor.facts()}
+    folder.append_log(end)
+    return progress
 
 
 def machine_facts() -> dict[str, Any]:
@@ -216,6 +246,7 @@ class _Counter:
         self._n_before = n_done
         self._tell = tell
         self._since = time.perf_counter()
+        self._waiting_for = ""
         self.n_computed = 0
         self.seconds = 0.0
         self.add(0)
@@ -224,24 +255,29 @@ class _Counter:
         """Computing begins now."""
         self._since = time.perf_counter()
 
-    def add(self, n: int) -> None:
-        self.n_computed += n
+    def add(self, n_runs: int) -> None:
+        self.n_computed += n_runs
         self.seconds = time.perf_counter() - self._since
+        self._tell_now()
+
+    def wait_for(self, what: str) -> None:
+        if what != self._waiting_for:
+            self._waiting_for = what
+            self._tell_now()
+
+    def _tell_now(self) -> None:
         if self._tell is not None:
-            self._tell(
-                Progress(self._n_before + self.n_computed, self._n_runs, self.n_computed, self.seconds)
-            )
+            n_done = self._n_before + self.n_computed
+            self._tell(Progress(n_done, self._n_runs, self.n_computed, self.seconds, self._waiting_for))
 
 
-def _chunks(
-    study: Study, missing: dict[str, list[range]], chunk: int | None
-) -> Iterator[tuple[Condition, int, int]]:
-    """(condition, first replicate, runs) of each chunk to compute."""
+def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) -> Iterator[ChunkTask]:
+    """The chunks to compute."""
     for condition in study.conditions:
         size = chunk or _chunk_size(condition, study.about.replicates)
         for gap in missing[condition.name]:
             for first in range(gap.start, gap.stop, size):
-                yield condition, first, min(size, gap.stop - first)
+                yield ChunkTask(condition, first, min(size, gap.stop - first))
 
 
 def _chunk_size(condition: Condition, replicates: int) -> int:
@@ -249,38 +285,3 @@ def _chunk_size(condition: Condition, replicates: int) -> int:
     by_time = CHUNK_STEPS // steps
     by_progress = -(-replicates // CHUNKS_PER_CONDITION)
     return max(1, min(by_time, by_progress, LARGEST_CHUNK))
-
-
-def _compute(
-    study: Study,
-    folder: ResultsFolder,
-    missing: dict[str, list[range]],
-    threads: int,
-    chunk: int | None,
-    progress: _Counter,
-) -> None:
-    """Compute the chunks on threads; few are under way at once, so that memory stays flat."""
-
-    def compute(condition: Condition, first: int, n_runs: int) -> int:
-        frame = run_replicates(condition, first, n_runs)
-        folder.publish(condition.name, first, frame, condition.hash())
-        return n_runs
-
-    todo = _chunks(study, missing, chunk)
-    progress.begin()
-    with ThreadPoolExecutor(threads, thread_name_prefix="run") as pool:
-        under_way: set[Future[int]] = set()
-        try:
-            while True:
-                while len(under_way) < 2 * threads and (task := next(todo, None)) is not None:
-                    under_way.add(pool.submit(compute, *task))
-                if not under_way:
-                    return
-                # The time-out lets Ctrl-C through on every system.
-                done, under_way = wait(under_way, timeout=0.2, return_when=FIRST_COMPLETED)
-                for future in done:
-                    progress.add(future.result())
-        except BaseException:
-            for future in under_way:
-                future.cancel()
-            raise

@@ -13,8 +13,9 @@ from realitygap.evolution import NAMED_SETTINGS, NeatSettings
 from realitygap.runs import TaskRun, run_task
 from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
 
+from ._executors import usable_processors
 from ._problems import Problems
-from ._run import Progress, usable_processors
+from ._run import Progress
 
 
 def measure_task(

@@ -1,0 +1,96 @@
+"""An inbox: where processes that do not hold a folder's lock leave chunks for the one that does.
+
+Only the holder of the lock publishes, by renaming out of its own inbox. What a worker of an earlier sitting still
+computes goes to an inbox that is gone, so that it can neither overlap with what was planned since nor come back
+after `--fresh`.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import polars as pl
+
+from realitygap.errors import RecordError
+from realitygap.records._chunk import ChunkName, encode_chunk
+from realitygap.records._files import write_durably, writing
+
+_NAME = re.compile(r"\.inbox-[0-9a-f]{16}")
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """A chunk that was left in an inbox.
+
+    Attributes:
+        condition: name of the condition.
+        first: first replicate.
+        n_runs: replicates in it.
+        condition_hash: hash of the condition as resolved.
+    """
+
+    condition: str
+    first: int
+    n_runs: int
+    condition_hash: str
+
+    @property
+    def name(self) -> ChunkName:
+        """What its file is named after."""
+        return ChunkName(self.condition, self.first, self.first + self.n_runs - 1)
+
+
+class MissingInboxError(RecordError):
+    """The inbox is not there: its sitting has ended, or this machine does not see the folder."""
+
+
+def deliver(inbox: Path, condition: str, first: int, frame: pl.DataFrame, condition_hash: str) -> None:
+    """Write the rows of one or more whole replicates into an inbox, synced and sealed.
+
+    Twice the same is once: the second takes the place of the first.
+
+    Args:
+        inbox: of the folder of results; see `ResultsFolder.inbox`.
+        condition: its name.
+        first: the first replicate in `frame`.
+        frame: columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
+        condition_hash: hash of the condition as resolved.
+
+    Raises:
+        MissingInboxError: there is no such inbox, or no longer.
+        RecordError: the disk is full, or the inbox cannot be written.
+        ValueError: the rows are not fit to be published.
+    """
+    chunk, data = encode_chunk(inbox, condition, first, frame, condition_hash)
+    try:
+        write_durably(chunk.path, data, replace=True)
+    except RecordError as error:
+        if not inbox.is_dir():
+            raise MissingInboxError(f"{inbox} is not there.") from error
+        raise
+
+
+def make_inbox(folder: Path) -> Path:
+    """A new inbox in a folder, with a name that never was and never will be.
+
+    Raises:
+        RecordError: the folder cannot be written.
+    """
+    inbox = folder / f".inbox-{secrets.token_hex(8)}"
+    with writing(inbox):
+        inbox.mkdir()
+    return inbox
+
+
+def remove_inbox(inbox: Path) -> None:
+    """Remove an inbox and what is in it; what a network file system keeps for a moment goes the next time."""
+    shutil.rmtree(inbox, ignore_errors=True)
+
+
+def is_inbox(name: str) -> bool:
+    """Whether a folder is an inbox, of this sitting or an earlier one."""
+    return _NAME.fullmatch(name) is not None

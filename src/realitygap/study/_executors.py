@@ -1,0 +1,95 @@
+"""What computes the chunks of a study: threads of this process; `_cluster.py` has another machine's."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from realitygap.records import ResultsFolder
+from realitygap.runs import Condition, prepare_kernels, run_replicates
+
+
+@dataclass(frozen=True)
+class ChunkTask:
+    """A chunk to compute: `n_runs` replicates of a condition, from `first` on."""
+
+    condition: Condition
+    first: int
+    n_runs: int
+
+
+class Listener(Protocol):
+    """Who is told how far the work is."""
+
+    def add(self, n_runs: int) -> None:
+        """So many more runs are published."""
+
+    def wait_for(self, what: str) -> None:
+        """Nothing goes on until `what` is there; nothing is waited for any longer when it is empty."""
+
+
+class Executor(Protocol):
+    """Computes chunks and publishes them in a folder whose lock the caller holds."""
+
+    def facts(self) -> dict[str, Any]:
+        """What the log says of it: names and numbers, as JSON knows them."""
+
+    def prepare(self) -> None:
+        """Do what is done once and not counted as computing."""
+
+    def carry_out(self, folder: ResultsFolder, tasks: Iterator[ChunkTask], listener: Listener) -> None:
+        """Compute all tasks; return when they are published.
+
+        Whatever ends it early, Ctrl-C included, what was published stays, and nothing more is published once
+        it has ended.
+        """
+
+
+class Threads:
+    """Kernels on threads of this process; few chunks are under way at once, so that memory stays flat."""
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+
+    def facts(self) -> dict[str, Any]:
+        """Their number."""
+        return {"threads": self._n}
+
+    def prepare(self) -> None:
+        """Compile the kernels, or load them from disk."""
+        prepare_kernels()
+
+    def carry_out(self, folder: ResultsFolder, tasks: Iterator[ChunkTask], listener: Listener) -> None:
+        """See `Executor`."""
+
+        def compute(task: ChunkTask) -> int:
+            frame = run_replicates(task.condition, task.first, task.n_runs)
+            folder.publish(task.condition.name, task.first, frame, task.condition.hash())
+            return task.n_runs
+
+        with ThreadPoolExecutor(self._n, thread_name_prefix="run") as pool:
+            under_way: set[Future[int]] = set()
+            try:
+                while True:
+                    while len(under_way) < 2 * self._n and (task := next(tasks, None)) is not None:
+                        under_way.add(pool.submit(compute, task))
+                    if not under_way:
+                        return
+                    # The time-out lets Ctrl-C through on every system.
+                    done, under_way = wait(under_way, timeout=0.2, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        listener.add(future.result())
+            except BaseException:
+                for future in under_way:
+                    future.cancel()
+                raise
+
+
+def usable_processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

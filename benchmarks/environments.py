@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 from work import REPEATS
 
 HERE = Path(__file__).parent
-SECONDS = 180.0  # that a worker may take for one figure
+SECONDS = 120.0  # that a worker may take for one figure
 
 
 class PeerError(Exception):

@@ -20,6 +20,8 @@ PEER = Peer(
     figures=tuple(work.FIGURES),
 )
 RUNS = 2_000
+TRIALS = 512
+CALLS = 100
 PASSES = 1_000_000
 SECONDS = 0.5
 # More than any genome of these runs needs; too little is told, never passed over.
@@ -43,6 +45,48 @@ def _steps(cores: str) -> dict[str, Any]:
     from realitygap.study import measure_speed
 
     return repeated(lambda: measure_speed(SECONDS)["robot_steps_per_second"][cores])
+
+
+def time_engine() -> dict[str, Any]:
+    """Rates of one core and of all, and of one core when part of the work is changed: what takes the time."""
+    from realitygap.study import measure_speed
+
+    speeds = [measure_speed(SECONDS) for _ in range(work.REPEATS)]
+    names = ("robot_steps_per_second", "paper_runs_per_second", "paper_runs_recorded_per_second")
+    rates = {
+        name: {cores: spread([speed[name][cores] for speed in speeds])["median"] for cores in speeds[0][name]}
+        for name in names
+    }
+    variants = {
+        "as it is": _steps_with(),
+        "double precision": _steps_with(precision="double"),
+        "2 hidden nodes": _steps_with(start_hidden=2),
+        "8 hidden nodes": _steps_with(start_hidden=8),
+    }
+    return {**rates, "variants": variants}
+
+
+def _steps_with(precision: str = "single", start_hidden: int = 0) -> float:
+    """Robot-steps a second of one core in trials of the paper, with one thing changed."""
+    from realitygap.evolution import Population, random_key
+    from realitygap.study import load_study
+    from realitygap.trials import NoiseKey, try_genomes
+
+    condition = next(item for item in load_study("paper").conditions if item.name == "coverage-50")
+    changes = {"population": TRIALS, "start_hidden": start_hidden}
+    settings = condition.neat.model_copy(update=changes)
+    genomes = Population(3, 2, settings, seed=condition.seed, bias=False).ask()
+    platform = condition.jyro.model_copy(update={"precision": precision})
+    arena = condition.arena.arena()
+    key = NoiseKey(random_key(condition.seed))
+
+    def work_once() -> float:
+        since = time.perf_counter()
+        for _ in range(CALLS):
+            try_genomes(platform, arena, genomes, noise=condition.noise, noise_key=key)
+        return CALLS * TRIALS * platform.steps / (time.perf_counter() - since)
+
+    return repeated(work_once)["median"]
 
 
 def time_runs() -> dict[str, Any]:
@@ -107,7 +151,6 @@ def time_large() -> dict[str, Any]:
 def _one_network(population: int) -> tuple[Any, Any]:
     """NEAT's rules, and room whose networks are those of a first generation."""
     from our_loops import KEY, begin_run
-
     from realitygap.kernels._network import decode
 
     rules = _settings(population).rules(work.N_INPUTS, work.N_OUTPUTS)
@@ -120,13 +163,13 @@ def _one_network(population: int) -> tuple[Any, Any]:
 def time_passes() -> dict[str, Any]:
     """Microseconds of one activation in the core: of one network alone, and of one among many side by side."""
     import numpy as np
-    from our_loops import passes, passes_side_by_side
 
+    from our_loops import passes, passes_side_by_side
     from realitygap.kernels._lanes import LANES
     from realitygap.kernels._wiring import make_wiring, wire
 
     rules, room = _one_network(work.RUN_POPULATION)
-    inputs = (0.1, 0.2, 0.3, 1.0)
+    inputs = (0.1, 0.2, 1.0)
     room.values[: work.N_INPUTS] = inputs
 
     def alone() -> float:
@@ -160,5 +203,6 @@ if __name__ == "__main__":
             "xor_ms": time_xor,
             "large_ms": time_large,
             "pass_us": time_passes,
+            "engine": time_engine,
         },
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._genome import (
     closes_cycle,
     has_link,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._philox import FIRST, PURPOSE_GENOME, draw_words, make_stream, unit
 
 

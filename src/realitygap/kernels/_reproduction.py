@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._crossover import crossover
 from ._genome import copy_genome, next_below, next_uniform
 from ._mutation import mutate, start_generation

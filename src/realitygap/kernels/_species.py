@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._genome import has_node, next_below, node_bias_of
 from ._philox import FIRST, PURPOSE_SPECIES, make_stream
 

@@ -18,10 +18,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from work import REPEATS
+from work import FIGURES, REPEATS
 
 HERE = Path(__file__).parent
-SECONDS = 120.0  # that a worker may take for one figure
+SECONDS = 600.0  # that a worker may take for what no figure says
 
 
 class PeerError(Exception):
@@ -87,15 +87,16 @@ def run(command: Sequence[str], seconds: float | None = None) -> str:
     except OSError as error:
         raise PeerError(f"{command[0]} could not be started: {error}") from error
     except subprocess.TimeoutExpired:
-        raise PeerError(f"not done after {seconds:.0f} s") from None
+        raise PeerError(f"not done after {seconds:g} s") from None
     if done.returncode:
         said = (done.stderr or done.stdout).strip().splitlines()[-5:]
         raise PeerError(f"{' '.join(command[:4])} ... failed:\n" + "\n".join(said))
     return done.stdout
 
 
-def measure(peer: Peer, python: Path, figure: str, *, seconds: float = SECONDS) -> dict[str, Any]:
+def measure(peer: Peer, python: Path, figure: str) -> dict[str, Any]:
     """One figure of a peer: `median`, `low`, `high`, and whatever else its worker tells."""
+    seconds = FIGURES[figure].seconds if figure in FIGURES else SECONDS
     lines = run([str(python), str(peer.script), "--worker", figure], seconds).strip().splitlines()
     answer: dict[str, Any] = json.loads(lines[-1])
     if "error" in answer:

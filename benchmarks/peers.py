@@ -24,13 +24,13 @@ import kheperax_peer
 import multineat_peer
 import neat_python_peer
 import ours
-from environments import SECONDS, Peer, PeerError, build_environment, machine, measure
+from environments import Peer, PeerError, build_environment, machine, measure
 from work import FIGURES
 
 PEERS = (jyro_peer.PEER, kheperax_peer.PEER, neat_python_peer.PEER, multineat_peer.PEER)
 
 
-def compare(peers: Sequence[Peer], *, fresh: bool = False, seconds: float = SECONDS) -> dict[str, Any]:
+def compare(peers: Sequence[Peer], *, fresh: bool = False) -> dict[str, Any]:
     """Every figure that some of these peers have, ours beside it.
 
     Returns:
@@ -52,7 +52,7 @@ def compare(peers: Sequence[Peer], *, fresh: bool = False, seconds: float = SECO
             return {"not_measured": reasons[peer.name]}
         print(f"{figure}: {peer.title} ...", file=sys.stderr)
         try:
-            answer = measure(peer, pythons[peer.name], figure, seconds=seconds)
+            answer = measure(peer, pythons[peer.name], figure)
         except PeerError as error:
             return {"not_measured": str(error)}
         versions[peer.name] = answer.pop("versions")

@@ -22,6 +22,7 @@ import time
 from typing import Any
 
 import ours
+import work
 from environments import Peer, PeerError, answer_as_worker, build_environment, machine, measure, repeated
 
 PEER = Peer(
@@ -100,7 +101,7 @@ def print_report(result: dict[str, Any]) -> None:
         print(f"  {name.replace('_', ' '):9}  {ratio:9,.0f} times Jyro   {rates[name]:14,.0f}")
     print(
         f"  Jyro       {'':21}  {rates['jyro']:14,.0f}   "
-        f"(median, {jyro['slowest']:,.0f} to {jyro['fastest']:,.0f}; it uses one core)"
+        f"(median of {work.REPEATS}, {jyro['slowest']:,.0f} to {jyro['fastest']:,.0f}; it uses one core)"
     )
     if result["note"]:
         print(f"\n{result['note']}")

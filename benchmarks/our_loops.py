@@ -12,6 +12,7 @@ from realitygap.kernels._mutation import clear_innovations
 from realitygap.kernels._network import activate, decode
 from realitygap.kernels._philox import FIRST
 from realitygap.kernels._species import clear_species, speciate
+from realitygap.kernels._trial import draw_lanes
 from realitygap.kernels._wiring import think
 from realitygap.kernels._xor import try_xor
 
@@ -90,6 +91,15 @@ def passes_side_by_side(wiring, rules, values, before, total, n):
         think(wiring, rules, values, before, total)
         for lane in range(LANES):
             values[0, lane] = values[rules.n_inputs, lane]
+
+
+@kernel
+def draws(counters, key, words, n):
+    """Random words as a step of a block of trials draws them."""
+    for step in range(n):
+        draw_lanes(step, counters, key, words)
+        for lane in range(LANES):
+            counters[2, lane] ^= words[3, lane]
 
 
 KEY = np.uint64(20_02)

@@ -23,6 +23,7 @@ PEER = Peer(
 RUNS = 2_000
 TRIALS = 512
 CALLS = 100
+STEPS = 50_000
 PASSES = 1_000_000
 SECONDS = 2.0
 # More than any genome of these runs needs; too little is told, never passed over.
@@ -55,7 +56,25 @@ def time_engine() -> dict[str, Any]:
         "2 hidden nodes": time_steps(start_hidden=2)["median"],
         "8 hidden nodes": time_steps(start_hidden=8)["median"],
     }
-    return {**rates, "variants": variants}
+    return {**rates, "variants": variants, "draw_ns": time_draws()["median"]}
+
+
+def time_draws() -> dict[str, Any]:
+    """Nanoseconds that the random words of one robot-step take."""
+    import numpy as np
+    from our_loops import KEY, draws
+
+    from realitygap.kernels._lanes import LANES
+
+    counters = np.arange(3 * LANES, dtype=np.uint32).reshape(3, LANES)
+    words = np.zeros((4, LANES), np.uint32)
+
+    def work_once() -> float:
+        since = time.perf_counter()
+        draws(counters, KEY, words, STEPS)
+        return (time.perf_counter() - since) / (STEPS * LANES) * 1e9
+
+    return repeated(work_once)
 
 
 def time_steps(threads: int = 1, precision: str = "single", start_hidden: int = 0) -> dict[str, Any]:

@@ -45,6 +45,7 @@ def page_parts() -> dict[str, str]:
         "parts/speed-peers.md": peers_table(measured),
         "parts/speed-machine.md": machine_text(measured),
         "parts/speed-run.md": run_table(measured["engine"]),
+        "parts/speed-step.md": step_table(measured),
         "parts/speed-variants.md": variants_table(measured["engine"]["variants"]),
     }
 
@@ -108,6 +109,20 @@ def run_table(engine: Mapping[str, Any]) -> str:
     }
     rows = [(what, f"{1e6 * part:,.0f} µs", f"{100 * part / recorded:.0f} %") for what, part in parts.items()]
     return _table(["part of a run of the paper", "time", "share"], rows)
+
+
+def step_table(measured: Mapping[str, Any]) -> str:
+    """Where the time of one robot-step goes, as far as its parts can be timed alone."""
+    step = 1e9 / measured["engine"]["variants"]["as it is"]
+    draw = measured["engine"]["draw_ns"]
+    network = 1e3 * measured["figures"]["pass_us"]["ours"]["side_by_side"]
+    parts = {
+        "random numbers": draw,
+        "the network": network,
+        "rays, motion, collisions and the line": step - draw - network,
+    }
+    rows = [(what, f"{part:.1f} ns", f"{100 * part / step:.0f} %") for what, part in parts.items()]
+    return _table(["part of a robot-step", "time", "share"], rows)
 
 
 def variants_table(variants: Mapping[str, float]) -> str:

@@ -254,6 +254,9 @@ def test_tables_on_the_page_of_speed_follow_from_its_figures():
     }
     rows = make_speed.run_table(engine).splitlines()[2:]
     assert [row.split("|")[2].strip() for row in rows] == ["100 µs", "25 µs", "75 µs"]
+    step = {"engine": {"variants": {"as it is": 5e7}, "draw_ns": 5.0}}
+    table = make_speed.step_table({**step, "figures": {"pass_us": {"ours": {"side_by_side": 0.003}}}})
+    assert [row.split("|")[3].strip() for row in table.splitlines()[2:]] == ["25 %", "15 %", "60 %"]
     assert "| double | 25.0 ns | 1.25 |" in make_speed.variants_table({"as it is": 5e7, "double": 4e7})
 
 

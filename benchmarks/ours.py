@@ -62,8 +62,8 @@ def time_engine() -> dict[str, Any]:
 def time_draws() -> dict[str, Any]:
     """Nanoseconds that the random words of one robot-step take."""
     import numpy as np
-    from our_loops import KEY, draws
 
+    from our_loops import KEY, draws
     from realitygap.kernels._lanes import LANES
 
     counters = np.arange(3 * LANES, dtype=np.uint32).reshape(3, LANES)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels._network import Networks, activate, decode, make_networks
+
+T = TypeVar("T", Genomes, Networks)
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,10 @@ class Network:
         room = rules.n_inputs + networks.order.shape[1]
         self._values = np.zeros(room)
         self._before = np.zeros(room)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Of the arrays, which may hold a whole population, only the network's own row."""
+        return self.__dict__ | {"_networks": _row_of(self._networks, self._row), "_row": 0}
 
     @property
     def n_inputs(self) -> int:
@@ -93,6 +99,10 @@ class Genome:
         self._row = row
         self.rules = rules
         self.bias_value = bias_value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Of the arrays, which hold a whole population, only the genome's own row."""
+        return self.__dict__ | {"_genomes": _row_of(self._genomes, self._row), "_row": 0}
 
     @property
     def nodes(self) -> tuple[NodeGene, ...]:
@@ -160,6 +170,13 @@ class Genome:
 
     def __repr__(self) -> str:
         return f"Genome({len(self.nodes)} nodes, {self.n_enabled} of {len(self.connections)} connections enabled)"
+
+
+def _row_of(table: T, row: int) -> T:
+    """One row of each array of a table; what belongs to no row is kept whole."""
+    n = len(table[0])
+    arrays: list[Any] = [array[row : row + 1].copy() if len(array) == n else array for array in table]
+    return type(table)(*arrays)
 
 
 def decode_all(genomes: Sequence[Genome]) -> Networks:

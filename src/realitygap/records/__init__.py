@@ -6,8 +6,10 @@ outside the digest. This package handles plain dicts, arrays and polars frames. 
 studies.
 """
 
+from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
+from realitygap.records._files import write_whole
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
@@ -24,4 +26,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Column",
     "column_table",
     "list_column",
+    # other files, written whole
+    "write_checkpoint",
+    "read_checkpoint",
+    "write_whole",
 ]

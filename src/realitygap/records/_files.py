@@ -44,6 +44,32 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file beside its place, sync it and rename it into place; a file that was there gives way.
+
+    Args:
+        path: the file; its folder must exist.
+        data: all of its bytes.
+
+    Raises:
+        RecordError: it cannot be written; a file that was there is as it was.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise RecordError(
+            f"Could not write {path}: {error.strerror or error}. Name another file or folder."
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
 def sync_folder(folder: Path) -> None:
     """Make renames and removals in a folder survive a loss of power; on Windows, nothing to call."""
     if sys.platform == "win32":

@@ -14,8 +14,9 @@ from typing import Any, Protocol
 import polars as pl
 
 from realitygap.errors import RecordError
+from realitygap.records import write_whole
 from realitygap.report._drawing import Drawing
-from realitygap.report._formats import drawing_bytes, write_whole
+from realitygap.report._formats import drawing_bytes
 from realitygap.report._species_figure import SpeciesCounts
 from realitygap.report._structures import structures_frame
 from realitygap.report._tally import Tally

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
 import io
-import os
 import textwrap
 from dataclasses import replace
 from pathlib import Path
 
 from realitygap.drawing import Ink, Picture
-from realitygap.errors import RecordError, did_you_mean
+from realitygap.errors import did_you_mean
+from realitygap.records import write_whole
 from realitygap.report._drawing import Drawing, house_style, to_svg
 from realitygap.report._shapes_drawing import figure_of
 
@@ -139,22 +138,3 @@ def standalone_svg(drawing: Drawing, title: str) -> str:
 def _text(text: str) -> str:
     printable = "".join(letter if letter.isprintable() else " " for letter in text)
     return html.escape(printable, quote=False)
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file beside its place and rename it into place.
-
-    Raises:
-        RecordError: it cannot be written; a file that was there is as it was.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(data)
-        temporary.replace(path)
-    except OSError as error:
-        raise RecordError(
-            f"Could not write {path}: {error.strerror or error}. Name another file or folder."
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

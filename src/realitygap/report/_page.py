@@ -15,13 +15,12 @@ from pydantic import ValidationError
 
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError
-from realitygap.records import RecordWarning, ResultsFolder, column_table
+from realitygap.records import RecordWarning, ResultsFolder, column_table, write_whole
 from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
 from realitygap.report._export import export_page
-from realitygap.report._formats import write_whole
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_tally_paths

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from realitygap.drawing import Ink
-from realitygap.records import ResultsFolder
+from realitygap.records import ResultsFolder, write_whole
 from realitygap.report._drawing import (
     Drawing,
     house_style,
@@ -21,7 +21,6 @@ from realitygap.report._drawing import (
     shorten,
     to_svg,
 )
-from realitygap.report._formats import write_whole
 from realitygap.report._path_figure import (
     TracedPath,
     arena_extent,

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import graphlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, TypeVar
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.errors import RecordError
 from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels._network import Networks, activate, decode, make_networks
+from realitygap.records import write_whole
+
+from . import _json
 
 T = TypeVar("T", Genomes, Networks)
 
@@ -90,6 +96,73 @@ class Network:
         first = self._rules.n_inputs
         return self._values[first : first + self._rules.n_outputs].copy()
 
+    def to_dict(self) -> dict[str, Any]:
+        """The network as plain values with a version, as after `reset`.
+
+        `nodes` lists outputs and hidden nodes in the order of activation. Nodes are numbered inputs (the constant
+        one last among them), outputs, hidden nodes.
+        """
+        rules, networks, row = self._rules, self._networks, self._row
+        nodes = []
+        for k in range(int(networks.n_nodes[row]) - rules.n_inputs):
+            edges = slice(int(networks.first_edge[row, k]), int(networks.first_edge[row, k + 1]))
+            nodes.append(
+                {
+                    "node": int(networks.order[row, k]),
+                    "bias": float(networks.bias[row, k]),
+                    "sources": networks.source[row, edges].tolist(),
+                    "weights": networks.weight[row, edges].tolist(),
+                }
+            )
+        return {
+            **_json.head("network", rules, self._bias_value),
+            "n_inputs": rules.n_inputs,
+            "n_outputs": rules.n_outputs,
+            "constant": rules.bias_input >= 0,
+            "nodes": nodes,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The network that `to_dict` described.
+
+        Raises:
+            RecordError: The values are not a network's.
+            RecordVersionError: Another version wrote them.
+        """
+        return cls._from(
+            _json.checked(dict(values), _json.NetworkForm, "network", "The mapping"), "The mapping"
+        )
+
+    def to_json(self) -> str:
+        """The network as JSON with a version; numbers come back bit for bit."""
+        return _json.to_text(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The network that `to_json` wrote.
+
+        Raises:
+            RecordError: The text is no JSON, or not a network's.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_text(text, "network", "The text")
+        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The text"), "The text")
+
+    @classmethod
+    def _from(cls, form: _json.NetworkForm, where: str) -> Self:
+        _check_network(form, where)
+        rules = form.rules(form.n_inputs, form.n_outputs, constant=form.constant, node_bias=True)
+        edges = [len(each.sources) for each in form.nodes]
+        networks = make_networks(1, rules, max(sum(edges), 1), len(edges) - rules.n_outputs)
+        networks.n_nodes[0] = rules.n_inputs + len(form.nodes)
+        networks.first_edge[0, : len(edges) + 1] = np.cumsum([0, *edges])
+        for k, each in enumerate(form.nodes):
+            networks.order[0, k], networks.bias[0, k] = each.node, each.bias
+            into = slice(int(networks.first_edge[0, k]), int(networks.first_edge[0, k + 1]))
+            networks.source[0, into], networks.weight[0, into] = each.sources, each.weights
+        return cls(networks, 0, rules, form.bias_value)
+
 
 class Genome:
     """One individual's genes: a view of a row of a population's arrays."""
@@ -150,11 +223,77 @@ class Genome:
         return Network(decode_all([self]), 0, self.rules, self.bias_value)
 
     def to_dict(self) -> dict[str, Any]:
-        """The genes as plain values: `nodes` and `connections`."""
+        """The genes, `nodes` and `connections`, and what decoding needs, as plain values with a version."""
         return {
+            **_json.head("genome", self.rules, self.bias_value),
+            "node_bias": bool(self.rules.node_bias),
             "nodes": [asdict(node) for node in self.nodes],
             "connections": [asdict(connection) for connection in self.connections],
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The genome that `to_dict` described; of NEAT's rates, which are no part of it, it has the defaults.
+
+        Raises:
+            RecordError: The values are not a genome's.
+            RecordVersionError: Another version wrote them.
+        """
+        return cls._from(
+            _json.checked(dict(values), _json.GenomeForm, "genome", "The mapping"), "The mapping"
+        )
+
+    def to_json(self) -> str:
+        """The genome as JSON with a version; numbers come back bit for bit."""
+        return _json.to_text(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The genome that `to_json` wrote.
+
+        Raises:
+            RecordError: The text is no JSON, or not a genome's.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_text(text, "genome", "The text")
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The text"), "The text")
+
+    def save(self, path: str | Path) -> None:
+        """Write the genome as JSON; a file that is there gives way once the new one is complete.
+
+        Raises:
+            RecordError: It cannot be written.
+        """
+        write_whole(Path(path), self.to_json().encode("utf-8"))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The genome that `save` or `realitygap export` wrote.
+
+        Raises:
+            RecordError: The file cannot be read, or holds no genome.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_file(Path(path), "genome")
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", str(path)), str(path))
+
+    @classmethod
+    def _from(cls, form: _json.GenomeForm, where: str) -> Self:
+        _check_genome(form, where)
+        kinds = [node.kind for node in form.nodes]
+        n_inputs, n_outputs = kinds.count("input") + kinds.count("bias"), kinds.count("output")
+        genes = form.connections
+        record: dict[str, list[Any]] = {
+            "hidden": [node.id for node in form.nodes if node.kind == "hidden"],
+            "biases": [node.bias for node in form.nodes[n_inputs:]],
+            **{
+                name: [getattr(gene, name) for gene in genes]
+                for name in ("innovation", "source", "target", "weight", "enabled")
+            },
+        }
+        rules = form.rules(n_inputs, n_outputs, constant="bias" in kinds, node_bias=form.node_bias)
+        made = genome_from_record(record, rules, form.bias_value)
+        return cls(made._genomes, 0, rules, form.bias_value)
 
     def _repr_svg_(self) -> str:
         from ._picture import network_picture
@@ -213,3 +352,69 @@ def genome_from_record(
     biases = record["biases"]
     genomes.bias[0, : len(biases)] = biases
     return Genome(genomes, 0, rules, bias_value)
+
+
+def _check_genome(form: _json.GenomeForm, where: str) -> None:
+    """Refuse genes that no evolution of ours could have made, and kernels could not read."""
+    kinds = "".join(node.kind[0] for node in form.nodes)  # i, b, o, h
+    ids = [node.id for node in form.nodes]
+    first_hidden = len(kinds.rstrip("h"))
+    numbers = [gene.innovation for gene in form.connections]
+    links = [(gene.source, gene.target) for gene in form.connections]
+    inputs = {node.id for node in form.nodes if node.kind in ("input", "bias")}
+    problems = {
+        "expected nodes in the order input, bias (one at most), output, hidden, at least one input and one output": (
+            kinds != "".join(sorted(kinds, key="iboh".index))
+            or kinds.count("b") > 1
+            or not {"i", "o"} <= set(kinds)
+        ),
+        "expected node ids 0, 1, ... for inputs and outputs and then ascending ones": (
+            ids[:first_hidden] != list(range(first_hidden)) or ids != sorted(set(ids))
+        ),
+        "expected ascending innovation numbers": numbers != sorted(set(numbers)),
+        "expected one gene at most for each two nodes": len(links) != len(set(links)),
+        "a connection starts or ends at no node": not {node for link in links for node in link} <= set(ids),
+        "a connection leads to an input": any(target in inputs for _, target in links),
+    }
+    for problem, is_there in problems.items():
+        if is_there:
+            raise RecordError(f"{where} is not a genome: {problem}.")
+    if not form.recurrent:
+        _refuse_cycle(links, f"{where} is not a genome")
+
+
+def _check_network(form: _json.NetworkForm, where: str) -> None:
+    """Refuse what kernels could not read."""
+    numbers = {each.node for each in form.nodes}
+    known = set(range(form.n_inputs)) | numbers
+    problems = {
+        "n_inputs counts the constant one, expected another besides": form.constant and form.n_inputs < 2,
+        "expected each output and hidden node once, numbered after the inputs": (
+            len(numbers) != len(form.nodes)
+            or len(numbers) < form.n_outputs
+            or numbers != set(range(form.n_inputs, form.n_inputs + len(numbers)))
+        ),
+        "a node has not as many sources as weights": any(
+            len(e.sources) != len(e.weights) for e in form.nodes
+        ),
+        "a source is no node": any(not set(each.sources) <= known for each in form.nodes),
+    }
+    for problem, is_there in problems.items():
+        if is_there:
+            raise RecordError(f"{where} is not a network: {problem}.")
+    if not form.recurrent:
+        seen = set(range(form.n_inputs))
+        for each in form.nodes:
+            if not set(each.sources) <= seen:
+                raise RecordError(f"{where} is not a network: node {each.node} comes before a source of it.")
+            seen.add(each.node)
+
+
+def _refuse_cycle(links: Sequence[tuple[int, int]], what: str) -> None:
+    graph: dict[int, set[int]] = {}
+    for source, target in links:
+        graph.setdefault(target, set()).add(source)
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        raise RecordError(f"{what}: its connections go in a circle, and it is not recurrent.") from error

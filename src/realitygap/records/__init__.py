@@ -11,6 +11,7 @@ from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
 from realitygap.records._files import write_whole
 from realitygap.records._folder import ResultsFolder
+from realitygap.records._outside import refuse_results_folder
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 __all__ = [  # noqa: RUF022 - grouped by subject
@@ -30,4 +31,5 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "write_checkpoint",
     "read_checkpoint",
     "write_whole",
+    "refuse_results_folder",
 ]

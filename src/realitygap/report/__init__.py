@@ -28,6 +28,7 @@ from realitygap.report._effects import (
     runs_needed,
 )
 from realitygap.report._formats import save_drawing, save_picture
+from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
@@ -94,6 +95,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_view",
     "save_arena",
     "save_robot",
+    # for other programs
+    "export_individual",
     "WIDE",
     "NARROW",
     # statistics

@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.records import column_table
+from realitygap.records import column_table, derived_table
 from realitygap.robots import JyroPlatform
 from realitygap.runs import Condition
 from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
@@ -47,6 +47,7 @@ def write_all(folder: Path) -> None:
         "parts/settings.md": settings_page(),
         "parts/neat-sets.md": neat_sets(),
         "parts/columns.md": columns(),
+        "parts/derived-columns.md": derived_columns(),
     }
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
@@ -181,6 +182,20 @@ def columns() -> str:
     lines = ["| column | type | what it holds |", "|---|---|---|"]
     lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in column_table()]
     return "\n".join(lines) + "\n"
+
+
+def derived_columns() -> str:
+    """The columns of the frames that are derived from rows, one table each."""
+    parts = []
+    for what, row in (
+        ("species", "one species in one generation"),
+        ("innovations", "one innovation number in one run"),
+        ("lineage", "one individual"),
+    ):
+        lines = ["| column | type | what it holds |", "|---|---|---|"]
+        lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in derived_table(what)]
+        parts.append(f"## `{what}`\n\nA row is {row}.\n\n" + "\n".join(lines))
+    return "\n\n".join(parts) + "\n"
 
 
 # --- commands -----------------------------------------------------------------------------------------------

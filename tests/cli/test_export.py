@@ -7,6 +7,7 @@ import networkx
 import numpy as np
 import onnx
 import onnxruntime
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
@@ -157,6 +158,43 @@ def test_a_missing_extra_is_one_message_and_leaves_no_file(results, tmp_path, mo
     ],
 )
 def test_mistakes_are_one_message_and_leave_no_file(results, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RealityGapError) as caught:
+        export(*(results if word == "DIR" else word for word in words))
+    assert message in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("what", ["species", "innovations", "lineage"])
+def test_species_innovations_and_lineage_are_written_as_parquet(results, tmp_path, what):
+    path = tmp_path / f"{what}.parquet"
+    assert export(what, results, "-o", path) == f"Written: {path}\n"
+    folder = ResultsFolder.open(results)
+    assert pl.read_parquet(path).equals(folder.derive(what))
+    export(what, results, "--condition", "novelty-50", "--replicate", 1, "-o", path)
+    assert pl.read_parquet(path).equals(folder.derive(what, "novelty-50", [1]))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["lineage", "-o", "a.parquet"], "Of which results? Name a folder: realitygap export lineage"),
+        (["linage", "DIR", "-o", "a.parquet"], "Expected species, innovations or lineage first"),
+        (["lineage", "DIR", "-o", "a.csv"], "ends in .csv, expected .parquet"),
+        (
+            ["lineage", "DIR", "--generation", "1", "-o", "a.parquet"],
+            "Of no meaning for lineage: --generation",
+        ),
+        (["lineage", "DIR", "--format", "json", "-o", "a.parquet"], "Of no meaning for lineage: --format"),
+        (["lineage", "DIR", "--replicate", "9", "-o", "a.parquet"], "There is no run 9"),
+        (["lineage", "DIR", "--condition", "novelty-5O", "-o", "a.parquet"], "Did you mean 'novelty-50'?"),
+        (["lineage", "nowhere", "-o", "a.parquet"], "nowhere does not exist"),
+        (["lineage", "DIR", "-o", "no/where/a.parquet"], "Could not write no/where/a.parquet"),
+    ],
+)
+def test_mistakes_with_tables_are_one_message_and_leave_no_file(
+    results, tmp_path, monkeypatch, words, message
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(RealityGapError) as caught:
         export(*(results if word == "DIR" else word for word in words))

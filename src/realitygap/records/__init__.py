@@ -9,6 +9,7 @@ studies.
 from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
+from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._files import write_whole
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._outside import refuse_results_folder
@@ -26,6 +27,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "COLUMNS",
     "Column",
     "column_table",
+    "derived_table",
+    "DerivedFrame",
     "list_column",
     # other files, written whole
     "write_checkpoint",

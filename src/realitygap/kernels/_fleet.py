@@ -2,8 +2,8 @@
 
 The physics is that of `_trial`: the same functions for noise, contact, sensors and cells, in the same order, so that
 robots under the commands of networks drive the trials of `run_trial`, bit for bit (`tests/gym` holds them to that).
-`run_trial` does not call `step_robots`: going through a function for each step halves its speed, as Numba then counts
-references to every array of scene and workspace at each of them (measured: 1.9 against 3.8 million steps a second).
+`run_trial` has a loop of its own: going through a function for each step halves its speed, as Numba then counts
+references to every array of scene and workspace at each of them.
 """
 
 from __future__ import annotations

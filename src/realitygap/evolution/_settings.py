@@ -90,16 +90,16 @@ class NeatSettings(BaseModel):
         description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
     )
     weight_step: float = Field(
-        0.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+        1.0, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        6.0,
+        10.0,
         ge=0,
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
     )
     weight_limit: float = Field(
-        8.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
+        30.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
     )
 
     add_node: float = Field(

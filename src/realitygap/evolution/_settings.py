@@ -93,13 +93,13 @@ class NeatSettings(BaseModel):
         1.0, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        10.0,
+        6.0,
         ge=0,
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
     )
     weight_limit: float = Field(
-        30.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
+        8.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
     )
 
     add_node: float = Field(

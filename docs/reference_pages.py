@@ -527,7 +527,7 @@ def ablations() -> str:
         n, solved = int(row["seeds"]), int(row["solved"])
         evaluations, failures = PUBLISHED_ABLATIONS[row["name"]]
         lines.append(
-            f"| {row['ablation']} | {mean_with_interval(row, solved)} | {100 * (n - solved) / n:.0f} % of {n} "
+            f"| {row['name']} | {mean_with_interval(row, solved)} | {100 * (n - solved) / n:.0f} % of {n} "
             f"| {evaluations:,} | {failures} % |"
         )
     return "\n".join(lines) + "\n"

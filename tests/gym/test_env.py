@@ -22,12 +22,18 @@ from realitygap.world import ArenaSettings
 ENV = "realitygap/ScribblerCoverage-v0"
 KEY = NoiseKey(0x9E3779B97F4A7C15, replicate=3, generation=2, individual=5, repeat=1)
 
+# In double precision, as networks compute outside of trials.
+DOUBLE = {"precision": "double"}
 SETTINGS = [
-    {"noise": 0.5},
-    {"noise": 0.0},
-    {"noise": 0.8, "platform": {"turn_per_step": 0.9, "steps": 200}},
-    {"noise": 0.5, "platform": {"noisy_reading": "clip", "steps": 40}, "arena": {"start": "left"}},
-    {"noise": 0.3, "arena": {"start": [0.5, 0.3, 1.0]}, "cells": "ends"},
+    {"noise": 0.5, "platform": DOUBLE},
+    {"noise": 0.0, "platform": DOUBLE},
+    {"noise": 0.8, "platform": {**DOUBLE, "turn_per_step": 0.9, "steps": 200}},
+    {
+        "noise": 0.5,
+        "platform": {**DOUBLE, "noisy_reading": "clip", "steps": 40},
+        "arena": {"start": "left"},
+    },
+    {"noise": 0.3, "platform": DOUBLE, "arena": {"start": [0.5, 0.3, 1.0]}, "cells": "ends"},
 ]
 
 
@@ -82,6 +88,24 @@ def test_a_network_driven_through_the_environment_is_its_trial_bit_for_bit(setti
         n_blocked += trial.stalled.sum()
     if not settings.get("arena"):
         assert n_blocked > 0, "no wall was met, so that contact was not tested"
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_the_commands_of_a_trial_give_that_trial_in_either_precision_bit_for_bit(precision):
+    platform, arena = JyroPlatform(precision=precision), ArenaSettings().arena()
+    tried = genomes(70)
+    keys = [NoiseKey(KEY.key, individual=k) for k in range(70)]
+    trials = [
+        trace_genome(platform, arena, genome, noise=0.5, noise_key=key)
+        for genome, key in zip(tried, keys, strict=True)
+    ]
+    envs = gymnasium.make_vec(ENV, num_envs=70, noise=0.5, platform={"precision": precision})
+    observations, infos = envs.reset(options={"noise_key": keys[0]})
+    for step in range(platform.steps):
+        assert observations.tolist() == [trial.inputs[step].tolist() for trial in trials]
+        assert infos["pose"].tolist() == [trial.poses[step].tolist() for trial in trials]
+        observations, _, _, _, infos = envs.step(np.array([trial.commands[step] for trial in trials]))
+    assert [envs.visited_cells(k) for k in range(70)] == [trial.cells for trial in trials]
 
 
 def k_bias(network: dict[str, object]) -> bool:

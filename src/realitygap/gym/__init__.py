@@ -6,9 +6,8 @@
     env = gymnasium.make("realitygap/ScribblerCoverage-v0")
     envs = gymnasium.make_vec("realitygap/ScribblerCoverage-v0", num_envs=4096)
 
-Importing this package registers the environment. It needs the extra `gym`. A network that drives a robot through
-either environment drives the trial that `realitygap.trials.trace_genome` and `try_genomes` give for the same
-`NoiseKey`.
+Importing this package registers the environment. It needs the extra `gym`. The commands of a network give, through
+either environment, the trial that `realitygap.trials.trace_genome` and `try_genomes` give for the same `NoiseKey`.
 """
 
 from realitygap.errors import from_extra

@@ -25,8 +25,9 @@ from ._executors import usable_processors
 from ._file import load_study
 from ._run import machine_facts
 
-TRIALS_PER_CALL = 500
-RUNS_PER_CALL = 50
+# So many that the start of a call does not count, as in a study of thousands of replicates.
+TRIALS_PER_CALL = 12_800
+RUNS_PER_CALL = 1_000
 MOST_SECONDS = 3600
 
 

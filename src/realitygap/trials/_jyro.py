@@ -342,16 +342,19 @@ def trace_genome(
 def _check_sizes(genomes: Sequence[Genome]) -> None:
     if not genomes:
         raise ValueError("No genome to try, expected at least one.")
-    for genome in genomes:
-        given = genome.rules.n_inputs - (genome.rules.bias_input >= 0)
-        if given != 3 or genome.rules.n_outputs != 2:
+    first = _kind(genomes[0])
+    # Genomes of one population share their rules: few kinds need a look.
+    kinds = {(id(genome.rules), genome.bias_value): k for k, genome in reversed(list(enumerate(genomes)))}
+    for k in sorted(kinds.values()):
+        rules = genomes[k].rules
+        given = rules.n_inputs - (rules.bias_input >= 0)
+        if given != 3 or rules.n_outputs != 2:
             raise ValueError(
-                f"A genome has {given} inputs and {genome.rules.n_outputs} outputs, expected 3 inputs (largest "
+                f"A genome has {given} inputs and {rules.n_outputs} outputs, expected 3 inputs (largest "
                 "reading, stall, time; a constant one is extra) and 2 outputs (move, turn)."
             )
-    first = _kind(genomes[0])
-    for k, genome in enumerate(genomes):
-        for name, value in _kind(genome).items():
+    for k in sorted(kinds.values()):
+        for name, value in _kind(genomes[k]).items():
             if value != first[name]:
                 raise ValueError(
                     f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "

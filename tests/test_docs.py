@@ -241,3 +241,47 @@ def test_python_twin_of_a_command_is_found_after_a_bare_import(command):
     code = f"import realitygap\nassert callable({re.match(r'[.a-zA-Z_]+', twin)[0]})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_tables_on_the_page_of_speed_follow_from_its_figures():
+    make_speed = _load("make_speed")
+    figures = {
+        name: {
+            "ours": {"median": 2.0, "low": 1.0, "high": 3.0},
+            "jyro": {"median": 5000.0, "low": 1.0, "high": 3.0, "ratio": 1234.5},
+            "multineat": {"not_measured": "not done after 120 s"},
+        }
+        for name in make_speed.FIGURES
+    }
+    table = make_speed.peers_table({"figures": figures})
+    assert "| **1,234** | robot-steps a second, one core | Jyro | 5,000/s (1 to 3) | 2/s (1 to 3) |" in table
+    assert "| – | robot-steps a second, one core | MultiNEAT | not measured: not done after 120 s |" in table
+    engine = {
+        "robot_steps_per_second": {"per_core": 34.8e6},
+        "paper_runs_per_second": {"per_core": 8000.0},
+        "paper_runs_recorded_per_second": {"per_core": 5000.0},
+    }
+    rows = make_speed.run_table(engine).splitlines()[2:]
+    assert [row.split("|")[2].strip() for row in rows] == ["100 µs", "25 µs", "75 µs"]
+    step = {"engine": {"variants": {"as it is": 5e7}, "draw_ns": 5.0}}
+    table = make_speed.step_table({**step, "figures": {"pass_us": {"ours": {"side_by_side": 0.003}}}})
+    assert [row.split("|")[3].strip() for row in table.splitlines()[2:]] == ["25 %", "15 %", "60 %"]
+    assert "| double | 25.0 ns | 1.25 |" in make_speed.variants_table({"as it is": 5e7, "double": 4e7})
+
+
+def test_figures_of_the_page_of_speed_are_those_that_its_command_measures():
+    """Times differ from sitting to sitting; what is measured, of whom and how it is called does not."""
+    make_speed = _load("make_speed")
+    measured = json.loads(make_speed.DATA.read_text("utf-8"))
+    names = (
+        "import json, peers; "
+        "print(json.dumps({f: [p.name for p in peers.PEERS if f in p.figures] for f in peers.FIGURES}))"
+    )
+    folder = make_speed.BENCHMARK.parent
+    done = subprocess.run(
+        [sys.executable, "-c", names], cwd=folder, capture_output=True, text=True, check=True
+    )
+    expected = json.loads(done.stdout)
+    assert {figure: list(answers)[1:] for figure, answers in measured["figures"].items()} == expected
+    assert expected.keys() == make_speed.FIGURES.keys()
+    assert all("median" in answers["ours"] for answers in measured["figures"].values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._genome import (
     closes_cycle,
     has_link,
@@ -40,7 +40,7 @@ def _mixed_bias(old, a, b, rules, node, average, stream, cursor):
     return node_bias_of(old, a if in_a else b, rules, node)
 
 
-@kernel
+@inlined
 def crossover(old, a, b, fitness, rules, new, row, stream, cursor, reached):
     """Write a child of the individuals `a` and `b` of `old` into a row of `new`.
 

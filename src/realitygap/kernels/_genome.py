@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._philox import FIRST, PURPOSE_GENOME, draw_words, make_stream, unit
 
 
@@ -131,7 +131,7 @@ def next_signed(stream, cursor, size):
     return (2.0 * next_uniform(stream, cursor) - 1.0) * size
 
 
-@kernel
+@inlined
 def first_genomes(genomes, rules, key, replicate, generation):
     """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4).
 
@@ -209,7 +209,7 @@ def has_link(genomes, row, source, target):
     return False
 
 
-@kernel
+@inlined
 def closes_cycle(genomes, row, source, target, reached):
     """Whether a link from `source` to `target` would close a cycle, disabled genes counted.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._genome import (
     ENABLED,
     closes_cycle,
@@ -42,7 +42,7 @@ N_LINKS = 2
 N_SPLITS = 3
 
 
-@kernel
+@inlined
 def clear_innovations(rules, innovations):
     """No innovation yet: the next numbers are those after the first genomes'."""
     first_node = rules.n_inputs + rules.n_outputs
@@ -73,7 +73,7 @@ def start_generation(innovations):
     innovations.counters[N_SPLITS] = 0
 
 
-@kernel
+@inlined
 def number_of_link(innovations, source, target):
     """The innovation number of a new link: known in this generation, or the next one."""
     n = innovations.counters[N_LINKS]
@@ -89,7 +89,7 @@ def number_of_link(innovations, source, target):
     return innovations.link_number[n]
 
 
-@kernel
+@inlined
 def place_of_split(innovations, gene_number):
     """Where the split of a gene is listed: as known in this generation, or newly."""
     n = innovations.counters[N_SPLITS]
@@ -105,7 +105,7 @@ def place_of_split(innovations, gene_number):
     return n
 
 
-@kernel
+@inlined
 def add_node(genomes, row, rules, innovations, stream, cursor):
     """Split an enabled connection: weight 1 into the new node, the old weight out of it (EC02, 3.1).
 
@@ -142,7 +142,7 @@ def add_node(genomes, row, rules, innovations, stream, cursor):
     return True
 
 
-@kernel
+@inlined
 def add_link(genomes, row, rules, innovations, stream, cursor, reached):
     """Join two nodes that are not joined yet; False when none was found in the allowed tries."""
     first_hidden = rules.n_inputs + rules.n_outputs

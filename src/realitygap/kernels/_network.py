@@ -176,7 +176,7 @@ def activation_of(kind, slope, x):
     return min(max(x, real(-IDENTITY_LIMIT)), real(IDENTITY_LIMIT))
 
 
-@kernel
+@inlined
 def activate(networks, row, rules, values, before):
     """One pass of one network over `values`, whose first entries are the inputs.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._crossover import crossover
 from ._genome import copy_genome, next_below, next_uniform
 from ._mutation import mutate, start_generation
@@ -154,7 +154,7 @@ def ranked_members(fitness, species_of, identity, members):
     return n
 
 
-@kernel
+@inlined
 def _other_champion(fitness, species_of, species, own, stream, cursor):
     """The fittest individual of another species drawn at random."""
     k = next_below(stream, cursor, species.counts[N_SPECIES] - 1)
@@ -167,7 +167,7 @@ def _other_champion(fitness, species_of, species, own, stream, cursor):
     return champion
 
 
-@kernel
+@inlined
 def reproduce(
     old, fitness, species_of, species, rules, innovations, key, replicate, generation, new, parents
 ):

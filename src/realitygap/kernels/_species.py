@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
+from ._compile import inlined
 from ._genome import has_node, next_below, node_bias_of
 from ._philox import FIRST, PURPOSE_SPECIES, make_stream
 
@@ -36,7 +36,7 @@ BEST_EVER = 1
 LOWEST_THRESHOLD = 0.3
 
 
-@kernel
+@inlined
 def clear_species(rules, species):
     """Make it a table of no species yet."""
     species.counts[N_SPECIES] = 0
@@ -134,7 +134,7 @@ def _representative(species_of, fitness, which, rules, stream, cursor):
     return -1
 
 
-@kernel
+@inlined
 def speciate(new, old, fitness, species_of, species, rules, key, replicate, generation):
     """Put every genome of `new` into a species; `species_of` changes from the old generation's to the new's.
 

@@ -38,7 +38,7 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:.*",
-        r"(Any|Callable|Figure|Iterator|Iterable|Literal|Mapping|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
+        r"(Any|Callable|Figure|Iterator|Iterable|Literal|Mapping|ResetNeeded|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
     ),
     (
         r"py:(class|obj)",

@@ -4,7 +4,7 @@
 
 Carries out what `realitygap bench TASK` does, with seeds on which no setting was tuned, and writes
 docs/data/classical-tasks.csv, from which the page's tables are made. Takes minutes. `--seed` takes another seed,
-`--out` another file.
+`--runs` fewer runs, for a first look, and `--out` another file.
 """
 
 from __future__ import annotations
@@ -68,18 +68,24 @@ def measured(task: str, settings: str, seeds: int, seed: int, **changes: Any) ->
     return {key: rounded(row.get(key)) for key in COLUMNS}
 
 
-def all_rows(seed: int) -> list[dict[str, Any]]:
-    """Every row of the data: tasks, open choices, ablations."""
+def all_rows(seed: int, most: int) -> list[dict[str, Any]]:
+    """Every row of the data: tasks, open choices, ablations; of each at most so many runs."""
     rows = [
-        {**measured(task, settings, seeds, seed), "group": "tasks"}
+        {**measured(task, settings, min(seeds, most), seed), "group": "tasks"}
         for task, seeds in RUNS
         for settings in ("stanley-2002", "default")
     ]
     for changes in OPEN_CHOICES:
         name = ", ".join(f"{key} = {json.dumps(value)}" for key, value in changes.items())
-        rows.append({**measured("xor", "stanley-2002", 100, seed, **changes), "group": "open", "name": name})
+        rows.append(
+            {
+                **measured("xor", "stanley-2002", min(100, most), seed, **changes),
+                "group": "open",
+                "name": name,
+            }
+        )
     for name, changes in ABLATIONS.items():
-        row = measured("double-pole", "stanley-2002", ABLATION_RUNS, seed, **changes)
+        row = measured("double-pole", "stanley-2002", min(ABLATION_RUNS, most), seed, **changes)
         rows.append({**row, "group": "ablations", "name": name})
     return rows
 
@@ -93,9 +99,10 @@ def main() -> None:
     """Measure everything and write it."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seed", type=int, default=SEED, help="of the random numbers")
+    parser.add_argument("--runs", type=int, default=ABLATION_RUNS, help="at most so many of each")
     parser.add_argument("--out", type=Path, default=DATA, help="file to write")
     wanted = parser.parse_args()
-    rows = all_rows(wanted.seed)
+    rows = all_rows(wanted.seed, wanted.runs)
     with wanted.out.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()

@@ -20,7 +20,7 @@ from scipy import stats
 
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.records import column_table
+from realitygap.records import column_table, derived_table
 from realitygap.robots import JyroPlatform
 from realitygap.runs import Condition
 from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
@@ -50,6 +50,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
         "parts/settings.md": settings_page(),
         "parts/neat-sets.md": neat_sets(),
         "parts/columns.md": columns(),
+        "parts/derived-columns.md": derived_columns(),
     }
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
@@ -187,6 +188,20 @@ def columns() -> str:
     lines = ["| column | type | what it holds |", "|---|---|---|"]
     lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in column_table()]
     return "\n".join(lines) + "\n"
+
+
+def derived_columns() -> str:
+    """The columns of the frames that are derived from rows, one table each."""
+    parts = []
+    for what, row in (
+        ("species", "one species in one generation"),
+        ("innovations", "one innovation number in one run"),
+        ("lineage", "one individual"),
+    ):
+        lines = ["| column | type | what it holds |", "|---|---|---|"]
+        lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in derived_table(what)]
+        parts.append(f"## `{what}`\n\nA row is {row}.\n\n" + "\n".join(lines))
+    return "\n\n".join(parts) + "\n"
 
 
 # --- commands -----------------------------------------------------------------------------------------------
@@ -512,7 +527,7 @@ def ablations() -> str:
         n, solved = int(row["seeds"]), int(row["solved"])
         evaluations, failures = PUBLISHED_ABLATIONS[row["name"]]
         lines.append(
-            f"| {row['ablation']} | {mean_with_interval(row, solved)} | {100 * (n - solved) / n:.0f} % of {n} "
+            f"| {row['name']} | {mean_with_interval(row, solved)} | {100 * (n - solved) / n:.0f} % of {n} "
             f"| {evaluations:,} | {failures} % |"
         )
     return "\n".join(lines) + "\n"

@@ -13,7 +13,8 @@ import pytest
 from realitygap import run_study
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.records import column_table
+from realitygap.records import column_table, derived_table
+from realitygap.records._derived import DERIVED
 from realitygap.robots import JyroPlatform
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import CoverageTask
@@ -103,6 +104,14 @@ def test_every_column_is_in_the_reference():
     page = reference_pages.columns()
     for name, _, _ in column_table():
         assert f"| `{name}` |" in page
+
+
+def test_every_derived_column_is_in_the_reference():
+    page = reference_pages.derived_columns()
+    for what in DERIVED:
+        assert f"## `{what}`\n\nA row is {DERIVED[what].row}." in page
+        for name, kind, text in derived_table(what):
+            assert f"| `{name}` | {kind} | {reference_pages.escape(text)} |" in page
 
 
 def test_every_condition_of_paper_choices_is_on_the_page_of_choices():

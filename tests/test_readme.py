@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import sys
 from pathlib import Path
 
 from realitygap import __version__
@@ -14,6 +15,7 @@ README = (ROOT / "README.md").read_text("utf-8")
 def _make_outputs():
     spec = importlib.util.spec_from_file_location("make_outputs", ROOT / "docs" / "make_outputs.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault("make_outputs", module)  # its dataclasses look their module up
     spec.loader.exec_module(module)
     return module
 

@@ -66,6 +66,7 @@ _PACKAGES = {
     "drawing",
     "errors",
     "evolution",
+    "gym",
     "records",
     "report",
     "robots",

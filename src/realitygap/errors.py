@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 import operator
 from collections.abc import Iterable
+from importlib import import_module
+from typing import Any
 
 
 class RealityGapError(Exception):
@@ -33,6 +35,25 @@ class CaseError(RealityGapError):
 
 class TableError(RealityGapError):
     """A table of results for `realitygap audit-results` cannot be read as written."""
+
+
+class MissingExtraError(RealityGapError, ImportError):
+    """Something needs packages that come with an extra of realitygap, which is not installed."""
+
+
+def from_extra(module: str, extra: str) -> Any:
+    """A module that comes with an extra of realitygap.
+
+    Raises:
+        MissingExtraError: it is not installed; the text has the command that installs it.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingExtraError(
+            f"This needs {module.partition('.')[0]}, which comes with the extra '{extra}' and cannot be imported "
+            f"({error}). Install it: pip install 'realitygap[{extra}]'"
+        ) from error
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -40,7 +40,17 @@ COMMANDS = sorted(typer.main.get_command(app).commands)
 
 
 def test_all_commands_are_known():
-    assert COMMANDS == ["audit-results", "bench", "digest", "new-study", "report", "run", "show", "simulate"]
+    assert COMMANDS == [
+        "audit-results",
+        "bench",
+        "digest",
+        "export",
+        "new-study",
+        "report",
+        "run",
+        "show",
+        "simulate",
+    ]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

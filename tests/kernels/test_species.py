@@ -96,7 +96,9 @@ class Speciation:
     """Species over generations of genomes that are told apart by one weight: distance = difference."""
 
     def __init__(self, n: int, **changes: Any) -> None:
-        self.neat = Neat(settings(weight_coefficient=1.0, **{"threshold": 1.0, **changes}), 1, 1)
+        self.neat = Neat(
+            settings(weight_coefficient=1.0, **{"threshold": 1.0, "target_species": 0, **changes}), 1, 1
+        )
         self.rules = rules_of(self.neat)
         self.table: SpeciesTable = _species.make_species(self.rules, n)
         self.species_of = np.zeros(n, np.int32)

@@ -18,6 +18,7 @@ from realitygap.report import (
     draw_arena_and_robot,
     draw_better_individuals,
     draw_individuals,
+    draw_lineage,
     draw_networks,
     draw_species,
     draw_trial,
@@ -32,6 +33,7 @@ from realitygap.report._structures import _canonical, count_structures, structur
 from realitygap.report._tally import read_tally
 from realitygap.robots import JyroPlatform
 from realitygap.runs import Condition, genome_of, replay
+from realitygap.study import parse_study, run_study
 from realitygap.world import arena_picture, paper_arena
 from tests.report.results import describe, random_runs, write_results
 
@@ -41,6 +43,7 @@ ALL = [
     draw_better_individuals,
     draw_networks,
     draw_species,
+    draw_lineage,
     draw_trial,
 ]
 
@@ -125,7 +128,7 @@ def test_paths_that_cannot_be_recomputed_are_said_to_be_missing(tiny_study, no_r
 
 
 def test_unknown_condition_and_run_are_clear_errors(tiny_study):
-    for draw in (draw_individuals, draw_better_individuals, draw_species, draw_trial):
+    for draw in (draw_individuals, draw_better_individuals, draw_species, draw_lineage, draw_trial):
         with pytest.raises(ValueError, match="Did you mean 'novelty'"):
             draw(tiny_study, "noveltyy")
         with pytest.raises(ValueError, match=r"has no run 99 .*its runs are 0 to 6"):
@@ -257,7 +260,7 @@ def test_a_drawing_is_saved_by_its_ending_and_always_alike(tiny_study, tmp_path,
 def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     page = write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures").read_text("utf-8")
     names = {each.name for each in (tmp_path / "figures").iterdir()}
-    for number in ("2", "4", "5", "6a", "6b", "7", "8", "9", "10", "11"):
+    for number in ("2", "4", "5", "6a", "6b", "7", "8", "9", "10", "11", "12"):
         assert {f"figure-{number}.svg", f"figure-{number}.pdf"} <= names
         root = ET.fromstring((tmp_path / "figures" / f"figure-{number}.svg").read_bytes())
         assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
@@ -304,3 +307,73 @@ def test_tables_of_a_page_have_one_heading_a_column():
             ],
         )
     ]
+
+
+def ancestors_of(rows: pl.DataFrame, generation: int, individual: int) -> set[tuple[int, int]]:
+    """By walking back through the rows."""
+    found, now = set(), {individual}
+    for number in range(generation, -1, -1):
+        here = rows.filter(pl.col("generation") == number, pl.col("individual").is_in(sorted(now)))
+        found |= {(number, each) for each in now}
+        now = {parent for parents in here["parents"] for parent in parents}
+    return found
+
+
+def test_a_lineage_shows_every_ancestor_with_its_coverage_and_species(tiny_study):
+    rows = tiny_study.read("novelty", [1])
+    drawing = draw_lineage(tiny_study, "novelty", 1, 2, 5)
+    ancestors = ancestors_of(rows, 2, 5)
+    assert f"{len(ancestors) - 1} in all" in drawing.caption
+    assert "Ancestors of novelty, run 1, generation 2, individual 5 (ringed" in drawing.caption
+    drawn = texts(drawing.svg)
+    for generation, individual in ancestors:
+        row = rows.filter(pl.col("generation") == generation, pl.col("individual") == individual).row(
+            0, named=True
+        )
+        assert f"{row['coverage_line']:.3f}" in drawn
+        assert str(row["species"]) in drawn
+    n_dots = sum(text == f"{r['coverage_line']:.3f}" for text in drawn for r in rows.iter_rows(named=True))
+    assert n_dots >= len(ancestors)
+
+
+def test_a_lineage_is_that_of_the_champion_of_the_typical_run(tiny_study):
+    caption = draw_lineage(tiny_study, "coverage").caption
+    replicate, generation, individual = map(
+        int, re.search(r"run (\d+), generation (\d+), individual (\d+)", caption).groups()
+    )
+    rows = tiny_study.read("coverage", [replicate])
+    best = rows.row(int(rows["coverage_line"].arg_max()), named=True)
+    assert (best["generation"], best["individual"]) == (generation, individual)
+
+
+def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(tmp_path):
+    text = """
+    [study]
+    name = "long"
+    title = "Long"
+    replicates = 1
+    [neat]
+    population = 20
+    generations = 15
+    add_node = 0.5
+    [platform.jyro]
+    steps = 10
+    [[condition]]
+    name = "coverage"
+    """
+    folder = run_study(parse_study(text, "long.toml"), tmp_path / "long").folder
+    early = draw_lineage(folder, "coverage", 0, 14, 3)
+    assert "Colors tell species apart" in early.caption
+    assert not [each for each in texts(early.svg) if each.startswith("+ ")]
+    lineage = folder.derive("lineage", "coverage")
+    rows = folder.read("coverage").with_columns(lineage["new"])
+    assert re.search(r"generation \d+: node h\d+", early.alt)
+    grown = rows.filter(pl.col("generation") == 1, pl.col("new").list.len() == 2).row(0, named=True)
+    shown = draw_lineage(folder, "coverage", 0, 1, grown["individual"])
+    assert f"generation 1: node h{grown['genome']['hidden'][0]}" in shown.alt
+
+
+def test_the_page_shows_the_lineage_below_the_species(tiny_study, tmp_path):
+    page = write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
+    assert page.index('id="figure-11"') < page.index('id="figure-12"')
+    assert "Ancestors of coverage, run" in page

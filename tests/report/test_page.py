@@ -91,7 +91,7 @@ def test_page_can_be_heard(tiny_page):
         for tag, attributes in page.tags
         if tag == "svg" and "aria-hidden" not in attributes and "replay" not in attributes.get("id", "")
     ]
-    assert len(pictures) == 20, "Figures 2, 4, 5, 6a, 6b and 7 to 11, each wide and narrow"
+    assert len(pictures) == 22, "Figures 2, 4, 5, 6a, 6b and 7 to 12, each wide and narrow"
     assert all(each["role"] == "img" and len(each["aria-label"]) > 40 for each in pictures)
     headings = [tag for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
     assert headings[0] == "h1"

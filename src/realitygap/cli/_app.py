@@ -10,6 +10,7 @@ from realitygap._version import __version__
 
 from ._audit import audit_results
 from ._bench import bench
+from ._export import export
 from ._results import digest, report
 from ._show import show
 from ._simulate import simulate
@@ -47,6 +48,7 @@ app.command("run")(run)
 app.command("new-study")(new_study)
 app.command("report")(report)
 app.command("show")(show)
+app.command("export")(export)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)

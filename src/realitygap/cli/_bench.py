@@ -35,7 +35,8 @@ def bench(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     seconds: Annotated[
-        float | None, typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]")
+        float | None,
+        typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]"),
     ] = None,
 ) -> None:
     """Measure how fast this machine is or, with a task, how many evaluations NEAT needs for it.
@@ -135,7 +136,9 @@ def _bench_speed(seconds: float, *, as_json: bool) -> None:
         return
     names = {
         "robot_steps_per_second": "robot-steps/s",
+        "robot_steps_two_hidden_per_second": "robot-steps/s with two hidden nodes",
         "paper_runs_per_second": "paper runs/s",
+        "paper_runs_novelty_per_second": "paper runs/s with novelty",
         "paper_runs_recorded_per_second": "paper runs/s with their rows written",
     }
     for key, name in names.items():
@@ -143,6 +146,7 @@ def _bench_speed(seconds: float, *, as_json: bool) -> None:
         typer.echo(
             f"{name:38} {one:14,.0f} a core {all_cores:14,.0f} on all {figures['machine']['processors']}"
         )
+    typer.echo(f"{figures['neat_share']:.0%} of a paper run is NEAT and records, the rest its trials")
     typer.echo(
         f"{figures['machine']['processor']}; " + ", ".join(f"{k} {v}" for k, v in figures["versions"].items())
     )

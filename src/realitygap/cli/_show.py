@@ -1,4 +1,4 @@
-"""`realitygap show`: one run, trial, network, arena or robot as a picture."""
+"""`realitygap show`: one run, trial, network, lineage, arena or robot as a picture."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ if TYPE_CHECKING:
 def show(
     what: Annotated[
         str,
-        typer.Argument(metavar="WHAT", help="A folder of results; or network, species, arena or robot."),
+        typer.Argument(
+            metavar="WHAT", help="A folder of results; or network, species, lineage, arena or robot."
+        ),
     ],
     name: Annotated[
         str | None,
         typer.Argument(
             metavar="NAME",
-            help="After network and species, the folder; after arena, paper; after robot, jyro.",
+            help="After network, species and lineage, the folder; after arena, paper; after robot, jyro.",
         ),
     ] = None,
     out: Annotated[
@@ -32,10 +34,10 @@ def show(
     ] = None,
     condition: Annotated[str | None, typer.Option(help="Of which. [default: the first]")] = None,
     replicate: Annotated[int | None, typer.Option(help="Which run. [default: the typical one]")] = None,
-    generation: Annotated[int | None, typer.Option(help="Of a trial or network.")] = None,
+    generation: Annotated[int | None, typer.Option(help="Of a trial, network or lineage.")] = None,
     individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
 ) -> None:
-    """Draw a run, one trial, a network, species, an arena or a robot into a file.
+    """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file.
 
     A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
     commands. FILE.gif shows a trial in motion (without --generation, the run's best). Trials are recomputed from their
@@ -48,6 +50,8 @@ def show(
     Example: realitygap show network results/paper --condition novelty-50 -o network.pdf
 
     Example: realitygap show species results/paper -o species.png
+
+    Example: realitygap show lineage results/paper --condition novelty-50 -o lineage.svg
 
     Example: realitygap show arena -o arena.svg
 
@@ -87,7 +91,7 @@ def show(
 
 def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
     """What to show of which folder."""
-    subjects: dict[str, Subject] = {"network": "network", "species": "species"}
+    subjects: dict[str, Subject] = {"network": "network", "species": "species", "lineage": "lineage"}
     if what in subjects:
         if name is None:
             raise StudyError(
@@ -96,7 +100,8 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
         return subjects[what], name
     if name is not None:
         raise StudyError(
-            f"Cannot show {what!r} of {name!r}. Expected network, species, arena or robot first, or only a folder."
+            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, arena or robot first, or only a "
+            "folder."
         )
     return "run", what
 

@@ -1,6 +1,7 @@
-"""NEAT and novelty search: settings, genomes, populations to ask and tell, archives."""
+"""NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record
+from ._graph import to_networkx
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -9,6 +10,7 @@ from ._novelty import (
     largest_cell_distance,
     sorted_cells_distance,
 )
+from ._onnx import to_onnx
 from ._picture import network_picture
 from ._population import Population
 from ._random import random_key
@@ -32,4 +34,6 @@ __all__ = [
     "network_picture",
     "random_key",
     "sorted_cells_distance",
+    "to_networkx",
+    "to_onnx",
 ]

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import graphlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.errors import RecordError
 from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels._network import Networks, activate, decode_rows, make_networks
+from realitygap.records import write_whole
+
+from . import _json
+
+T = TypeVar("T", Genomes, Networks)
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,10 @@ class Network:
         self._values = np.zeros(room)
         self._before = np.zeros(room)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Of the arrays, which may hold a whole population, only the network's own row."""
+        return self.__dict__ | {"_networks": _row_of(self._networks, self._row), "_row": 0}
+
     @property
     def n_inputs(self) -> int:
         """Inputs to be given; the constant one, where there is one, is not among them."""
@@ -84,6 +96,85 @@ class Network:
         first = self._rules.n_inputs
         return self._values[first : first + self._rules.n_outputs].copy()
 
+    def to_dict(self) -> dict[str, Any]:
+        """The network as plain values with a version, as after `reset`.
+
+        `nodes` lists outputs and hidden nodes in the order of activation. Nodes are numbered inputs (the constant
+        one last among them), outputs, hidden nodes.
+        """
+        rules, networks, row = self._rules, self._networks, self._row
+        nodes = []
+        n_hidden = int(networks.n_hidden[row])
+        first_hidden = rules.n_inputs + rules.n_outputs
+        for k in range(n_hidden + rules.n_outputs):
+            edges = slice(int(networks.first_edge[row, k]), int(networks.first_edge[row, k + 1]))
+            nodes.append(
+                {
+                    "node": first_hidden + k if k < n_hidden else rules.n_inputs + k - n_hidden,
+                    "bias": float(networks.bias[row, k]),
+                    "sources": networks.source[row, edges].tolist(),
+                    "weights": networks.weight[row, edges].tolist(),
+                }
+            )
+        return {
+            **_json.head("network", rules, self._bias_value),
+            "n_inputs": rules.n_inputs,
+            "n_outputs": rules.n_outputs,
+            "constant": rules.bias_input >= 0,
+            "nodes": nodes,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The network that `to_dict` described.
+
+        Raises:
+            RecordError: The values are not a network's.
+            RecordVersionError: Another version wrote them.
+        """
+        return cls._from(
+            _json.checked(dict(values), _json.NetworkForm, "network", "The mapping"), "The mapping"
+        )
+
+    def to_json(self) -> str:
+        """The network as JSON with a version; numbers come back bit for bit."""
+        return _json.to_text(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The network that `to_json` wrote.
+
+        Raises:
+            RecordError: The text is no JSON, or not a network's.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_text(text, "network", "The text")
+        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The text"), "The text")
+
+    @classmethod
+    def _from(cls, form: _json.NetworkForm, where: str) -> Self:
+        _check_network(form, where)
+        rules = form.rules(form.n_inputs, form.n_outputs, constant=form.constant, node_bias=True)
+        edges = [len(each.sources) for each in form.nodes]
+        networks = make_networks(1, rules, max(sum(edges), 1), len(edges) - rules.n_outputs)
+        first_hidden = rules.n_inputs + rules.n_outputs
+        hidden = [each for each in form.nodes if each.node >= first_hidden]
+        outputs = sorted(
+            (each for each in form.nodes if each.node < first_hidden), key=lambda each: each.node
+        )
+        number = {node: node for node in range(first_hidden)}
+        number |= {each.node: first_hidden + k for k, each in enumerate(hidden)}
+        networks.n_hidden[0] = len(hidden)
+        edge = 0
+        for k, each in enumerate([*hidden, *outputs]):
+            networks.bias[0, k] = each.bias
+            pairs = zip((number[node] for node in each.sources), each.weights, strict=True)
+            for source, weight in sorted(pairs):
+                networks.source[0, edge], networks.weight[0, edge] = source, weight
+                edge += 1
+            networks.first_edge[0, k + 1] = edge
+        return cls(networks, 0, rules, form.bias_value)
+
 
 class Genome:
     """One individual's genes: a view of a row of a population's arrays."""
@@ -93,6 +184,10 @@ class Genome:
         self._row = row
         self.rules = rules
         self.bias_value = bias_value
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Of the arrays, which hold a whole population, only the genome's own row."""
+        return self.__dict__ | {"_genomes": _row_of(self._genomes, self._row), "_row": 0}
 
     @property
     def nodes(self) -> tuple[NodeGene, ...]:
@@ -140,11 +235,77 @@ class Genome:
         return Network(decode_all([self]), 0, self.rules, self.bias_value)
 
     def to_dict(self) -> dict[str, Any]:
-        """The genes as plain values: `nodes` and `connections`."""
+        """The genes, `nodes` and `connections`, and what decoding needs, as plain values with a version."""
         return {
+            **_json.head("genome", self.rules, self.bias_value),
+            "node_bias": bool(self.rules.node_bias),
             "nodes": [asdict(node) for node in self.nodes],
             "connections": [asdict(connection) for connection in self.connections],
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The genome that `to_dict` described; of NEAT's rates, which are no part of it, it has the defaults.
+
+        Raises:
+            RecordError: The values are not a genome's.
+            RecordVersionError: Another version wrote them.
+        """
+        return cls._from(
+            _json.checked(dict(values), _json.GenomeForm, "genome", "The mapping"), "The mapping"
+        )
+
+    def to_json(self) -> str:
+        """The genome as JSON with a version; numbers come back bit for bit."""
+        return _json.to_text(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The genome that `to_json` wrote.
+
+        Raises:
+            RecordError: The text is no JSON, or not a genome's.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_text(text, "genome", "The text")
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The text"), "The text")
+
+    def save(self, path: str | Path) -> None:
+        """Write the genome as JSON; a file that is there gives way once the new one is complete.
+
+        Raises:
+            RecordError: It cannot be written.
+        """
+        write_whole(Path(path), self.to_json().encode("utf-8"))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The genome that `save` or `realitygap export` wrote.
+
+        Raises:
+            RecordError: The file cannot be read, or holds no genome.
+            RecordVersionError: Another version wrote it.
+        """
+        values = _json.from_file(Path(path), "genome")
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", str(path)), str(path))
+
+    @classmethod
+    def _from(cls, form: _json.GenomeForm, where: str) -> Self:
+        _check_genome(form, where)
+        kinds = [node.kind for node in form.nodes]
+        n_inputs, n_outputs = kinds.count("input") + kinds.count("bias"), kinds.count("output")
+        genes = form.connections
+        record: dict[str, list[Any]] = {
+            "hidden": [node.id for node in form.nodes if node.kind == "hidden"],
+            "biases": [node.bias for node in form.nodes[n_inputs:]],
+            **{
+                name: [getattr(gene, name) for gene in genes]
+                for name in ("innovation", "source", "target", "weight", "enabled")
+            },
+        }
+        rules = form.rules(n_inputs, n_outputs, constant="bias" in kinds, node_bias=form.node_bias)
+        made = genome_from_record(record, rules, form.bias_value)
+        return cls(made._genomes, 0, rules, form.bias_value)
 
     def _repr_svg_(self) -> str:
         from ._picture import network_picture
@@ -160,6 +321,20 @@ class Genome:
 
     def __repr__(self) -> str:
         return f"Genome({len(self.nodes)} nodes, {self.n_enabled} of {len(self.connections)} connections enabled)"
+
+
+_OF_NO_ROW = {"full", "reached", "cursor", "ends"}
+
+
+def _row_of(table: T, row: int) -> T:
+    """One row of each array of a table; what belongs to no row is kept whole."""
+    arrays: dict[str, Any] = table._asdict()
+    return type(table)(
+        **{
+            name: array if name in _OF_NO_ROW else array[row : row + 1].copy()
+            for name, array in arrays.items()
+        }
+    )
 
 
 def decode_all(genomes: Sequence[Genome]) -> Networks:
@@ -201,3 +376,69 @@ def genome_from_record(
     biases = record["biases"]
     genomes.bias[0, : len(biases)] = biases
     return Genome(genomes, 0, rules, bias_value)
+
+
+def _check_genome(form: _json.GenomeForm, where: str) -> None:
+    """Refuse genes that no evolution of ours could have made, and kernels could not read."""
+    kinds = "".join(node.kind[0] for node in form.nodes)  # i, b, o, h
+    ids = [node.id for node in form.nodes]
+    first_hidden = len(kinds.rstrip("h"))
+    numbers = [gene.innovation for gene in form.connections]
+    links = [(gene.source, gene.target) for gene in form.connections]
+    inputs = {node.id for node in form.nodes if node.kind in ("input", "bias")}
+    problems = {
+        "expected nodes in the order input, bias (one at most), output, hidden, at least one input and one output": (
+            kinds != "".join(sorted(kinds, key="iboh".index))
+            or kinds.count("b") > 1
+            or not {"i", "o"} <= set(kinds)
+        ),
+        "expected node ids 0, 1, ... for inputs and outputs and then ascending ones": (
+            ids[:first_hidden] != list(range(first_hidden)) or ids != sorted(set(ids))
+        ),
+        "expected ascending innovation numbers": numbers != sorted(set(numbers)),
+        "expected one gene at most for each two nodes": len(links) != len(set(links)),
+        "a connection starts or ends at no node": not {node for link in links for node in link} <= set(ids),
+        "a connection leads to an input": any(target in inputs for _, target in links),
+    }
+    for problem, is_there in problems.items():
+        if is_there:
+            raise RecordError(f"{where} is not a genome: {problem}.")
+    if not form.recurrent:
+        _refuse_cycle(links, f"{where} is not a genome")
+
+
+def _check_network(form: _json.NetworkForm, where: str) -> None:
+    """Refuse what kernels could not read."""
+    numbers = {each.node for each in form.nodes}
+    known = set(range(form.n_inputs)) | numbers
+    problems = {
+        "n_inputs counts the constant one, expected another besides": form.constant and form.n_inputs < 2,
+        "expected each output and hidden node once, numbered after the inputs": (
+            len(numbers) != len(form.nodes)
+            or len(numbers) < form.n_outputs
+            or numbers != set(range(form.n_inputs, form.n_inputs + len(numbers)))
+        ),
+        "a node has not as many sources as weights": any(
+            len(e.sources) != len(e.weights) for e in form.nodes
+        ),
+        "a source is no node": any(not set(each.sources) <= known for each in form.nodes),
+    }
+    for problem, is_there in problems.items():
+        if is_there:
+            raise RecordError(f"{where} is not a network: {problem}.")
+    if not form.recurrent:
+        seen = set(range(form.n_inputs))
+        for each in form.nodes:
+            if not set(each.sources) <= seen:
+                raise RecordError(f"{where} is not a network: node {each.node} comes before a source of it.")
+            seen.add(each.node)
+
+
+def _refuse_cycle(links: Sequence[tuple[int, int]], what: str) -> None:
+    graph: dict[int, set[int]] = {}
+    for source, target in links:
+        graph.setdefault(target, set()).add(source)
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        raise RecordError(f"{what}: its connections go in a circle, and it is not recurrent.") from error

@@ -42,7 +42,7 @@ def network_picture(
     Raises:
         ValueError: Another number of names than of inputs or outputs.
     """
-    names = _names(genome, input_names, output_names)
+    names = node_names(genome, input_names, output_names)
     links = [gene for gene in genome.connections if gene.enabled or show_disabled]
     places = _places(genome, links)
     most = max((abs(gene.weight) for gene in links if gene.enabled), default=1.0) or 1.0
@@ -106,9 +106,10 @@ def network_picture(
     )
 
 
-def _names(
+def node_names(
     genome: Genome, input_names: Sequence[str] | None, output_names: Sequence[str] | None
 ) -> dict[int, str]:
+    """What inputs and outputs are called, by id; refuses another number of names."""
     rules = genome.rules
     inputs = input_names or ["bias" if k == rules.bias_input else f"input {k}" for k in range(rules.n_inputs)]
     outputs = output_names or [f"output {k}" for k in range(rules.n_outputs)]

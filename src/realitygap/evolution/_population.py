@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import reprlib
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import ValidationError
 
-from realitygap.errors import whole_number
+from realitygap.errors import RecordError, whole_number
 from realitygap.kernels._evolve import next_generation
 from realitygap.kernels._genome import Genomes, first_genomes, make_genomes
 from realitygap.kernels._mutation import Innovations, make_innovations
 from realitygap.kernels._species import SpeciesTable, make_species, speciate
+from realitygap.records import read_checkpoint, write_checkpoint
 
 from ._genome import Genome
 from ._random import random_key
@@ -20,6 +24,10 @@ from ._settings import NeatSettings
 # Room beyond the first genes; doubled whenever a child does not fit.
 FIRST_ROOM = 32
 FIRST_HIDDEN_ROOM = 8
+
+
+# What kernels write to before they read it.
+_ROOM = {"genomes.reached", "genomes.cursor", "species.numbers", "species.shares"}
 
 
 class Population:
@@ -31,7 +39,9 @@ class Population:
             population.tell([fitness_of(genome.network()) for genome in genomes])
 
     The same kernels carry out the whole runs of a study; both roads give the same genomes. What comes is a
-    function of the seed, the settings and the fitness told, on any machine.
+    function of the seed, the settings and the fitness told, on any machine: not of how many workers found the
+    fitness, nor of whether the population was saved and loaded on the way. Genomes and networks can be pickled,
+    so `pool.map(fitness_of, population.ask())` works with threads and with processes.
     """
 
     def __init__(
@@ -70,6 +80,7 @@ class Population:
                 f"settings is {settings!r}, expected NeatSettings, such as NeatSettings.named('default')."
             )
         self.settings = settings or NeatSettings()
+        self._n_inputs = n_inputs
         self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
         self._key = np.uint64(key)
         self._replicate = replicate
@@ -79,6 +90,8 @@ class Population:
         hidden_room = self._rules.start_hidden + FIRST_HIDDEN_ROOM
         self._genomes: Genomes = make_genomes(n, n_outputs, room, hidden_room)
         self._innovations: Innovations = make_innovations(self._rules, n)
+        for array in self._innovations[1:]:  # room that is not read yet, but saved
+            array[:] = 0
         self._species: SpeciesTable = make_species(self._rules, n)
         self._species_of = np.zeros(n, np.int32)
         self._parents = np.full((n, 2), -1, np.int32)
@@ -164,6 +177,98 @@ class Population:
         self._genomes, self._innovations, self._species = children, innovations, species
         self._species_of, self._parents = species_of, parents
         self.generation += 1
+
+    def save(self, path: str | Path) -> None:
+        """Write a checkpoint; a file that is there gives way once the new one is complete.
+
+        Between `ask` and `tell` nothing else needs to be kept: `load`, `ask` and tell the same fitness, and the
+        next generation is the same, bit for bit.
+
+        Args:
+            path: The file, a NumPy .npz whatever its name.
+
+        Raises:
+            RecordError: It cannot be written; a file that was there is as it was.
+        """
+        about = {
+            "n_inputs": self._n_inputs,
+            "n_outputs": self._rules.n_outputs,
+            "bias": self._rules.bias_input >= 0,
+            "settings": self.settings.model_dump(mode="json"),
+            "key": int(self._key),
+            "replicate": self._replicate,
+            "generation": self.generation,
+        }
+        write_checkpoint(Path(path), "population", about, self._arrays())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """The population that `save` wrote.
+
+        Raises:
+            RecordError: There is no such file, it is cut off or damaged, or no checkpoint of a population.
+            RecordVersionError: A version wrote it whose numbers may differ.
+        """
+        about, arrays = read_checkpoint(Path(path), "population")
+        try:
+            population = cls(
+                about["n_inputs"],
+                about["n_outputs"],
+                NeatSettings.model_validate(about["settings"]),
+                replicate=about["replicate"],
+                bias=about["bias"],
+                key=about["key"],
+            )
+            population._restore(arrays)
+            population.generation = about["generation"]
+        except (KeyError, TypeError, ValidationError, ValueError) as error:
+            raise RecordError(
+                f"{path} is a checkpoint, but not one of a population as this version has it ({error})."
+            ) from error
+        return population
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """All that changes from generation to generation, by name; views."""
+        tables: dict[str, Any] = {
+            "genomes": self._genomes,
+            "innovations": self._innovations,
+            "species": self._species,
+        }
+        arrays: dict[str, NDArray[Any]] = {"species_of": self._species_of, "parents": self._parents}
+        for prefix, table in tables.items():
+            arrays |= {f"{prefix}.{name}": array for name, array in table._asdict().items()}
+        return {name: array for name, array in arrays.items() if name not in _ROOM}
+
+    def _restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Put `_arrays` back; only the room for genes may differ.
+
+        Raises:
+            ValueError: Names, types or sizes do not fit.
+        """
+        own = self._arrays()
+        if arrays.keys() != own.keys():
+            raise ValueError(f"it lacks {sorted(own.keys() - arrays.keys())} or holds something else")
+        for name, array in arrays.items():
+            fixed = 1 if name.startswith("genomes.") else array.ndim
+            if array.dtype != own[name].dtype or array.ndim != own[name].ndim:
+                raise ValueError(f"{name} is {array.dtype} with {array.ndim} dimensions")
+            if array.shape[:fixed] != own[name].shape[:fixed]:
+                raise ValueError(f"{name} has shape {array.shape}")
+
+        def table(like: Any, prefix: str) -> Any:
+            names = [name for name in like._fields if f"{prefix}.{name}" not in _ROOM]
+            return like._replace(**{name: np.ascontiguousarray(arrays[f"{prefix}.{name}"]) for name in names})
+
+        genomes: Genomes = table(self._genomes, "genomes")
+        genomes = genomes._replace(reached=np.zeros(genomes.innovation.shape[1] + 1, np.int32))
+        room, hidden_room = genomes.innovation.shape[1], genomes.hidden.shape[1]
+        for count, most in ((genomes.n_connections, room), (genomes.n_hidden, hidden_room)):
+            if count.min() < 0 or count.max() > most:
+                raise ValueError("a genome has more genes than room")
+        self._genomes = genomes
+        self._innovations = table(self._innovations, "innovations")
+        self._species = table(self._species, "species")
+        self._species_of, self._parents = arrays["species_of"], arrays["parents"]
 
 
 def _as_numbers(fitness: ArrayLike, n: int) -> NDArray[np.float64]:

@@ -13,6 +13,9 @@ from realitygap.kernels._network import IDENTITY, SIGMOID, TANH
 
 _NEVER = 2**31 - 1
 
+ACTIVATIONS = {"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}
+"""The kernels' numbers of the activation functions, by name."""
+
 
 class NeatSettings(BaseModel):
     """NEAT after Stanley & Miikkulainen (2002), with the choices that the paper leaves open settled by name.
@@ -90,7 +93,7 @@ class NeatSettings(BaseModel):
         description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
     )
     weight_step: float = Field(
-        0.5, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+        1.0, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
         6.0,
@@ -289,7 +292,7 @@ class NeatSettings(BaseModel):
             recurrent=self.recurrent,
             node_bias=self.node_bias,
             bias_input=bias_input,
-            activation={"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}[self.activation],
+            activation=ACTIVATIONS[self.activation],
             activation_slope=float(self.activation_slope),
             start_hidden=self.start_hidden,
             start_random=self.start_topology == "random",

@@ -203,30 +203,30 @@ def reproduce(
         n_parents = min(int(math.floor(rules.survival * size + 1.0)), size)
         counted = size if rules.champion_by_members else offspring[k]
         for place in range(offspring[k]):
-            if place == 0 and counted >= rules.champion_from:
-                copy_genome(old, members[0], new, child)
-                parents[child, 0] = members[0]
-                parents[child, 1] = -1
-                child += 1
-                continue
+            # Each of copying, mating and mutating stands here once, as it becomes part of this function.
             stream = make_stream(key, replicate, generation + 1, child, FIRST, PURPOSE_CHILD)
             cursor[0] = 0
-            first = members[next_below(stream, cursor, n_parents)]
             second = -1
-            if next_uniform(stream, cursor) < rules.crossover:
-                if n_species > 1 and next_uniform(stream, cursor) < rules.interspecies:
-                    second = _other_champion(fitness, species_of, species, k, stream, cursor)
-                else:
-                    second = members[next_below(stream, cursor, n_parents)]
-                if second == first:
-                    second = -1
+            if place == 0 and counted >= rules.champion_from:
+                first = members[0]
+                mutated = False
+            else:
+                first = members[next_below(stream, cursor, n_parents)]
+                mutated = True
+                if next_uniform(stream, cursor) < rules.crossover:
+                    if n_species > 1 and next_uniform(stream, cursor) < rules.interspecies:
+                        second = _other_champion(fitness, species_of, species, k, stream, cursor)
+                    else:
+                        second = members[next_below(stream, cursor, n_parents)]
+                    if second == first:
+                        second = -1
             if second < 0:
                 copy_genome(old, first, new, child)
-                mutate(new, child, rules, innovations, stream, cursor, reached)
             else:
                 crossover(old, first, second, fitness, rules, new, child, stream, cursor, reached)
-                if next_uniform(stream, cursor) >= rules.crossover_only:
-                    mutate(new, child, rules, innovations, stream, cursor, reached)
+                mutated = next_uniform(stream, cursor) >= rules.crossover_only
+            if mutated:
+                mutate(new, child, rules, innovations, stream, cursor, reached)
             parents[child, 0] = first
             parents[child, 1] = second
             child += 1

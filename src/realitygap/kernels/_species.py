@@ -166,10 +166,8 @@ def speciate(new, old, fitness, species_of, species, rules, key, replicate, gene
         home = -1
         nearest = math.inf
         for k in range(n_all):
-            if k < n_known:
-                distance = genome_distance(new, row, old, representative[k], rules)
-            else:
-                distance = genome_distance(new, row, new, representative[k], rules)
+            of = old if k < n_known else new
+            distance = genome_distance(new, row, of, representative[k], rules)
             if distance < species.floats[THRESHOLD] and (home < 0 or distance < nearest):
                 home = k
                 nearest = distance

@@ -6,8 +6,10 @@ outside the digest. This package handles plain dicts, arrays and polars frames. 
 studies.
 """
 
+from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
+from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
 from realitygap.records._output import is_special, refuse_results, write_whole
@@ -28,8 +30,12 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "COLUMNS",
     "Column",
     "column_table",
+    "derived_table",
+    "DerivedFrame",
     "list_column",
-    # other files
+    # other files, written whole
+    "write_checkpoint",
+    "read_checkpoint",
     "write_whole",
     "refuse_results",
     "is_special",

@@ -25,6 +25,7 @@ from realitygap.records._chunk import (
     read_rows,
 )
 from realitygap.records._columns import SCHEMA
+from realitygap.records._derived import DERIVED, DerivedFrame
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._digest import RowsDigest, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
@@ -39,6 +40,8 @@ from realitygap.records._listing import (
 )
 from realitygap.records._lock import LOCK_NAME, FolderLock
 from realitygap.records._log import LOG_NAME, append_line, read_lines
+from realitygap.records._output import refuse_results
+from realitygap.records._parquet import write_frames
 from realitygap.records._published import PublishedNames
 from realitygap.records._seal import BrokenSeal, check_ends
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
@@ -352,6 +355,59 @@ class ResultsFolder:
         frame = pl.concat(parts) if parts else pl.DataFrame(schema=SCHEMA)
         return frame if columns is None else frame.select(columns)
 
+    def derive(
+        self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
+    ) -> pl.DataFrame:
+        """Species, innovations or lineage of the runs, derived from their rows.
+
+        Args:
+            what: species (a row is one species in one generation), innovations (one innovation number in one run), or
+                lineage (one individual); `derived_table` has their columns.
+            condition: only this one.
+            replicates: only these; those that are not there are left out.
+
+        Raises:
+            RecordError: as `chunks`.
+            ValueError: no such condition, or nothing of that name to derive.
+        """
+        parts = list(self.derived_frames(what, condition, replicates))
+        return pl.concat(parts) if parts else pl.DataFrame(schema=DERIVED[what].schema)
+
+    def derived_frames(
+        self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
+    ) -> Iterator[pl.DataFrame]:
+        """As `derive`, chunk by chunk, so that memory holds one chunk at a time."""
+        if what not in DERIVED:
+            raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
+        self._check_selection(condition, None)
+        self._warn_of_version()
+        wanted = None if replicates is None else pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+        return self._derived(what, self._names(condition), wanted)
+
+    def write_derived(
+        self,
+        what: DerivedFrame,
+        path: str | Path,
+        condition: str | None = None,
+        replicates: Iterable[int] | None = None,
+    ) -> int:
+        """Write `derive` to a Parquet file, chunk by chunk; one that is there gives way once the new one is complete.
+
+        Args:
+            what, condition, replicates: As of `derive`.
+            path: The file; not in a folder of results.
+
+        Returns:
+            How many rows it has.
+
+        Raises:
+            RecordError: as `chunks`, or the file lies in a folder of results or cannot be written.
+            ValueError: as `derive`.
+        """
+        path = Path(path)
+        refuse_results(path)
+        return write_frames(path, self.derived_frames(what, condition, replicates), DERIVED[what].schema)
+
     def digest(self) -> str:
         """Sha256 of all rows, as 64 hexadecimal digits.
 
@@ -546,6 +602,17 @@ class ResultsFolder:
             self._check_together([*before, chunk])
             before = [chunk]
             yield frame
+
+    def _derived(
+        self, what: DerivedFrame, names: Iterable[ChunkName], replicates: pl.Series | None
+    ) -> Iterator[pl.DataFrame]:
+        derived = DERIVED[what]
+        if replicates is not None:
+            names = [name for name in names if replicates.is_between(name.first, name.last).any()]
+        for frame in self._frames(names, derived.needs):
+            if replicates is not None:
+                frame = frame.filter(pl.col("replicate").cast(pl.Int64).is_in(replicates.implode()))
+            yield derived.frame(frame)
 
     def _load(self, name: ChunkName) -> Chunk:
         path = self._trials / str(name)

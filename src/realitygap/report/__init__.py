@@ -29,7 +29,10 @@ from realitygap.report._effects import (
     runs_needed,
 )
 from realitygap.report._formats import save_drawing, save_picture
+from realitygap.report._frame_file import export_frame
+from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
+from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
 from realitygap.report._paper_audit import Finding, audit_paper
@@ -88,6 +91,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "draw_better_individuals",
     "draw_networks",
     "draw_species",
+    "draw_lineage",
     "draw_trial",
     "draw_choices",
     "Drawing",
@@ -96,6 +100,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_view",
     "save_arena",
     "save_robot",
+    # for other programs
+    "export_individual",
+    "export_frame",
     "WIDE",
     "NARROW",
     # statistics

@@ -36,7 +36,7 @@ def check_ending(path: Path, endings: tuple[str, ...] = ENDINGS) -> str:
     ending = path.suffix.lower()
     if ending not in endings:
         hint = (
-            "only one trial can move: give a folder of results, without network or species"
+            "only one trial can move: give a folder of results, without another word"
             if ending == ".gif"
             else did_you_mean(ending, endings)
         )

@@ -1,4 +1,4 @@
-"""The figures that show a study rather than measure it: arena, all individuals, better ones, networks, species."""
+"""The figures that show a study rather than measure it: arena, individuals, networks, species, a lineage."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
-from realitygap.report import _arena_figure, _networks_figure
+from realitygap.report import _arena_figure, _lineage_figure, _networks_figure
 from realitygap.report._drawing import Drawing
 from realitygap.report._individuals_figure import draw_tally_better, draw_tally_individuals
 from realitygap.report._species_figure import count_species, draw_tally_species
@@ -60,6 +60,7 @@ def content(
         draw_tally_species(tally, species, condition, widths=widths, name="figure-11"),
     )
     found["species_counts"] = species
+    found["lineage"] = placed("figure-12", "Figure 12", _lineage_figure.content(tally, condition, widths))
     return found
 
 

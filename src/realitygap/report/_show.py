@@ -1,4 +1,4 @@
-"""What `realitygap show` shows: a run, a trial, a network, species, an arena or a robot, as a file."""
+"""What `realitygap show` shows: a run, a trial, a network, species, a lineage, an arena or a robot, as a file."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from realitygap.errors import did_you_mean
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
+from realitygap.report._lineage_figure import draw_chosen_lineage
 from realitygap.report._networks_figure import draw_network
 from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._species_figure import count_species, draw_tally_species
@@ -19,7 +20,7 @@ from realitygap.report._trial_figure import animate_trial, choose_trial, draw_ch
 from realitygap.robots import JyroPlatform
 from realitygap.world import arena_picture, paper_arena
 
-Subject = Literal["run", "network", "species"]
+Subject = Literal["run", "network", "species", "lineage"]
 
 _STILL = (".pdf", ".png", ".svg")
 
@@ -40,10 +41,12 @@ def save_view(
         folder: the results of a study, or the path to them.
         out: ends in .svg, .pdf, .png or, for one trial, .gif; a file that is there gives way.
         subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
-            network, that of one individual; species, their shares in one run and their number in all.
+            network, that of one individual; species, their shares in one run and their number in all; lineage, the
+            ancestors of one individual.
         condition: of which; the first one when not given.
         replicate: which run; when not given the typical one, and for species the one with most of them.
-        generation: of a trial or network; when not given that of the run's best trial, for a network the last one.
+        generation: of a trial, network or lineage; when not given that of the run's best trial, for a network the last
+            one.
         individual: of the generation; the one of highest coverage when not given.
 
     Returns:
@@ -66,6 +69,10 @@ def save_view(
             raise ValueError("Species are shown over all generations: leave out generation and individual.")
         (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate)
         return _save(drawing, out, "Species")
+    if subject == "lineage":
+        trial = choose_trial(tally, condition, replicate, generation, individual)
+        (drawing,) = draw_chosen_lineage(tally, trial)
+        return _save(drawing, out, f"Lineage of {trial.title}")
     if subject == "network":
         trial = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
         return _save(

@@ -16,17 +16,19 @@ import numpy as np
 import polars
 
 from realitygap._version import __version__
-from realitygap.evolution import Population, random_key
+from realitygap.evolution import Population, decode_all
+from realitygap.kernels._trial import make_block, make_trace, run_trials
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
-from realitygap.trials import NoiseKey, try_genomes
+from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene
 
 from ._executors import usable_processors
 from ._file import load_study
 from ._run import machine_facts
 
-TRIALS_PER_CALL = 500
-RUNS_PER_CALL = 50
+# So many that the start of a call does not count, as in a study of thousands of replicates.
+TRIALS_PER_CALL = 12_800
+RUNS_PER_CALL = 1_000
 MOST_SECONDS = 3600
 
 
@@ -37,10 +39,12 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
         seconds: How long each figure is measured, after everything is compiled.
 
     Returns:
-        `robot_steps_per_second`, `paper_runs_per_second` (coverage at 50 % noise, NEAT included) and
-        `paper_runs_recorded_per_second` (their rows written as well), each with `per_core` and `all_cores`;
-        `machine` and `versions`. A robot-step holds its noise and its line coverage; its networks have no
-        hidden node.
+        Rates, each `per_core` and on `all_cores`: `robot_steps_per_second` of networks without hidden nodes and
+        `robot_steps_two_hidden_per_second` of networks with two (noise and both counts of cells are part of a
+        step); `paper_runs_per_second` (coverage at 50 % noise, NEAT included),
+        `paper_runs_novelty_per_second`, and `paper_runs_recorded_per_second` (of coverage, their rows written as
+        well). `neat_share`: the part of the time of a paper run, one core, that its trials do not take. `machine`
+        and `versions`.
 
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
@@ -48,14 +52,20 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
     if not 0 < seconds <= MOST_SECONDS:
         raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
     study = load_study("paper")
-    condition = next(item for item in study.conditions if item.name == "coverage-50")
+    coverage, novelty = (
+        next(item for item in study.conditions if item.name == name) for name in ("coverage-50", "novelty-50")
+    )
     with tempfile.TemporaryDirectory() as temporary:
         folder = ResultsFolder.create(Path(temporary) / "bench", study.description())
         with folder.locked():
+            runs = _rates(_run_work(coverage), seconds)
             return {
-                "robot_steps_per_second": _rates(_trial_work(condition), seconds),
-                "paper_runs_per_second": _rates(_run_work(condition), seconds),
-                "paper_runs_recorded_per_second": _rates(_recorded_work(condition, folder), seconds),
+                "robot_steps_per_second": _rates(_trial_work(coverage, 0), seconds),
+                "robot_steps_two_hidden_per_second": _rates(_trial_work(coverage, 2), seconds),
+                "paper_runs_per_second": runs,
+                "paper_runs_novelty_per_second": _rates(_run_work(novelty), seconds),
+                "paper_runs_recorded_per_second": _rates(_recorded_work(coverage, folder), seconds),
+                "neat_share": _share_without_trials(coverage, runs["per_core"], seconds),
                 "machine": machine_facts(),
                 "versions": {
                     "realitygap": __version__,
@@ -66,6 +76,16 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
                     "polars": polars.__version__,
                 },
             }
+
+
+def _share_without_trials(condition: Condition, rate: float, seconds: float) -> float:
+    """Of a run's time; from runs whose trials last one step."""
+    steps = condition.jyro.steps
+    short = condition.model_copy(update={"jyro": condition.jyro.model_copy(update={"steps": 1})})
+    work = _run_work(short)
+    work(0)
+    whole, least = 1 / rate, 1 / _rate(work, 1, seconds)
+    return 1 - (whole - least) * steps / (steps - 1) / whole
 
 
 def _rates(work: Callable[[int], int], seconds: float) -> dict[str, float]:
@@ -92,15 +112,25 @@ def _rate(work: Callable[[int], int], threads: int, seconds: float) -> float:
     return done / (time.perf_counter() - since)
 
 
-def _trial_work(condition: Condition) -> Callable[[int], int]:
-    settings = condition.neat.model_copy(update={"population": TRIALS_PER_CALL})
+def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
+    """Trials by the kernel alone, of networks that are decoded already."""
+    changes = {"population": TRIALS_PER_CALL, "start_hidden": n_hidden}
+    settings = condition.neat.model_copy(update=changes)
     genomes = Population(3, 2, settings, seed=condition.seed, bias=False).ask()
-    arena = condition.arena.arena()
+    networks, neat = decode_all(genomes), genomes[0].rules
+    scene = jyro_scene(condition.jyro, condition.arena.arena())
+    rules = jyro_rules(condition.jyro, noise=condition.noise, bias_input=False, bias_value=1.0)
+    rows = np.arange(TRIALS_PER_CALL, dtype=np.int32)
+    nothing = make_trace(scene.heading, scene.sensors.shape[0], neat.n_inputs, -1, 1)
 
     def work(call: int) -> int:
-        noise_key = NoiseKey(random_key(condition.seed), replicate=call)
-        try_genomes(condition.jyro, arena, genomes, noise=condition.noise, noise_key=noise_key)
-        return len(genomes) * condition.jyro.steps
+        cells = np.zeros((TRIALS_PER_CALL, scene.columns * scene.rows), np.uint8)
+        counts = np.zeros((TRIALS_PER_CALL, 3), np.int32)
+        lanes, wiring = make_block(scene, neat, networks.place.shape[1])
+        counters = counters_of(NoiseKey(0, replicate=call), TRIALS_PER_CALL)
+        key = np.uint64(condition.key)
+        run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, counts, nothing)
+        return TRIALS_PER_CALL * condition.jyro.steps
 
     return work
 

@@ -19,7 +19,7 @@ from ._file import load_study
 from ._study import Study
 
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.
-CHUNK_STEPS = 1_500_000
+CHUNK_STEPS = 7_000_000
 LARGEST_CHUNK = 2000
 # At least so many chunks a condition, so that progress shows and little is lost in a crash.
 CHUNKS_PER_CONDITION = 4

@@ -16,7 +16,7 @@ from realitygap.kernels._math import sin_cos
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
 from realitygap.kernels._trial import Trace, TrialRules, TrialScene, make_block, make_trace, run_trials
 from realitygap.robots import STEP_S, JyroPlatform
-from realitygap.world import Arena
+from realitygap.world import Arena, Pose
 
 REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
@@ -131,6 +131,13 @@ def jyro_rules(
         noise=np.array([noise], real),
         sensor_range=np.array([platform.sensor_range], real),
     )
+
+
+def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:
+    """(n, 3) x [m], y [m], heading [rad, 0 to 2 pi] of poses (n, >= 3) as kernels keep them."""
+    seen = poses[:, :3].astype(np.float64) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
+    seen[:, 2] %= math.tau
+    return seen
 
 
 @dataclass(frozen=True)
@@ -319,13 +326,9 @@ def trace_genome(
     """Try one genome once and keep every step; arguments as in `try_genomes`."""
     rows, counters = np.zeros(1, np.int32), counters_of(noise_key)
     batch, trace = run_all(platform, arena, [genome], rows, noise, noise_key.key, counters, platform.steps)
-    poses = trace.poses[:, :, 0].astype(np.float64)
-    poses *= [1.0, 1.0, math.tau]
-    poses += [arena.start.x, arena.start.y, 0.0]
-    poses[:, 2] %= math.tau
     return Trajectory(
         STEP_S,
-        poses,
+        poses_of(trace.poses[:, :, 0], arena.start),
         trace.readings[:, :, 0].astype(np.float64) * platform.sensor_range,
         trace.inputs[:, :, 0].astype(np.float64),
         trace.commands[:, :, 0].astype(np.float64),
@@ -339,16 +342,19 @@ def trace_genome(
 def _check_sizes(genomes: Sequence[Genome]) -> None:
     if not genomes:
         raise ValueError("No genome to try, expected at least one.")
-    for genome in genomes:
-        given = genome.rules.n_inputs - (genome.rules.bias_input >= 0)
-        if given != 3 or genome.rules.n_outputs != 2:
+    first = _kind(genomes[0])
+    # Genomes of one population share their rules: few kinds need a look.
+    kinds = {(id(genome.rules), genome.bias_value): k for k, genome in reversed(list(enumerate(genomes)))}
+    for k in sorted(kinds.values()):
+        rules = genomes[k].rules
+        given = rules.n_inputs - (rules.bias_input >= 0)
+        if given != 3 or rules.n_outputs != 2:
             raise ValueError(
-                f"A genome has {given} inputs and {genome.rules.n_outputs} outputs, expected 3 inputs (largest "
+                f"A genome has {given} inputs and {rules.n_outputs} outputs, expected 3 inputs (largest "
                 "reading, stall, time; a constant one is extra) and 2 outputs (move, turn)."
             )
-    first = _kind(genomes[0])
-    for k, genome in enumerate(genomes):
-        for name, value in _kind(genome).items():
+    for k in sorted(kinds.values()):
+        for name, value in _kind(genomes[k]).items():
             if value != first[name]:
                 raise ValueError(
                     f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "

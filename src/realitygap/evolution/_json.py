@@ -1,0 +1,159 @@
+"""Genomes and networks as JSON with a version, and back, bit for bit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from realitygap.errors import RecordError, RecordVersionError
+from realitygap.kernels._genome import NeatRules
+
+from ._settings import ACTIVATIONS, NeatSettings
+
+FORMAT_VERSION = 1
+Kind = Literal["genome", "network"]
+
+
+class _Form(BaseModel):
+    """What genomes and networks have in common: how a node answers."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    activation: Literal["tanh", "sigmoid", "identity"]
+    activation_slope: float = Field(gt=0, le=100)
+    recurrent: bool
+    bias_value: float
+
+    def rules(self, n_inputs: int, n_outputs: int, *, constant: bool, node_bias: bool) -> NeatRules:
+        """The rules that decoding and activating need; all others are the defaults'."""
+        settings = NeatSettings(
+            activation=self.activation,
+            activation_slope=self.activation_slope,
+            recurrent=self.recurrent,
+            node_bias=node_bias,
+            bias_value=self.bias_value,
+        )
+        return settings.rules(n_inputs, n_outputs, bias_input=n_inputs - 1 if constant else -1)
+
+
+class NodeForm(BaseModel):
+    """A node gene as written."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    id: int = Field(ge=0, lt=2**31)
+    kind: Literal["input", "bias", "output", "hidden"]
+    bias: float
+
+
+class ConnectionForm(BaseModel):
+    """A connection gene as written."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    innovation: int = Field(ge=0, lt=2**31)
+    source: int
+    target: int
+    weight: float
+    enabled: bool
+
+
+class GenomeForm(_Form):
+    """A genome as written."""
+
+    node_bias: bool
+    nodes: list[NodeForm]
+    connections: list[ConnectionForm]
+
+
+class ActiveNodeForm(BaseModel):
+    """A node of a network as written: its number, bias, and the edges into it."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    node: int = Field(ge=0, lt=2**31)
+    bias: float
+    sources: list[int]
+    weights: list[float]
+
+
+class NetworkForm(_Form):
+    """A network as written."""
+
+    n_inputs: int = Field(ge=1)
+    n_outputs: int = Field(ge=1)
+    constant: bool
+    nodes: list[ActiveNodeForm]
+
+
+F = TypeVar("F", GenomeForm, NetworkForm)
+
+
+def head(kind: Kind, rules: NeatRules, bias_value: float) -> dict[str, Any]:
+    """What every document begins with."""
+    names = {code: name for name, code in ACTIVATIONS.items()}
+    return {
+        "format": f"realitygap {kind}",
+        "version": FORMAT_VERSION,
+        "activation": names[rules.activation],
+        "activation_slope": float(rules.activation_slope),
+        "recurrent": bool(rules.recurrent),
+        "bias_value": float(bias_value),
+    }
+
+
+def to_text(values: dict[str, Any]) -> str:
+    """A document as text; numbers are written so that they come back bit for bit."""
+    return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def from_text(text: str | bytes, kind: Kind, where: str) -> Any:
+    """The document in a text; `where` is what messages call it.
+
+    Raises:
+        RecordError: it is no JSON, or cut off.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise RecordError(f"{where} is no JSON, or cut off ({error}), expected a {kind}.") from error
+
+
+def from_file(path: Path, kind: Kind) -> Any:
+    """The document in a file.
+
+    Raises:
+        RecordError: it cannot be read, is no JSON, or cut off.
+    """
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise RecordError(f"Could not read {path}: {error.strerror or error}. Check the path.") from error
+    return from_text(text, kind, str(path))
+
+
+def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
+    """The values of a document, after its format, version and types were checked.
+
+    Raises:
+        RecordError: they are not those of this kind.
+        RecordVersionError: of another version.
+    """
+    expected = f"realitygap {kind}"
+    found = values.get("format") if isinstance(values, dict) else None
+    if found != expected:
+        raise RecordError(f"{where} has the format {found!r}, expected {expected!r}.")
+    if values.get("version") != FORMAT_VERSION:
+        raise RecordVersionError(
+            f"{where} is a {kind} of version {values.get('version')}, this realitygap reads version "
+            f"{FORMAT_VERSION}. Use the realitygap that wrote it."
+        )
+    try:
+        return form.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise RecordError(f"{where} is not a whole {kind}: {place}: {first['msg']}.") from error

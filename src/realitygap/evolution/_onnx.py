@@ -1,0 +1,181 @@
+"""A network as an ONNX model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap._version import __version__
+from realitygap.errors import from_extra
+
+if TYPE_CHECKING:
+    from ._genome import Network
+
+OPSET = 13
+IR_VERSION = 8
+"""Old enough for every runtime of recent years; nothing newer is needed."""
+
+_ACTIVATIONS = {"tanh": "Tanh", "sigmoid": "Sigmoid", "identity": "Identity"}
+
+
+def to_onnx(
+    network: Network,
+    input_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
+    *,
+    precision: Literal["double", "single"] = "double",
+) -> Any:
+    """The network as an `onnx.ModelProto`, whose `SerializeToString()` is what goes into a file.
+
+    A feed-forward network maps `inputs` (b, n_inputs) to `outputs` (b, n_outputs), a row for each of b sets of inputs.
+    A recurrent one is exported as one step: it also takes `state` (b, m), the activations of its m outputs and hidden
+    nodes after the step before (zeros at first), and gives `next_state`. The constant input is part of the biases.
+
+    In double precision the outputs are those of `Network.activate` but for rounding, below 1e-12.
+
+    Args:
+        network: Of which genome ever; its memory is not exported.
+        input_names: Of the inputs to be given, without the constant one; kept in the model's metadata.
+        output_names: Of the outputs; kept in the model's metadata.
+        precision: Of all numbers: double (float64) or single (float32).
+
+    Raises:
+        MissingExtraError: onnx is not installed.
+        ValueError: Another number of names than of inputs or outputs, or an unknown precision.
+    """
+    if precision not in ("double", "single"):
+        raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
+    for what, given, n in (
+        ("input_names", input_names, network.n_inputs),
+        ("output_names", output_names, network.n_outputs),
+    ):
+        if given is not None and len(given) != n:
+            raise ValueError(f"{what} has {len(given)} names, expected {n}.")
+    onnx = from_extra("onnx", "export")
+    values = network.to_dict()
+    parts = _Parts(values, np.float64 if precision == "double" else np.float32)
+    ends = _recurrent(parts) if values["recurrent"] else _feed_forward(parts)
+    kind = onnx.helper.np_dtype_to_tensor_dtype(np.dtype(parts.dtype))
+    inputs, outputs = (
+        [onnx.helper.make_tensor_value_info(name, kind, ["b", size]) for name, size in side] for side in ends
+    )
+    graph = onnx.helper.make_graph(
+        [onnx.helper.make_node(*step[:3], **step[3]) for step in parts.steps],
+        "network",
+        inputs,
+        outputs,
+        [onnx.numpy_helper.from_array(array, name) for name, array in parts.arrays.items()],
+    )
+    model = onnx.helper.make_model(
+        graph,
+        opset_imports=[onnx.helper.make_opsetid("", OPSET)],
+        ir_version=IR_VERSION,
+        producer_name="realitygap",
+        producer_version=__version__,
+    )
+    names = {"input_names": input_names, "output_names": output_names}
+    onnx.helper.set_model_props(
+        model, {key: json.dumps(list(given)) for key, given in names.items() if given is not None}
+    )
+    onnx.checker.check_model(model, full_check=True)
+    return model
+
+
+Ends = tuple[list[tuple[str, int]], list[tuple[str, int]]]
+"""Names and widths of what goes in, and of what comes out."""
+
+
+@dataclass
+class _Parts:
+    """The steps of a model as they are put together, and the arrays in it."""
+
+    values: dict[str, Any]
+    dtype: type[np.floating[Any]]
+    steps: list[tuple[str, list[str], list[str], dict[str, Any]]] = field(default_factory=list)
+    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    @property
+    def n_given(self) -> int:
+        """Inputs to be given."""
+        return int(self.values["n_inputs"]) - bool(self.values["constant"])
+
+    def array(self, name: str, values: NDArray[Any]) -> str:
+        """Add an array; returns its name."""
+        self.arrays[name] = values
+        return name
+
+    def step(self, kind: str, given: list[str], result: str, **attributes: Any) -> str:
+        """Add a step; returns the name of its result."""
+        self.steps.append((kind, given, [result], attributes))
+        return result
+
+    def layer(self, seen: str, columns: dict[int, int], nodes: list[dict[str, Any]], name: str) -> str:
+        """Activations of some nodes: activation(slope * (seen @ weights + biases)).
+
+        Args:
+            seen: The result whose columns the nodes see.
+            columns: Which column is which node's.
+            nodes: In the order of the result's columns.
+            name: Of the result; other names begin with it.
+        """
+        weights = np.zeros((len(columns), len(nodes)))
+        biases = np.array([node["bias"] for node in nodes])
+        constant = self.values["n_inputs"] - 1 if self.values["constant"] else -1
+        for k, node in enumerate(nodes):
+            for source, weight in zip(node["sources"], node["weights"], strict=True):
+                if source == constant:
+                    biases[k] += weight * self.values["bias_value"]
+                elif source in columns:
+                    weights[columns[source], k] += weight
+        given = [
+            seen,
+            self.array(f"{name}_weights", weights.astype(self.dtype)),
+            self.array(f"{name}_biases", biases.astype(self.dtype)),
+        ]
+        total = self.step("Gemm", given, f"{name}_sums")
+        if self.values["activation"] != "identity":
+            slope = self.array(f"{name}_slope", np.array(self.values["activation_slope"], self.dtype))
+            total = self.step("Mul", [total, slope], f"{name}_scaled")
+        return self.step(_ACTIVATIONS[self.values["activation"]], [total], name)
+
+
+def _feed_forward(parts: _Parts) -> Ends:
+    """Layer after layer, each seeing all before it; last the outputs are picked."""
+    values = parts.values
+    columns = {node: node for node in range(parts.n_given)}
+    layers: dict[int, list[dict[str, Any]]] = {}
+    depth = dict.fromkeys(range(values["n_inputs"]), 0)
+    for node in values["nodes"]:
+        depth[node["node"]] = 1 + max((depth.get(source, 0) for source in node["sources"]), default=0)
+        layers.setdefault(depth[node["node"]], []).append(node)
+    seen = "inputs"
+    for number, nodes in sorted(layers.items()):
+        layer = parts.layer(seen, columns, nodes, f"layer_{number}")
+        columns |= {node["node"]: len(columns) + k for k, node in enumerate(nodes)}
+        seen = parts.step("Concat", [seen, layer], f"seen_{number}", axis=1)
+    first, n = values["n_inputs"], values["n_outputs"]
+    picked = np.array([columns[first + k] for k in range(n)], np.int64)
+    parts.step("Gather", [seen, parts.array("output_columns", picked)], "outputs", axis=1)
+    return [("inputs", parts.n_given)], [("outputs", n)]
+
+
+def _recurrent(parts: _Parts) -> Ends:
+    """One step: all nodes see the inputs of now and the activations of the step before."""
+    values = parts.values
+    nodes = sorted(values["nodes"], key=lambda node: int(node["node"]))
+    columns = {node: node for node in range(parts.n_given)}
+    columns |= {node["node"]: parts.n_given + k for k, node in enumerate(nodes)}
+    seen = parts.step("Concat", ["inputs", "state"], "seen", axis=1)
+    parts.layer(seen, columns, nodes, "next_state")
+    n = values["n_outputs"]
+    first = parts.array("output_columns", np.arange(n))
+    parts.step("Gather", ["next_state", first], "outputs", axis=1)
+    return (
+        [("inputs", parts.n_given), ("state", len(nodes))],
+        [("outputs", n), ("next_state", len(nodes))],
+    )

@@ -1,0 +1,156 @@
+"""n robots that take a command each, step by step: the only place where the environments call kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ResetNeeded
+from numpy.typing import ArrayLike, NDArray
+
+from realitygap.errors import did_you_mean
+from realitygap.kernels._fleet import make_fleet, observe_robots, start_robots, step_robots
+from realitygap.kernels._philox import MAX_INDIVIDUALS
+from realitygap.robots import JyroPlatform
+from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene, poses_of
+from realitygap.world import ArenaSettings
+
+Cells = Literal["line", "ends"]
+
+
+class Robots:
+    """n robots of one platform in one arena, all at the same step of their trials.
+
+    Args:
+        n: How many, >= 1.
+        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10.
+        platform: The robot as simulated, or its settings; the paper's when not given.
+        arena: Where, or its settings; the paper's when not given.
+        cells: What rewards count: cells along the line driven, or those in which steps end.
+
+    Raises:
+        ValueError: A setting out of range, or an unknown one.
+    """
+
+    def __init__(
+        self,
+        n: int,
+        *,
+        noise: float,
+        platform: JyroPlatform | Mapping[str, Any] | None,
+        arena: ArenaSettings | Mapping[str, Any] | None,
+        cells: Cells,
+    ) -> None:
+        if not 1 <= n <= MAX_INDIVIDUALS:
+            raise ValueError(f"num_envs is {n}, expected 1 to {MAX_INDIVIDUALS}.")
+        if not 0 <= noise <= 10:
+            raise ValueError(f"noise is {noise}, expected 0 to 10.")
+        if cells not in ("line", "ends"):
+            raise ValueError(f"cells is {cells!r}, expected 'line' or 'ends'.")
+        self.n = n
+        self.platform = platform if isinstance(platform, JyroPlatform) else JyroPlatform(**(platform or {}))
+        settings = arena if isinstance(arena, ArenaSettings) else ArenaSettings(**(arena or {}))
+        self.arena = settings.arena()
+        self._scene = jyro_scene(self.platform, self.arena)
+        self._rules = jyro_rules(self.platform, noise=noise, bias_input=False, bias_value=1.0)
+        self._fleet = make_fleet(self._scene, n)
+        self._cells = np.zeros((n, self.arena.grid.n_cells), np.uint8)
+        self._counts = np.zeros((n, 3), np.int32)
+        self._column = 0 if cells == "line" else 1
+        self._step: int | None = None
+        self.noise_key = NoiseKey(0)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all steps are done."""
+        return self._step == self.platform.steps
+
+    def observation_space(self) -> Any:
+        """The Box of what one robot's controller sees: obstacle (largest noisy reading), stall, time."""
+        noise = self._rules.noise[0] * (not self._rules.clip)
+        low, high = np.nextafter(
+            [-noise, 1 + noise], [-np.inf, np.inf], dtype=noise.dtype
+        )  # sums are rounded
+        return spaces.Box(np.array([low, 0.0, 0.0]), np.array([high, 1.0, 1.0]), dtype=np.float64)
+
+    def action_space(self) -> Any:
+        """The Box of what it answers: move and turn."""
+        return spaces.Box(-1.0, 1.0, (2,), np.float64)
+
+    def start(self, options: Mapping[str, Any] | None, np_random: np.random.Generator) -> NDArray[np.float64]:
+        """Put all robots at the start; returns (n, 3) observations.
+
+        Args:
+            options: `noise_key`: which random numbers; robot k draws those of individual `noise_key.individual` + k.
+            np_random: A key is drawn from it when none is given.
+
+        Raises:
+            ValueError: An unknown option, or a key whose numbers would repeat.
+        """
+        options = options or {}
+        for name in options.keys() - {"noise_key"}:
+            raise ValueError(f"Unknown option {name!r}. {did_you_mean(name, ['noise_key'])}")
+        given = options.get("noise_key")
+        if given is None:
+            given = NoiseKey(int(np_random.integers(1 << 64, dtype=np.uint64)))
+        key = given if isinstance(given, NoiseKey) else NoiseKey(**given)
+        if key.individual + self.n > MAX_INDIVIDUALS:
+            raise ValueError(
+                f"noise_key.individual is {key.individual} for {self.n} robots, expected at most "
+                f"{MAX_INDIVIDUALS - self.n}: beyond it numbers would repeat."
+            )
+        self.noise_key = key
+        start_robots(
+            self._scene, self._rules, self._fleet, counters_of(key, self.n), self._cells, self._counts
+        )
+        self._step = 0
+        return self._observe()
+
+    def drive(self, commands: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Carry out one command of each robot.
+
+        Args:
+            commands: (n, 2) move and turn; limited to -1..1, and 0 where they are no number, as in a trial.
+
+        Returns:
+            (n, 3) observations, and (n,) the share of the reachable cells that each robot visited for the first time.
+
+        Raises:
+            ResetNeeded: No trial is under way.
+            ValueError: Another shape.
+        """
+        if self._step is None or self.is_over:
+            raise ResetNeeded("No trial is under way: call reset() first, and again when all steps are done.")
+        given = np.ascontiguousarray(commands, np.float64)
+        if given.shape != (self.n, 2):
+            raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2): move and turn.")
+        before = self._counts[:, self._column].copy()
+        step_robots(self._scene, self._fleet, given, self._cells, self._counts)
+        self._step += 1
+        return self._observe(), (self._counts[:, self._column] - before) / self.arena.grid.n_cells
+
+    def _observe(self) -> NDArray[np.float64]:
+        observations = np.empty((self.n, 3))
+        observe_robots(self._rules, self._fleet, np.uint64(self.noise_key.key), self._step, observations)
+        return observations
+
+    def facts(self) -> dict[str, NDArray[np.float64]]:
+        """What is so, whatever the controller sees: pose (n, 3), readings (n, s) [m], both coverages (n,)."""
+        counts = self._counts / self.arena.grid.n_cells
+        return {
+            "pose": poses_of(by_robot(self._fleet.poses, self.n), self.arena.start),
+            "readings": by_robot(self._fleet.fractions, self.n) * self.platform.sensor_range,
+            "coverage_line": counts[:, 0],
+            "coverage_ends": counts[:, 1],
+        }
+
+    def cells(self, k: int) -> tuple[int, ...]:
+        """The cells that robot k visited along its line, in order of first visit, columns * row + column."""
+        return tuple(self._cells[k, : self._counts[k, 0]].tolist())
+
+
+def by_robot(blocks: NDArray[Any], n: int) -> NDArray[np.float64]:
+    """(b, m, LANES) numbers of blocks as (n, m)."""
+    return np.moveaxis(blocks, 1, 2).reshape(-1, blocks.shape[1])[:n].astype(np.float64)

@@ -1,0 +1,123 @@
+"""One individual of a study as a file for other programs: JSON, ONNX or GraphML."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from realitygap._version import __version__
+from realitygap.errors import RecordError, did_you_mean, from_extra
+from realitygap.evolution import Genome, to_networkx, to_onnx
+from realitygap.evolution._json import to_text
+from realitygap.records import RecordWarning, ResultsFolder, refuse_results, write_whole
+from realitygap.report._tally import read_tally
+from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.runs import genome_of
+
+Format = Literal["json", "onnx", "graphml"]
+
+
+def export_individual(
+    folder: ResultsFolder | str | Path,
+    out: str | Path,
+    *,
+    format: Format | None = None,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+) -> Path:
+    """Write an individual of a study to a file: the one whose network `save_view` draws for the same arguments.
+
+    * json: the genome with a version; `Genome.load` reads it.
+    * onnx: the network, as `to_onnx` makes it, in double precision.
+    * graphml: the genome as a graph, as `to_networkx` makes it.
+
+    Each has the names of inputs and outputs, and says which individual it is.
+
+    Args:
+        folder: the results of a study, or the path to them; nothing is ever written there.
+        out: the file; one that is there gives way once the new one is complete.
+        format: what kind; by the ending of `out` when not given.
+        condition: of which; the first one when not given.
+        replicate: which run; the typical one when not given.
+        generation: of the run; the last one when not given.
+        individual: of the generation; the one of highest coverage when not given.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        MissingExtraError: the extra `export` is not installed; JSON needs none.
+        RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, its settings are another
+            version's, or the file lies in a folder of results or cannot be written.
+        ValueError: there is no such condition, run, generation, individual or format; the message says which there are.
+    """
+    out = Path(out)
+    write = _writer(out, format)
+    refuse_results(out)
+    with warnings.catch_warnings():
+        if not isinstance(folder, ResultsFolder):
+            warnings.simplefilter("default", RecordWarning)
+        tally = read_tally(folder)
+    try:
+        chosen = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
+    except ValidationError as error:
+        raise RecordError(
+            f"This realitygap ({__version__}) cannot read the settings of the condition: {error.errors()[0]['msg']}. "
+            "Use the version that ran the study."
+        ) from error
+    origin = {
+        "study": str(tally.description.get("name", "")),
+        **{key: chosen.row[key] for key in ("condition", "replicate", "generation", "individual")},
+        "label": chosen.label,
+        **{key: chosen.row[key] for key in ("fitness", "coverage_line", "coverage_ends")},
+        "results_version": tally.folder.results_version,
+        "software": __version__,
+    }
+    write_whole(out, write(chosen, genome_of(chosen.condition, chosen.row), origin))
+    return out
+
+
+def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]:
+    writers = {"json": _json, "onnx": _onnx, "graphml": _graphml}
+    word = out.suffix.lower().removeprefix(".") if format is None else format
+    if word not in writers:
+        what = f"{out} ends in {out.suffix or 'nothing'}" if format is None else f"Unknown format {format!r}"
+        raise ValueError(f"{what}, expected json, onnx or graphml. {did_you_mean(word, writers)}")
+    return writers[word]
+
+
+def _names(chosen: ChosenTrial) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Of all inputs and outputs, the constant input included."""
+    task = chosen.condition.task
+    return task.input_names(chosen.condition.selection), task.output_names
+
+
+def _json(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+    inputs, outputs = _names(chosen)
+    values = genome.to_dict() | {"input_names": inputs, "output_names": outputs, "origin": origin}
+    return to_text(values).encode("utf-8")
+
+
+def _onnx(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+    inputs, outputs = _names(chosen)
+    network = genome.network()
+    model = to_onnx(network, inputs[: network.n_inputs], outputs)
+    for key, value in origin.items():
+        model.metadata_props.add(key=key, value=str(value))
+    data: bytes = model.SerializeToString()
+    return data
+
+
+def _graphml(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+    graph = to_networkx(genome, *_names(chosen))
+    graph.graph |= origin
+    buffer = io.BytesIO()
+    from_extra("networkx", "export").write_graphml(graph, buffer)
+    return buffer.getvalue()

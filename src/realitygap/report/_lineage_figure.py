@@ -1,0 +1,388 @@
+"""The lineage of an individual: all its ancestors, how each came to be, and what structure each brought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+from pydantic import ValidationError
+
+from realitygap._version import __version__
+from realitygap.drawing import Ink
+from realitygap.records import ResultsFolder
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._tally import Tally, read_tally
+from realitygap.report._trial_figure import ChosenTrial, choose_trial
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
+"""Of species, as in the figure of species; its number stands in each dot, too."""
+
+_MOST_LABELED = 12
+"""Generations up to which each ancestor has its numbers, and all individuals are shown; half of it on a phone."""
+
+_MOST_ROWS = 16
+"""Individuals up to which all of a generation are shown, each at a height of its own."""
+
+_ORIGINS = {
+    "first": "drawn at random",
+    "copy": "copied unchanged",
+    "mutation": "mutated from one parent",
+    "crossover": "crossed from two parents",
+}
+
+
+@dataclass(frozen=True)
+class Ancestor:
+    """An individual from which the chosen one descends, or that one itself.
+
+    Attributes:
+        generation, individual, species: which.
+        parents: individuals of the generation before.
+        origin: first, copy, mutation or crossover.
+        coverage: of its trial [0..1].
+        brought: the structure that no parent has, in words.
+    """
+
+    generation: int
+    individual: int
+    species: int
+    parents: tuple[int, ...]
+    origin: str
+    coverage: float
+    brought: str
+
+
+def draw_lineage(
+    folder: ResultsFolder | str | Path,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    *,
+    width: float = WIDE,
+) -> Drawing:
+    """The ancestors of an individual, from the first generation on, and their coverage.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        condition: of which; the first one when not given.
+        replicate: which run; the typical one when not given.
+        generation: of the run; that of its best trial, the champion, when not given.
+        individual: of the generation; the one of highest coverage when not given.
+        width: of the figure [in].
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such individual.
+    """
+    tally = read_tally(folder)
+    trial = choose_trial(tally, condition, replicate, generation, individual)
+    (drawing,) = draw_chosen_lineage(tally, trial, widths=[width])
+    return drawing
+
+
+def draw_chosen_lineage(
+    tally: Tally, trial: ChosenTrial, *, widths: Sequence[float] = (WIDE,), name: str = "lineage"
+) -> list[Drawing]:
+    """As `draw_lineage`, of an individual chosen already, in several widths; ids begin with `name`."""
+    row = trial.row
+    rows = tally.folder.read(row["condition"], [row["replicate"]])
+    lineage = tally.folder.derive("lineage", row["condition"], [row["replicate"]])
+    ancestors = _ancestors(trial, rows, lineage)
+    counts = {
+        word: sum(each.origin == origin for each in ancestors[:-1]) for origin, word in _ORIGINS.items()
+    }
+    counted = ", ".join(f"{n} {word}" for word, n in counts.items() if n) or "none"
+    champion = ancestors[-1]
+    beside = (
+        "The number in a dot is that of its species; beside it stand coverage and the structure that no parent has"
+        if rows["generation"].max() < _MOST_LABELED  # type: ignore[operator]
+        else "Colors tell species apart, and repeat when there are more than eight"
+    )
+    caption = (
+        f"Ancestors of {trial.title} (ringed; itself {_ORIGINS[champion.origin]}): {len(ancestors) - 1} in all, "
+        f"{counted}. "
+        "Unbroken lines lead from the first parent, dashed ones from the second, broad ones to a copy. "
+        f"{beside}. Below, coverage of the ancestors, and the best of each generation (line). {trial.label}, "
+        "n = 1 run, no interval."
+    )
+    brought = [f"generation {each.generation}: {each.brought}" for each in ancestors if each.brought]
+    alt = (
+        f"Lineage of {trial.title}, coverage {champion.coverage:.3f}, with {len(ancestors) - 1} ancestors. "
+        f"New structure: {'; '.join(brought) or 'none'}."
+    )
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            figure = _draw(trial, rows, ancestors, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
+
+
+# --- who they are -------------------------------------------------------------------------------------------
+
+
+def _ancestors(trial: ChosenTrial, rows: pl.DataFrame, lineage: pl.DataFrame) -> list[Ancestor]:
+    """All ancestors and, last, the chosen individual; by generation and individual."""
+    chosen = trial.row["generation"]
+    by_key = {(each["generation"], each["individual"]): each for each in rows.iter_rows(named=True)}
+    origins = {
+        (each["generation"], each["individual"]): each
+        for each in lineage.filter(pl.col("generation") <= chosen).iter_rows(named=True)
+    }
+    found: list[Ancestor] = []
+    wanted = {int(trial.row["individual"])}
+    for generation in range(chosen, -1, -1):
+        parents: set[int] = set()
+        for individual in sorted(wanted, reverse=True):
+            row, origin = by_key[generation, individual], origins[generation, individual]
+            before = [by_key[generation - 1, parent] for parent in row["parents"]]
+            found.append(
+                Ancestor(
+                    generation,
+                    individual,
+                    row["species"],
+                    tuple(row["parents"]),
+                    origin["origin"],
+                    row[trial.measure],
+                    _brought(trial, row, origin["new"], before) if before else "",
+                )
+            )
+            parents |= set(row["parents"])
+        wanted = parents
+    return found[::-1]
+
+
+def _brought(
+    trial: ChosenTrial, row: Mapping[str, Any], new: Sequence[int], parents: Sequence[Mapping[str, Any]]
+) -> str:
+    """The structure of an individual that no parent has: nodes and links."""
+    known = {node for parent in parents for node in parent["genome"]["hidden"]}
+    nodes = [node for node in row["genome"]["hidden"] if node not in known]
+    task = trial.condition.task
+    names = dict(enumerate([*task.input_names(trial.condition.selection), *task.output_names]))
+    genes = row["genome"]
+    links = [
+        f"{names.get(source, f'h{source}')} → {names.get(target, f'h{target}')}"
+        for number, source, target in zip(genes["innovation"], genes["source"], genes["target"], strict=True)
+        if number in new and source not in nodes and target not in nodes
+    ]
+    return ", ".join([*(f"node h{node}" for node in nodes), *links])
+
+
+# --- drawing ------------------------------------------------------------------------------------------------
+
+
+def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], width: float) -> Figure:
+    n = int(rows["generation"].max()) + 1  # type: ignore[arg-type]
+    n_individuals = int(rows["individual"].max()) + 1  # type: ignore[arg-type]
+    is_wide = width >= 6
+    is_few = n <= (_MOST_LABELED if is_wide else _MOST_LABELED // 2)
+    shows_all = is_few and n_individuals <= _MOST_ROWS
+    places = _places(ancestors, shows_all)
+    spread = max(places.values()) - min(places.values())
+    most = n_individuals if shows_all else max(spread + 1, 4.0)
+    height = min(max(0.33 * most, 1.6), 4.6)
+    figure = new_figure(width, height + 1.95)
+    left, across = 0.5, width - 0.75
+    axes = place_axes(figure, left, 0.3, across, height)
+    below = place_axes(figure, left, height + 0.45, across, 1.05)
+    if shows_all:
+        axes.set_ylim(n_individuals - 0.4, -0.6)
+        axes.set_yticks(range(n_individuals))
+        axes.set_ylabel("individual")
+        _draw_others(axes, n, n_individuals, set(places))
+    else:
+        middle = (min(places.values()) + max(places.values())) / 2
+        axes.set_ylim(middle + most / 2 + 0.2, middle - most / 2 - 0.2)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+    _draw_links(axes, ancestors, places, is_few=is_few)
+    _draw_dots(axes, ancestors, places, is_few=is_few, is_wide=is_wide)
+    _draw_coverage(below, trial, rows, ancestors)
+    for each in (axes, below):
+        each.set_xlim(-0.2 if is_few else -0.5, n - (0.35 if is_few else 0.5))
+    axes.set_xticks([])
+    axes.spines["bottom"].set_visible(False)
+    row = trial.row
+    numbers = (row["generation"], row["individual"])
+    which = "generation {}, individual {}" if is_wide else "{}/{}"
+    _head(axes, f"{shorten(row['condition'], 24)}, run {row['replicate']}: {which.format(*numbers)}", trial)
+    return figure
+
+
+def _places(ancestors: list[Ancestor], shows_all: bool) -> dict[tuple[int, int], float]:
+    """The height of each: its number where all are shown, else near its descendants and apart from others."""
+    if shows_all:
+        return {(each.generation, each.individual): float(each.individual) for each in ancestors}
+    places: dict[tuple[int, int], float] = {}
+    last = ancestors[-1].generation
+    for generation in range(last, -1, -1):
+        here = [each for each in ancestors if each.generation == generation]
+        wanted = []
+        for each in here:
+            heights = [
+                places[child.generation, child.individual]
+                for child in ancestors
+                if child.generation == generation + 1 and each.individual in child.parents
+            ]
+            wanted.append(float(np.mean(heights)) if heights else 0.0)
+        for each, height in zip(here, _apart(np.array(wanted)), strict=True):
+            places[generation, each.individual] = float(height)
+    return places
+
+
+def _apart(wanted: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Heights at least 1 apart, in the order of those wanted and about their mean."""
+    order = np.argsort(wanted, kind="stable")
+    heights = wanted[order]
+    for k in range(1, len(heights)):
+        heights[k] = max(heights[k], heights[k - 1] + 1)
+    heights += wanted.mean() - heights.mean()
+    placed = np.empty_like(heights)
+    placed[order] = heights
+    return placed
+
+
+def _draw_others(axes: Axes, n: int, n_individuals: int, ancestors: set[tuple[int, int]]) -> None:
+    others = np.array(
+        [(g, k) for g in range(n) for k in range(n_individuals) if (g, k) not in ancestors], float
+    ).reshape(-1, 2)
+    axes.plot(
+        others[:, 0],
+        others[:, 1],
+        linestyle="none",
+        marker="o",
+        markersize=3.0,
+        color=Ink.RULE,
+        clip_on=False,
+    )
+
+
+def _draw_links(
+    axes: Axes, ancestors: list[Ancestor], places: Mapping[tuple[int, int], float], *, is_few: bool
+) -> None:
+    for each in ancestors:
+        here = places[each.generation, each.individual]
+        for rank, parent in enumerate(each.parents):
+            axes.plot(
+                [each.generation - 1, each.generation],
+                [places[each.generation - 1, parent], here],
+                color=Ink.RUN,
+                linewidth=(3.0 if each.origin == "copy" else 1.1) * (1.0 if is_few else 0.6),
+                linestyle="solid" if rank == 0 else (0, (3, 2)),
+                zorder=1.5,
+                clip_on=False,
+            )
+
+
+def _draw_dots(
+    axes: Axes,
+    ancestors: list[Ancestor],
+    places: Mapping[tuple[int, int], float],
+    *,
+    is_few: bool,
+    is_wide: bool,
+) -> None:
+    numbers = sorted({each.species for each in ancestors})
+    for each in ancestors:
+        x, y = each.generation, places[each.generation, each.individual]
+        color = _PENS[numbers.index(each.species) % len(_PENS)]
+        if each is ancestors[-1]:
+            axes.plot(x, y, "o", markersize=18.0 if is_few else 9.0, markerfacecolor="none", markeredgecolor=Ink.TEXT,
+                      markeredgewidth=1.1, zorder=2, clip_on=False)  # fmt: skip
+        axes.plot(x, y, "o", markersize=13.0 if is_few else 4.5, markerfacecolor=Ink.GROUND, markeredgecolor=color,
+                  markeredgewidth=1.6 if is_few else 1.2, zorder=2.5, clip_on=False)  # fmt: skip
+        if not is_few:
+            continue
+        axes.annotate(
+            str(each.species), (x, y), ha="center", va="center", fontsize=7.0, color=color, zorder=3
+        )
+        right = 12.5 if each is ancestors[-1] else 9.5
+        text = f"{each.coverage:.3f}" if is_wide else f"{each.coverage:.2f}".removeprefix("0")
+        _label(axes, (x, y), (right, 4.5 if each.brought else 0.0), text, Ink.MUTED)
+        if each.brought:
+            _label(
+                axes,
+                (x, y),
+                (right, -4.5),
+                "+ " + (shorten(each.brought, 24) if is_wide else _in_short(each.brought)),
+                color,
+            )
+
+
+def _in_short(brought: str) -> str:
+    """What kinds of structure were brought."""
+    kinds = ["node" if each.startswith("node ") else "link" for each in brought.split(", ")]
+    return ", ".join(dict.fromkeys(kinds))
+
+
+def _label(axes: Axes, at: tuple[float, float], shift: tuple[float, float], text: str, color: str) -> None:
+    axes.annotate(
+        text, at, shift, textcoords="offset points", ha="left", va="center", fontsize=7.0, color=color, zorder=3,
+        bbox={"facecolor": Ink.GROUND, "edgecolor": "none", "pad": 0.6, "alpha": 0.85}, annotation_clip=False,
+    )  # fmt: skip
+
+
+def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    best = rows.group_by("generation", maintain_order=True).agg(pl.col(trial.measure).max())
+    axes.plot(best["generation"], best[trial.measure], color=Ink.RUN, linewidth=1.1)
+    numbers = sorted({each.species for each in ancestors})
+    for each in ancestors:
+        color = _PENS[numbers.index(each.species) % len(_PENS)]
+        axes.plot(each.generation, each.coverage, "o", markersize=4.0, color=color, clip_on=False)
+    axes.set_ylim(0, None)
+    axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
+    axes.set_xlabel("generation", labelpad=2)
+    axes.set_ylabel("coverage")
+
+
+def _head(axes: Axes, title: str, trial: ChosenTrial) -> None:
+    label = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
+    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
+        axes.annotate(
+            text,
+            (x, 1.0),
+            (0, 6),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=8.0,
+            weight="bold" if x == 0.0 else "normal",
+            color=color,
+        )
+
+
+def content(
+    tally: Tally, condition: str, widths: Sequence[float], *, name: str = "figure-12"
+) -> list[Drawing] | str:
+    """The lineage of the champion of a condition's typical run in these widths, or why it is missing."""
+    try:
+        return draw_chosen_lineage(tally, choose_trial(tally, condition), widths=widths, name=name)
+    except ValidationError:
+        return (
+            f"Figure 12 is missing: this realitygap ({__version__}) cannot read the settings of condition {condition}. "
+            "Use the version that ran the study."
+        )

@@ -306,12 +306,16 @@ def test_bench_measures_what_it_names():
     figures = json.loads(done.stdout)
     assert set(figures) == {
         "robot_steps_per_second",
+        "robot_steps_two_hidden_per_second",
         "paper_runs_per_second",
+        "paper_runs_novelty_per_second",
         "paper_runs_recorded_per_second",
+        "neat_share",
         "machine",
         "versions",
     }
-    for name in list(figures)[:3]:
+    assert 0 < figures.pop("neat_share") < 1
+    for name in list(figures)[:5]:
         assert set(figures[name]) == {"per_core", "all_cores"}
         assert all(rate > 0 for rate in figures[name].values())
 

@@ -58,7 +58,7 @@ def test_descriptions_of_more_than_json_are_refused(tmp_path):
         (lambda data: b"[]", "not written by realitygap"),
         (lambda data: b'{"study": {}}', "not written by realitygap"),
         (lambda data: data.replace(b'"seed": 1', b'"seed": 2'), "edited or damaged"),
-        (lambda data: data.replace(b'"results_version": 1', b'"results_version": 2'), "edited or damaged"),
+        (lambda data: data.replace(b'"results_version": 2', b'"results_version": 3'), "edited or damaged"),
     ],
 )
 def test_torn_edited_and_foreign_files_are_refused(tmp_path, spoil, message):

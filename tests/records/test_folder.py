@@ -452,7 +452,9 @@ def test_a_chunk_of_another_version_is_named_and_refused(older, tmp_path):
     folder = make_folder(tmp_path / "r", 0)
     path = Path(shutil.copy(older.chunks()[0].path, folder.path / "trials"))
     for name, read in READERS.items():
-        with pytest.raises(RecordVersionError, match=r"results version 0, study\.json says 1") as caught:
+        with pytest.raises(
+            RecordVersionError, match=rf"version {RESULTS_VERSION - 1}, study\.json says {RESULTS_VERSION}"
+        ) as caught:
             read(folder)
         assert str(path) in str(caught.value), name
 

@@ -244,7 +244,7 @@ def test_a_worker_with_other_software_is_refused(study, dask, tmp_path, changed)
     shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
     path = copy / "realitygap" / changed
     text = path.read_text("utf-8") + "\n# another\n"
-    text = text.replace("RESULTS_VERSION = 1", "RESULTS_VERSION = 99")
+    text = text.replace("RESULTS_VERSION = 2", "RESULTS_VERSION = 99")
     path.write_text(text.replace('__version__ = "', '__version__ = "9.'), "utf-8")
     dask.scheduler()
     dask.worker(path=copy)

@@ -26,7 +26,7 @@ def export(
         typer.Argument(metavar="NAME", help="After species, innovations and lineage, the folder."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Not in a folder of results.")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Not one of a study's own files.")
     ] = None,
     format: Annotated[
         str | None,

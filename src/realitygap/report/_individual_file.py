@@ -8,10 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ValidationError
-
 from realitygap._version import __version__
-from realitygap.errors import RecordError, did_you_mean, from_extra
+from realitygap.errors import did_you_mean, from_extra
 from realitygap.evolution import Genome, to_networkx, to_onnx
 from realitygap.evolution._json import to_text
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results, write_whole
@@ -55,7 +53,7 @@ def export_individual(
     Raises:
         MissingExtraError: the extra `export` is not installed; JSON needs none.
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, its settings are another
-            version's, or the file lies in a folder of results or cannot be written.
+            version's, or the file is one of a study's own or cannot be written.
         ValueError: there is no such condition, run, generation, individual or format; the message says which there are.
     """
     out = Path(out)
@@ -65,13 +63,7 @@ def export_individual(
         if not isinstance(folder, ResultsFolder):
             warnings.simplefilter("default", RecordWarning)
         tally = read_tally(folder)
-    try:
-        chosen = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
-    except ValidationError as error:
-        raise RecordError(
-            f"This realitygap ({__version__}) cannot read the settings of the condition: {error.errors()[0]['msg']}. "
-            "Use the version that ran the study."
-        ) from error
+    chosen = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
     origin = {
         "study": str(tally.description.get("name", "")),
         **{key: chosen.row[key] for key in ("condition", "replicate", "generation", "individual")},

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
-from pydantic import ValidationError
 
 from realitygap._version import __version__
 from realitygap.drawing import Ink
+from realitygap.errors import RecordVersionError
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
@@ -381,7 +381,7 @@ def content(
     """The lineage of the champion of a condition's typical run in these widths, or why it is missing."""
     try:
         return draw_chosen_lineage(tally, choose_trial(tally, condition), widths=widths, name=name)
-    except ValidationError:
+    except RecordVersionError:
         return (
             f"Figure 12 is missing: this realitygap ({__version__}) cannot read the settings of condition {condition}. "
             "Use the version that ran the study."

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import special
 
 from realitygap.report._permutation import ALPHA, SEED
 from realitygap.report._statistics import CONFIDENCE
@@ -157,11 +157,11 @@ def bca_interval(
         return None
     ties = 1e-12 * max(1.0, abs(observed))
     below = ((resampled < observed - ties).sum() + (resampled <= observed + ties).sum()) / (2 * n_resamples)
-    bias = stats.norm.ppf(below)
+    bias = special.ndtri(below)
     skewness = _acceleration(statistic, values, codes_one, codes_other, counts, paired)
     tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
-    shifted = bias + stats.norm.ppf(tails)
-    bounds = np.quantile(resampled, stats.norm.cdf(bias + shifted / (1 - skewness * shifted)))
+    shifted = bias + special.ndtri(tails)
+    bounds = np.quantile(resampled, special.ndtr(bias + shifted / (1 - skewness * shifted)))
     if not np.isfinite(bounds).all():
         return None
     return Interval(float(bounds[0]), float(bounds[1]), "BCa")
@@ -241,7 +241,7 @@ def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDEN
 
     Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
     """
-    z = stats.norm.ppf((1 + confidence) / 2)
+    z = special.ndtri((1 + confidence) / 2)
     others = (n + m) / 2 - 1
 
     def excess(at: float) -> float:
@@ -249,8 +249,8 @@ def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDEN
         return float((at - share) ** 2 - z * z * variance)
 
     # at 0 and 1 the share itself is a root too, which is not the one that is meant
-    low = 0.0 if share <= 0 else optimize.brentq(excess, 0.0, min(share, 1 - 1e-9))
-    high = 1.0 if share >= 1 else optimize.brentq(excess, max(share, 1e-9), 1.0)
+    low = 0.0 if share <= 0 else _root(excess, 0.0, min(share, 1 - 1e-9))
+    high = 1.0 if share >= 1 else _root(excess, max(share, 1e-9), 1.0)
     return Interval(float(low), float(high), "Newcombe")
 
 
@@ -293,27 +293,38 @@ def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: floa
     high = 1.0
     while _power(high, n, paired, alpha) < power:
         high *= 2
-    return float(optimize.brentq(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high))
+    return _root(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high)
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function changes its sign between two places, to the last bit or so, by halving."""
+    sign = function(low) > 0
+    while low < (middle := (low + high) / 2) < high:
+        if (function(middle) > 0) == sign:
+            low = middle
+        else:
+            high = middle
+    return middle
 
 
 def _power(effect: float, n: int, paired: bool, alpha: float) -> float:
     freedom = n - 1 if paired else 2 * n - 2
     center = abs(effect) * math.sqrt(n if paired else n / 2)
-    critical = float(stats.t.ppf(1 - alpha / 2, freedom))
-    found = float(stats.nct.sf(critical, freedom, center))
+    critical = float(special.stdtrit(freedom, 1 - alpha / 2))
+    found = 1.0 - float(special.nctdtr(freedom, center, critical))
     if not math.isfinite(found):
         # so far out the noncentral distribution cannot be computed, and a normal one will do
-        found = float(stats.norm.sf(critical - center))
+        found = float(special.ndtr(center - critical))
     # a difference found with the wrong sign; beyond 3 it is less than one in 10 million
-    wrong = float(stats.nct.cdf(-critical, freedom, center)) if center < 3 else 0.0
+    wrong = float(special.nctdtr(freedom, center, -critical)) if center < 3 else 0.0
     return found + (wrong if math.isfinite(wrong) else 0.0)
 
 
 def effect_of_a12(share: float) -> float:
     """The difference of means [standard deviations] of two normal conditions with this A12."""
-    return float(math.sqrt(2) * stats.norm.ppf(share))
+    return float(math.sqrt(2) * special.ndtri(share))
 
 
 def a12_of_effect(effect: float) -> float:
     """A12 of two normal conditions whose means differ by so many standard deviations."""
-    return float(stats.norm.cdf(effect / math.sqrt(2)))
+    return float(special.ndtr(effect / math.sqrt(2)))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from realitygap.evolution import largest_cell_distance
 from realitygap.records import ResultsFolder
@@ -50,8 +50,12 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """Its bounds, at least 95 %."""
-        bounds = stats.binomtest(self.count, self.n).proportion_ci(CONFIDENCE, method="exact")
-        return float(bounds.low), float(bounds.high)
+        beyond = (1 - CONFIDENCE) / 2
+        low = special.betaincinv(self.count, self.n - self.count + 1, beyond) if self.count > 0 else 0.0
+        high = (
+            special.betaincinv(self.count + 1, self.n - self.count, 1 - beyond) if self.count < self.n else 1.0
+        )
+        return float(low), float(high)
 
 
 # --- plateaus -----------------------------------------------------------------------------------------------

@@ -35,7 +35,8 @@ def bench(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     seconds: Annotated[
-        float | None, typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]")
+        float | None,
+        typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]"),
     ] = None,
 ) -> None:
     """Measure how fast this machine is or, with a task, how many evaluations NEAT needs for it.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -144,21 +145,40 @@ def bca_interval(
     `scipy.stats.bootstrap`, which draws the same resamples. Differs: they are kept as counts, and what
     is equal but for rounding counts as a tie.
     """
+    (interval,) = bca_intervals(
+        [statistic], one, other, paired=paired, confidence=confidence, n_resamples=n_resamples
+    )
+    return interval
+
+
+def bca_intervals(
+    statistics: Sequence[Statistic],
+    one: Values,
+    other: Values,
+    *,
+    paired: bool,
+    confidence: float = CONFIDENCE,
+    n_resamples: int = RESAMPLES,
+) -> list[Interval | None]:
+    """As `bca_interval`, of several effects of the same samples, which are resampled once."""
     if paired and len(one) != len(other):
         raise ValueError(f"Pairs need samples of one size, these have {len(one)} and {len(other)} values.")
     if min(len(one), len(other)) < BCA_SMALLEST_N:
-        return None
+        return [None] * len(statistics)
     values, codes = np.unique(np.concatenate([one, other]), return_inverse=True)
-    codes_one, codes_other = codes[: len(one)], codes[len(one) :]
-    counts = [np.bincount(part, minlength=len(values)).astype(float) for part in (codes_one, codes_other)]
-    observed = float(statistic(values, counts[0][None], counts[1][None])[0])
-    resampled = _resample(statistic, values, codes_one, codes_other, paired, n_resamples)
+    samples = _Samples(values, codes[: len(one)], codes[len(one) :], paired)
+    resampled = samples.resample(statistics, n_resamples)
+    return [_bca(*each, samples, confidence) for each in zip(statistics, resampled, strict=True)]
+
+
+def _bca(statistic: Statistic, resampled: Values, samples: _Samples, confidence: float) -> Interval | None:
     if not np.isfinite(resampled).all() or np.ptp(resampled) == 0:
         return None
+    observed = float(statistic(samples.values, *(counts[None] for counts in samples.counts))[0])
     ties = 1e-12 * max(1.0, abs(observed))
-    below = ((resampled < observed - ties).sum() + (resampled <= observed + ties).sum()) / (2 * n_resamples)
+    below = ((resampled < observed - ties).mean() + (resampled <= observed + ties).mean()) / 2
     bias = special.ndtri(below)
-    skewness = _acceleration(statistic, values, codes_one, codes_other, counts, paired)
+    skewness = samples.acceleration(statistic)
     tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
     shifted = bias + special.ndtri(tails)
     bounds = np.quantile(resampled, special.ndtr(bias + shifted / (1 - skewness * shifted)))
@@ -176,6 +196,57 @@ def _first_mean(values: Values, one: Values, _: Values) -> Values:
     return np.asarray(one @ values / one.sum(axis=1))
 
 
+@dataclass(frozen=True)
+class _Samples:
+    """Two samples as places in their common values.
+
+    Attributes:
+        values: (u,) in ascending order.
+        one: (n,) the place of each of the first sample's values, and
+        other: (m,) of the second's.
+        paired: whether they are drawn together.
+    """
+
+    values: Values
+    one: npt.NDArray[np.int64]
+    other: npt.NDArray[np.int64]
+    paired: bool
+
+    @property
+    def counts(self) -> tuple[Values, Values]:
+        """(u,) how often each value occurs in the one sample, and in the other."""
+        one, other = (np.bincount(part, minlength=len(self.values)) for part in (self.one, self.other))
+        return one.astype(float), other.astype(float)
+
+    def resample(self, statistics: Sequence[Statistic], n_resamples: int) -> list[Values]:
+        """(b,) each statistic of the resamples."""
+        most = max(len(self.one), len(self.other), len(self.values))
+        block = max(1, _BLOCK // most)
+        draw = _draw_once if n_resamples <= block else _draw
+        found: list[list[Values]] = [[] for _ in statistics]
+        for rows, others in draw(len(self.one), None if self.paired else len(self.other), n_resamples, block):
+            counts = _counts(self.one[rows], len(self.values)), _counts(self.other[others], len(self.values))
+            for parts, statistic in zip(found, statistics, strict=True):
+                parts.append(statistic(self.values, *counts))
+        return [np.concatenate(parts) for parts in found]
+
+    def acceleration(self, statistic: Statistic) -> float:
+        """Efron's acceleration, from leaving out one value (or pair) at a time."""
+        one, other, counts = self.one, self.other, self.counts
+        drops_one, drops_other = (each - np.eye(len(self.values)) for each in counts)
+        if self.paired:
+            pairs, inverse = np.unique(np.stack([one, other]), axis=1, return_inverse=True)
+            left_out = statistic(self.values, drops_one[pairs[0]], drops_other[pairs[1]])[inverse.ravel()]
+            influences = [(len(one) - 1) * (left_out.mean() - left_out)]
+        else:
+            first = statistic(self.values, drops_one[one], np.repeat(counts[1][None], len(one), 0))
+            second = statistic(self.values, np.repeat(counts[0][None], len(other), 0), drops_other[other])
+            influences = [(len(part) - 1) * (part.mean() - part) for part in (first, second)]
+        cubes = sum(float((part**3).sum()) / len(part) ** 3 for part in influences)
+        squares = sum(float((part**2).sum()) / len(part) ** 2 for part in influences)
+        return cubes / (6 * squares**1.5) if squares > 0 else 0.0
+
+
 def _counts(codes: npt.NDArray[np.int64], n_values: int) -> Values:
     """(b, u) how often each value occurs in each row of (b, n) codes."""
     b = len(codes)
@@ -183,51 +254,22 @@ def _counts(codes: npt.NDArray[np.int64], n_values: int) -> Values:
     return np.bincount(places.ravel(), minlength=b * n_values).reshape(b, n_values).astype(float)
 
 
-def _draw(rng: np.random.Generator, codes: npt.NDArray[np.int64], b: int) -> npt.NDArray[np.int64]:
-    return np.asarray(rng.integers(0, len(codes), (b, len(codes))))
+_Draws = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 
-def _resample(
-    statistic: Statistic,
-    values: Values,
-    one: npt.NDArray[np.int64],
-    other: npt.NDArray[np.int64],
-    paired: bool,
-    n_resamples: int,
-) -> Values:
+def _draw(n: int, m: int | None, n_resamples: int, block: int) -> Iterator[_Draws]:
+    """Which of n values are in each resample, (b, n), and which of m others, in blocks; m None: the same."""
     rng = np.random.default_rng(SEED)
-    block = max(1, _BLOCK // max(len(one), len(other), len(values)))
-    found = []
     for first in range(0, n_resamples, block):
         b = min(block, n_resamples - first)
-        rows = _draw(rng, one, b)
-        others = rows if paired else _draw(rng, other, b)
-        found.append(statistic(values, _counts(one[rows], len(values)), _counts(other[others], len(values))))
-    return np.concatenate(found)
+        rows = rng.integers(0, n, (b, n))
+        yield rows, rows if m is None else rng.integers(0, m, (b, m))
 
 
-def _acceleration(
-    statistic: Statistic,
-    values: Values,
-    one: npt.NDArray[np.int64],
-    other: npt.NDArray[np.int64],
-    counts: list[Values],
-    paired: bool,
-) -> float:
-    """Efron's acceleration, from leaving out one value (or pair) at a time."""
-    drops_one = counts[0] - np.eye(len(values))
-    drops_other = counts[1] - np.eye(len(values))
-    if paired:
-        pairs, inverse = np.unique(np.stack([one, other]), axis=1, return_inverse=True)
-        left_out = statistic(values, drops_one[pairs[0]], drops_other[pairs[1]])[inverse.ravel()]
-        influences = [(len(one) - 1) * (left_out.mean() - left_out)]
-    else:
-        first = statistic(values, drops_one[one], np.repeat(counts[1][None], len(one), 0))
-        second = statistic(values, np.repeat(counts[0][None], len(other), 0), drops_other[other])
-        influences = [(len(part) - 1) * (part.mean() - part) for part in (first, second)]
-    cubes = sum(float((part**3).sum()) / len(part) ** 3 for part in influences)
-    squares = sum(float((part**2).sum()) / len(part) ** 2 for part in influences)
-    return cubes / (6 * squares**1.5) if squares > 0 else 0.0
+@functools.lru_cache(maxsize=2)
+def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Draws]:
+    """As `_draw`, kept for the next samples of these sizes."""
+    return list(_draw(n, m, n_resamples, block))
 
 
 def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDENCE) -> Interval:
@@ -283,6 +325,7 @@ def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA, power: flo
     return high
 
 
+@functools.lru_cache
 def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> float | None:
     """The smallest difference [standard deviations] that n runs a condition find so often; None below 2.
 

@@ -18,7 +18,7 @@ from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
 from realitygap.report._effects import (
     Interval,
-    bca_interval,
+    bca_intervals,
     mean_interval,
     ratio_of_robust_spreads,
     ratio_of_spreads,
@@ -53,7 +53,9 @@ class Share:
         beyond = (1 - CONFIDENCE) / 2
         low = special.betaincinv(self.count, self.n - self.count + 1, beyond) if self.count > 0 else 0.0
         high = (
-            special.betaincinv(self.count + 1, self.n - self.count, 1 - beyond) if self.count < self.n else 1.0
+            special.betaincinv(self.count + 1, self.n - self.count, 1 - beyond)
+            if self.count < self.n
+            else 1.0
         )
         return float(low), float(high)
 
@@ -140,9 +142,8 @@ def _spread(tally: Tally, condition: str, reference: str) -> Spread:
     if reference != condition and min(len(samples.one), len(samples.other)) > 1:
         ratio = _ratio(float(samples.one.std(ddof=1)), float(samples.other.std(ddof=1)))
         robust_ratio = _ratio(robust_spread(samples.one), robust_spread(samples.other))
-        ratio_interval, robust_interval = (
-            bca_interval(statistic, samples.one, samples.other, paired=samples.paired)
-            for statistic in (ratio_of_spreads, ratio_of_robust_spreads)
+        ratio_interval, robust_interval = bca_intervals(
+            [ratio_of_spreads, ratio_of_robust_spreads], samples.one, samples.other, paired=samples.paired
         )
     return Spread(
         condition,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -89,7 +91,7 @@ def write_report(
     """
     if out is not None:
         _check_out(Path(out))
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _uncollected():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
         tally = read_tally(folder)
@@ -101,6 +103,18 @@ def write_report(
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
     write_whole(path, page.encode("utf-8", "replace"))
     return path
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without looking for garbage: figures are many small objects, and all of them live as long as the page."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _check_out(path: Path) -> None:

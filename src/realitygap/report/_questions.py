@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 from scipy import special
 
 from realitygap.evolution import largest_cell_distance
@@ -217,22 +219,32 @@ def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
     columns, lines = _grid(condition)
     points = np.stack(np.divmod(np.arange(columns * lines), lines), axis=1).astype(float)
     rng = np.random.default_rng(SEED)
-    sorted_cells, jaccard, most = [], [], 0
-    for part in rows.partition_by("replicate", maintain_order=True):
-        behaviors = part["cells"]
-        if len(behaviors) > MOST_BEHAVIORS:
-            behaviors = behaviors.gather(np.sort(rng.choice(len(behaviors), MOST_BEHAVIORS, replace=False)))
-        most = max(most, len(behaviors))
-        if len(behaviors) < 2:
-            continue
-        visited = np.zeros((len(behaviors), columns * lines), np.bool_)
-        lengths = behaviors.list.len().to_numpy()
-        row, column = np.divmod(behaviors.explode().drop_nulls().to_numpy().astype(np.int64), columns)
-        # cells are numbered row by row, and sorted by x, then y
-        visited[np.repeat(np.arange(len(behaviors)), lengths), column * lines + row] = True
-        sorted_cells.append(mean_sorted_distance(visited, points, largest_cell_distance(columns, lines)))
-        jaccard.append(mean_jaccard_distance(visited))
-    return Variety(name, np.array(sorted_cells), np.array(jaccard), most)
+    lengths = rows["replicate"].rle().struct.field("len").to_list()
+    chosen = [
+        first
+        + (np.sort(rng.choice(n, MOST_BEHAVIORS, replace=False)) if n > MOST_BEHAVIORS else np.arange(n))
+        for first, n in zip(itertools.accumulate(lengths, initial=0), lengths, strict=False)
+    ]
+    visited = _visited(rows["cells"].gather(np.concatenate(chosen)), columns, lines)
+    behaviors = np.split(visited, np.cumsum([len(each) for each in chosen])[:-1])
+    compared = [each for each in behaviors if len(each) > 1]
+    padding = largest_cell_distance(columns, lines)
+    return Variety(
+        name,
+        np.array([mean_sorted_distance(each, points, padding) for each in compared]),
+        np.array([mean_jaccard_distance(each) for each in compared]),
+        max(map(len, behaviors)),
+    )
+
+
+def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_]:
+    """(n, c) which cells each of n behaviors visits, in the order of the paper: by x, then y."""
+    visited = np.zeros((len(cells), columns * lines), np.bool_)
+    # cells are numbered row by row
+    row, column = np.divmod(cells.explode().drop_nulls().to_numpy().astype(np.int64), columns)
+    behavior = np.repeat(np.arange(len(cells)), cells.list.len().to_numpy())
+    visited[behavior, column * lines + row] = True
+    return visited
 
 
 def _grid(condition: Mapping[str, Any]) -> tuple[int, int]:

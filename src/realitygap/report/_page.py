@@ -191,11 +191,7 @@ def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> _Figure
 
 
 def _coverage_figure(tally: Tally) -> _FigureOnPage:
-    wide, narrow = (
-        draw_tally_coverage(tally, width=width, name=name)
-        for width, name in ((WIDE, "coverage-wide"), (NARROW, "coverage-narrow"))
-    )
-    return _on_page("figure-4", "Figure 4", wide, narrow)
+    return _on_page("figure-4", "Figure 4", *draw_tally_coverage(tally, widths=(WIDE, NARROW)))
 
 
 def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
@@ -206,17 +202,14 @@ def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
         number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
         anchor = f"figure-6-{index}"
         try:
-            wide, narrow = (
-                draw_tally_paths(tally, condition, width=width, name=f"{anchor}-{name}")
-                for width, name in ((WIDE, "wide"), (NARROW, "narrow"))
-            )
+            drawn = draw_tally_paths(tally, condition, widths=(WIDE, NARROW), name=anchor)
         except RecordVersionError:
             found.append(
                 f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
             )
         else:
-            found.append(_on_page(anchor, number, wide, narrow))
+            found.append(_on_page(anchor, number, *drawn))
     return found
 
 

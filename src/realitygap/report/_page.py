@@ -6,6 +6,7 @@ import gc
 import itertools
 import warnings
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
@@ -141,6 +142,14 @@ def _render(content: Mapping[str, Any]) -> str:
 
 def _content(tally: Tally) -> dict[str, Any]:
     """Everything the template shows."""
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        digest = beside.submit(tally.folder.digest)
+        statistics = beside.submit(statistics_content, tally)
+        shown = _words_and_figures(tally)
+        return shown | {"digest": digest.result(), "statistics": statistics.result()}
+
+
+def _words_and_figures(tally: Tally) -> dict[str, Any]:
     summary = summarize_tally(tally)
     description = tally.description
     return {
@@ -152,7 +161,6 @@ def _content(tally: Tally) -> dict[str, Any]:
         "banners": _banners(tally),
         "facts": _facts(tally),
         "labels": _labels(tally),
-        "digest": tally.folder.digest(),
         "results_version": tally.folder.results_version,
         "version": __version__,
         "software": description.get("software") or "unknown",
@@ -160,7 +168,6 @@ def _content(tally: Tally) -> dict[str, Any]:
         "settings": settings_tables(tally.conditions),
         "summary": summary.to_dicts(),
         "measure": tally.measure,
-        "statistics": statistics_content(tally),
         "audit": paper_audit_content(tally),
         "note": description.get("note") or "",
         "published_sources": _published_sources(tally),
@@ -227,11 +234,7 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
 def _choices_figure(tally: Tally) -> _FigureOnPage | None:
     if not compare_tally_choices(tally):
         return None
-    wide, narrow = (
-        draw_tally_choices(tally, width=width, name=name)
-        for width, name in ((WIDE, "choices-wide"), (NARROW, "choices-narrow"))
-    )
-    return _on_page("figure-10", "Figure 10", wide, narrow)
+    return _on_page("figure-10", "Figure 10", *draw_tally_choices(tally, widths=(WIDE, NARROW)))
 
 
 # --- words --------------------------------------------------------------------------------------------------

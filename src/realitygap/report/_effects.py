@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from realitygap.kernels._resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
 from realitygap.report._statistics import CONFIDENCE
 
@@ -225,7 +226,10 @@ class _Samples:
         draw = _draw_once if n_resamples <= block else _draw
         found: list[list[Values]] = [[] for _ in statistics]
         for rows, others in draw(len(self.one), None if self.paired else len(self.other), n_resamples, block):
-            counts = _counts(self.one[rows], len(self.values)), _counts(self.other[others], len(self.values))
+            counts = (
+                _counts(rows, self.one, len(self.values)),
+                _counts(others, self.other, len(self.values)),
+            )
             for parts, statistic in zip(found, statistics, strict=True):
                 parts.append(statistic(self.values, *counts))
         return [np.concatenate(parts) for parts in found]
@@ -247,11 +251,11 @@ class _Samples:
         return cubes / (6 * squares**1.5) if squares > 0 else 0.0
 
 
-def _counts(codes: npt.NDArray[np.int64], n_values: int) -> Values:
-    """(b, u) how often each value occurs in each row of (b, n) codes."""
-    b = len(codes)
-    places = codes + n_values * np.arange(b)[:, None]
-    return np.bincount(places.ravel(), minlength=b * n_values).reshape(b, n_values).astype(float)
+def _counts(draws: npt.NDArray[np.int64], places: npt.NDArray[np.int64], n_values: int) -> Values:
+    """(b, u) how often each value occurs in each of (b, n) draws from a sample of (m,) places."""
+    counts = np.zeros((len(draws), n_values))
+    count_drawn(draws, places, counts)
+    return counts
 
 
 _Draws = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]

@@ -41,6 +41,7 @@ BLOCK = re.compile(
 # What differs from one run and machine to the next.
 VOLATILE = [
     (re.compile(r"\b[\d.]+ s \([\d,]+ runs/s\)"), "T s (R runs/s)"),
+    (re.compile(r"(Written: .*report\.html) \([\d.]+ s\)"), r"\1 (T s)"),
 ]
 # What stands where a terminal would have the progress bar.
 STARTING = re.compile(r"^Compiling or loading the kernels .*\n+", re.MULTILINE)

@@ -272,7 +272,7 @@ def test_open_shows_the_report_in_the_browser(tmp_path):
     done = realitygap("run", "paper", "--replicates", "6", "--out", "r", "--open", **options)
     assert done.returncode == 0, done.stderr
     page = tmp_path / "r" / "report.html"
-    assert "Written: r/report.html" in done.stdout
+    assert re.search(r"^Written: r/report\.html \(\d+\.\d s\)$", done.stdout, re.MULTILINE)
     assert (tmp_path / "opened").read_text() == f"{page.as_uri()}\n"
     done = realitygap("report", "r", "--out", "other.html", "--open", **options)
     assert done.returncode == 0, done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -31,14 +32,23 @@ def report(
 
     In Python: realitygap.write_report("results/paper", figures="figures")
     """
-    from realitygap.report import write_report
-
-    path = write_report(folder, out, figures=figures)
-    typer.echo(f"Written: {path}")
+    path = written_report(folder, out, figures=figures)
     if figures is not None:
         typer.echo(f"Figures and tables: {figures}")
     if open_page:
         show_page(path)
+
+
+def written_report(
+    folder: Path, out: Path | None = None, *, figures: Path | None = None, to_stderr: bool = False
+) -> Path:
+    """Write a report, and say where it is and what it took."""
+    started = time.perf_counter()
+    from realitygap.report import write_report
+
+    path = write_report(folder, out, figures=figures)
+    typer.echo(f"Written: {path} ({time.perf_counter() - started:.1f} s)", err=to_stderr)
+    return path
 
 
 def digest(folder: Folder) -> None:

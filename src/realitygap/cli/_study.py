@@ -12,6 +12,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._browser import show_page
+from ._results import written_report
 
 if TYPE_CHECKING:
     from realitygap.study import Progress, StudyResult
@@ -90,11 +91,7 @@ def run(
         raise typer.Exit(130) from None
     _print_result(result, as_json=as_json)
     if open_page:
-        from realitygap.report import write_report
-
-        path = write_report(result.folder)
-        typer.echo(f"Written: {path}", err=as_json)
-        show_page(path)
+        show_page(written_report(result.folder.path, to_stderr=as_json))
 
 
 def new_study(

@@ -23,7 +23,7 @@ from realitygap.report._effects import (
     Interval,
     a12,
     a12_of_effect,
-    bca_interval,
+    bca_intervals,
     detectable_effect,
     difference_of_means,
     effect_of_a12,
@@ -263,7 +263,9 @@ def compare_samples(
     for k, (name, other_name) in enumerate(names):
         one, other = values[name], values[other_name]
         share = a12(one, other)
-        interval = bca_interval(share_above, one, other, paired=False)
+        difference_interval, interval = bca_intervals(
+            [difference_of_means, share_above], one, other, paired=False
+        )
         if interval is None and floors[k] < ALPHA:
             interval = newcombe_interval(share, len(one), len(other))
         effect = detectable_effect(min(len(one), len(other)), paired=False)
@@ -274,7 +276,7 @@ def compare_samples(
                 n=len(one),
                 n_other=len(other),
                 difference=float(one.mean() - other.mean()),
-                difference_interval=bca_interval(difference_of_means, one, other, paired=False),
+                difference_interval=difference_interval,
                 a12=share,
                 a12_interval=interval,
                 p=float(raw[k]),

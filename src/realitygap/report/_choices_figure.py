@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -127,11 +127,14 @@ def draw_choices(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> 
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: no condition of the study names a baseline.
     """
-    return draw_tally_choices(read_tally(folder), width=width)
+    (drawing,) = draw_tally_choices(read_tally(folder), widths=[width])
+    return drawing
 
 
-def draw_tally_choices(tally: Tally, *, width: float = WIDE, name: str = "choices") -> Drawing:
-    """As `draw_choices`, of what was read already; `name` is what the ids in the drawing begin with.
+def draw_tally_choices(
+    tally: Tally, *, widths: Sequence[float] = (WIDE,), name: str = "choices"
+) -> list[Drawing]:
+    """As `draw_choices`, of what was read already, in several widths; ids begin with `name`.
 
     Raises:
         ValueError: no condition of the study names a baseline.
@@ -139,10 +142,13 @@ def draw_tally_choices(tally: Tally, *, width: float = WIDE, name: str = "choice
     groups = compare_tally_choices(tally)
     if not groups:
         raise ValueError("No condition of this study names a baseline, so there are no choices to compare.")
-    caption = _caption(tally, groups)
+    caption, alt = _caption(tally, groups), _alt(groups)
+    drawings = []
     with house_style():
-        figure = _draw(groups, width)
-        return Drawing(to_svg(figure, name, _alt(groups)), caption, _alt(groups), figure)
+        for index, width in enumerate(widths):
+            figure = _draw(groups, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
 
 
 # --- drawing ------------------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from realitygap.report._effects import (
     RESAMPLES,
     Interval,
     a12,
-    bca_interval,
+    bca_intervals,
     detectable_effect,
     difference_of_means,
     newcombe_interval,
@@ -259,7 +259,9 @@ def _comparison(
 ) -> Comparison:
     n, m, paired = len(samples.one), len(samples.other), samples.paired
     share = a12(samples.one, samples.other)
-    interval = bca_interval(share_above, samples.one, samples.other, paired=paired)
+    difference_interval, interval = bca_intervals(
+        [difference_of_means, share_above], samples.one, samples.other, paired=paired
+    )
     spread = samples.spread()
     # Bonferroni's level is the strictest that Holm can ask for
     alpha = ALPHA / n_comparisons
@@ -275,7 +277,7 @@ def _comparison(
         n_other=m,
         paired=paired,
         difference=difference,
-        difference_interval=bca_interval(difference_of_means, samples.one, samples.other, paired=paired),
+        difference_interval=difference_interval,
         a12=share,
         a12_interval=interval
         if interval or samples.smallest_p() >= ALPHA

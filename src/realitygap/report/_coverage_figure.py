@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -73,13 +73,18 @@ def draw_coverage(
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return draw_tally_coverage(read_tally(folder), points=points, width=width)
+    (drawing,) = draw_tally_coverage(read_tally(folder), points=points, widths=[width])
+    return drawing
 
 
 def draw_tally_coverage(
-    tally: Tally, *, points: Points | None = None, width: float = WIDE, name: str = "coverage"
-) -> Drawing:
-    """As `draw_coverage`, of what was read already; `name` is what the ids in the drawing begin with."""
+    tally: Tally,
+    *,
+    points: Points | None = None,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "coverage",
+) -> list[Drawing]:
+    """As `draw_coverage`, of what was read already, in several widths; ids begin with `name`."""
     points = points or _points_of(tally.description)
     panels = [_panel(tally, condition, points) for condition in tally.conditions]
     caption = _caption(tally, panels, points)
@@ -87,9 +92,12 @@ def draw_tally_coverage(
         f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the "
         "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
+    drawings = []
     with house_style():
-        figure = _draw(panels, width)
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        for index, width in enumerate(widths):
+            figure = _draw(panels, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
 
 
 def _points_of(description: Mapping[str, Any]) -> Points:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import special
 
+from realitygap.kernels._resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
 from realitygap.report._statistics import CONFIDENCE
 
@@ -144,24 +146,43 @@ def bca_interval(
     `scipy.stats.bootstrap`, which draws the same resamples. Differs: they are kept as counts, and what
     is equal but for rounding counts as a tie.
     """
+    (interval,) = bca_intervals(
+        [statistic], one, other, paired=paired, confidence=confidence, n_resamples=n_resamples
+    )
+    return interval
+
+
+def bca_intervals(
+    statistics: Sequence[Statistic],
+    one: Values,
+    other: Values,
+    *,
+    paired: bool,
+    confidence: float = CONFIDENCE,
+    n_resamples: int = RESAMPLES,
+) -> list[Interval | None]:
+    """As `bca_interval`, of several effects of the same samples, which are resampled once."""
     if paired and len(one) != len(other):
         raise ValueError(f"Pairs need samples of one size, these have {len(one)} and {len(other)} values.")
     if min(len(one), len(other)) < BCA_SMALLEST_N:
-        return None
+        return [None] * len(statistics)
     values, codes = np.unique(np.concatenate([one, other]), return_inverse=True)
-    codes_one, codes_other = codes[: len(one)], codes[len(one) :]
-    counts = [np.bincount(part, minlength=len(values)).astype(float) for part in (codes_one, codes_other)]
-    observed = float(statistic(values, counts[0][None], counts[1][None])[0])
-    resampled = _resample(statistic, values, codes_one, codes_other, paired, n_resamples)
+    samples = _Samples(values, codes[: len(one)], codes[len(one) :], paired)
+    resampled = samples.resample(statistics, n_resamples)
+    return [_bca(*each, samples, confidence) for each in zip(statistics, resampled, strict=True)]
+
+
+def _bca(statistic: Statistic, resampled: Values, samples: _Samples, confidence: float) -> Interval | None:
     if not np.isfinite(resampled).all() or np.ptp(resampled) == 0:
         return None
+    observed = float(statistic(samples.values, *(counts[None] for counts in samples.counts))[0])
     ties = 1e-12 * max(1.0, abs(observed))
-    below = ((resampled < observed - ties).sum() + (resampled <= observed + ties).sum()) / (2 * n_resamples)
-    bias = stats.norm.ppf(below)
-    skewness = _acceleration(statistic, values, codes_one, codes_other, counts, paired)
+    below = ((resampled < observed - ties).mean() + (resampled <= observed + ties).mean()) / 2
+    bias = special.ndtri(below)
+    skewness = samples.acceleration(statistic)
     tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
-    shifted = bias + stats.norm.ppf(tails)
-    bounds = np.quantile(resampled, stats.norm.cdf(bias + shifted / (1 - skewness * shifted)))
+    shifted = bias + special.ndtri(tails)
+    bounds = np.quantile(resampled, special.ndtr(bias + shifted / (1 - skewness * shifted)))
     if not np.isfinite(bounds).all():
         return None
     return Interval(float(bounds[0]), float(bounds[1]), "BCa")
@@ -176,58 +197,83 @@ def _first_mean(values: Values, one: Values, _: Values) -> Values:
     return np.asarray(one @ values / one.sum(axis=1))
 
 
-def _counts(codes: npt.NDArray[np.int64], n_values: int) -> Values:
-    """(b, u) how often each value occurs in each row of (b, n) codes."""
-    b = len(codes)
-    places = codes + n_values * np.arange(b)[:, None]
-    return np.bincount(places.ravel(), minlength=b * n_values).reshape(b, n_values).astype(float)
+@dataclass(frozen=True)
+class _Samples:
+    """Two samples as places in their common values.
+
+    Attributes:
+        values: (u,) in ascending order.
+        one: (n,) the place of each of the first sample's values, and
+        other: (m,) of the second's.
+        paired: whether they are drawn together.
+    """
+
+    values: Values
+    one: npt.NDArray[np.int64]
+    other: npt.NDArray[np.int64]
+    paired: bool
+
+    @property
+    def counts(self) -> tuple[Values, Values]:
+        """(u,) how often each value occurs in the one sample, and in the other."""
+        one, other = (np.bincount(part, minlength=len(self.values)) for part in (self.one, self.other))
+        return one.astype(float), other.astype(float)
+
+    def resample(self, statistics: Sequence[Statistic], n_resamples: int) -> list[Values]:
+        """(b,) each statistic of the resamples."""
+        most = max(len(self.one), len(self.other), len(self.values))
+        block = max(1, _BLOCK // most)
+        draw = _draw_once if n_resamples <= block else _draw
+        found: list[list[Values]] = [[] for _ in statistics]
+        for rows, others in draw(len(self.one), None if self.paired else len(self.other), n_resamples, block):
+            counts = (
+                _counts(rows, self.one, len(self.values)),
+                _counts(others, self.other, len(self.values)),
+            )
+            for parts, statistic in zip(found, statistics, strict=True):
+                parts.append(statistic(self.values, *counts))
+        return [np.concatenate(parts) for parts in found]
+
+    def acceleration(self, statistic: Statistic) -> float:
+        """Efron's acceleration, from leaving out one value (or pair) at a time."""
+        one, other, counts = self.one, self.other, self.counts
+        drops_one, drops_other = (each - np.eye(len(self.values)) for each in counts)
+        if self.paired:
+            pairs, inverse = np.unique(np.stack([one, other]), axis=1, return_inverse=True)
+            left_out = statistic(self.values, drops_one[pairs[0]], drops_other[pairs[1]])[inverse.ravel()]
+            influences = [(len(one) - 1) * (left_out.mean() - left_out)]
+        else:
+            first = statistic(self.values, drops_one[one], np.repeat(counts[1][None], len(one), 0))
+            second = statistic(self.values, np.repeat(counts[0][None], len(other), 0), drops_other[other])
+            influences = [(len(part) - 1) * (part.mean() - part) for part in (first, second)]
+        cubes = sum(float((part**3).sum()) / len(part) ** 3 for part in influences)
+        squares = sum(float((part**2).sum()) / len(part) ** 2 for part in influences)
+        return cubes / (6 * squares**1.5) if squares > 0 else 0.0
 
 
-def _draw(rng: np.random.Generator, codes: npt.NDArray[np.int64], b: int) -> npt.NDArray[np.int64]:
-    return np.asarray(rng.integers(0, len(codes), (b, len(codes))))
+def _counts(draws: npt.NDArray[np.int64], places: npt.NDArray[np.int64], n_values: int) -> Values:
+    """(b, u) how often each value occurs in each of (b, n) draws from a sample of (m,) places."""
+    counts = np.zeros((len(draws), n_values))
+    count_drawn(draws, places, counts)
+    return counts
 
 
-def _resample(
-    statistic: Statistic,
-    values: Values,
-    one: npt.NDArray[np.int64],
-    other: npt.NDArray[np.int64],
-    paired: bool,
-    n_resamples: int,
-) -> Values:
+_Draws = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
+
+
+def _draw(n: int, m: int | None, n_resamples: int, block: int) -> Iterator[_Draws]:
+    """Which of n values are in each resample, (b, n), and which of m others, in blocks; m None: the same."""
     rng = np.random.default_rng(SEED)
-    block = max(1, _BLOCK // max(len(one), len(other), len(values)))
-    found = []
     for first in range(0, n_resamples, block):
         b = min(block, n_resamples - first)
-        rows = _draw(rng, one, b)
-        others = rows if paired else _draw(rng, other, b)
-        found.append(statistic(values, _counts(one[rows], len(values)), _counts(other[others], len(values))))
-    return np.concatenate(found)
+        rows = rng.integers(0, n, (b, n))
+        yield rows, rows if m is None else rng.integers(0, m, (b, m))
 
 
-def _acceleration(
-    statistic: Statistic,
-    values: Values,
-    one: npt.NDArray[np.int64],
-    other: npt.NDArray[np.int64],
-    counts: list[Values],
-    paired: bool,
-) -> float:
-    """Efron's acceleration, from leaving out one value (or pair) at a time."""
-    drops_one = counts[0] - np.eye(len(values))
-    drops_other = counts[1] - np.eye(len(values))
-    if paired:
-        pairs, inverse = np.unique(np.stack([one, other]), axis=1, return_inverse=True)
-        left_out = statistic(values, drops_one[pairs[0]], drops_other[pairs[1]])[inverse.ravel()]
-        influences = [(len(one) - 1) * (left_out.mean() - left_out)]
-    else:
-        first = statistic(values, drops_one[one], np.repeat(counts[1][None], len(one), 0))
-        second = statistic(values, np.repeat(counts[0][None], len(other), 0), drops_other[other])
-        influences = [(len(part) - 1) * (part.mean() - part) for part in (first, second)]
-    cubes = sum(float((part**3).sum()) / len(part) ** 3 for part in influences)
-    squares = sum(float((part**2).sum()) / len(part) ** 2 for part in influences)
-    return cubes / (6 * squares**1.5) if squares > 0 else 0.0
+@functools.lru_cache(maxsize=2)
+def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Draws]:
+    """As `_draw`, kept for the next samples of these sizes."""
+    return list(_draw(n, m, n_resamples, block))
 
 
 def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDENCE) -> Interval:
@@ -241,7 +287,7 @@ def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDEN
 
     Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
     """
-    z = stats.norm.ppf((1 + confidence) / 2)
+    z = special.ndtri((1 + confidence) / 2)
     others = (n + m) / 2 - 1
 
     def excess(at: float) -> float:
@@ -249,8 +295,8 @@ def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDEN
         return float((at - share) ** 2 - z * z * variance)
 
     # at 0 and 1 the share itself is a root too, which is not the one that is meant
-    low = 0.0 if share <= 0 else optimize.brentq(excess, 0.0, min(share, 1 - 1e-9))
-    high = 1.0 if share >= 1 else optimize.brentq(excess, max(share, 1e-9), 1.0)
+    low = 0.0 if share <= 0 else _root(excess, 0.0, min(share, 1 - 1e-9))
+    high = 1.0 if share >= 1 else _root(excess, max(share, 1e-9), 1.0)
     return Interval(float(low), float(high), "Newcombe")
 
 
@@ -283,6 +329,7 @@ def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA, power: flo
     return high
 
 
+@functools.lru_cache
 def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> float | None:
     """The smallest difference [standard deviations] that n runs a condition find so often; None below 2.
 
@@ -293,27 +340,38 @@ def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: floa
     high = 1.0
     while _power(high, n, paired, alpha) < power:
         high *= 2
-    return float(optimize.brentq(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high))
+    return _root(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high)
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Where a function changes its sign between two places, to the last bit or so, by halving."""
+    sign = function(low) > 0
+    while low < (middle := (low + high) / 2) < high:
+        if (function(middle) > 0) == sign:
+            low = middle
+        else:
+            high = middle
+    return middle
 
 
 def _power(effect: float, n: int, paired: bool, alpha: float) -> float:
     freedom = n - 1 if paired else 2 * n - 2
     center = abs(effect) * math.sqrt(n if paired else n / 2)
-    critical = float(stats.t.ppf(1 - alpha / 2, freedom))
-    found = float(stats.nct.sf(critical, freedom, center))
+    critical = float(special.stdtrit(freedom, 1 - alpha / 2))
+    found = 1.0 - float(special.nctdtr(freedom, center, critical))
     if not math.isfinite(found):
         # so far out the noncentral distribution cannot be computed, and a normal one will do
-        found = float(stats.norm.sf(critical - center))
+        found = float(special.ndtr(center - critical))
     # a difference found with the wrong sign; beyond 3 it is less than one in 10 million
-    wrong = float(stats.nct.cdf(-critical, freedom, center)) if center < 3 else 0.0
+    wrong = float(special.nctdtr(freedom, center, -critical)) if center < 3 else 0.0
     return found + (wrong if math.isfinite(wrong) else 0.0)
 
 
 def effect_of_a12(share: float) -> float:
     """The difference of means [standard deviations] of two normal conditions with this A12."""
-    return float(math.sqrt(2) * stats.norm.ppf(share))
+    return float(math.sqrt(2) * special.ndtri(share))
 
 
 def a12_of_effect(effect: float) -> float:
     """A12 of two normal conditions whose means differ by so many standard deviations."""
-    return float(stats.norm.cdf(effect / math.sqrt(2)))
+    return float(special.ndtr(effect / math.sqrt(2)))

@@ -283,7 +283,7 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
     for cell in sorted({cell for path in paths for cell in path.cells}):
         row, column = divmod(cell, grid.columns)
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        axes.add_patch(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     outline = body_outline(body, arena.start)
     axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
     axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)

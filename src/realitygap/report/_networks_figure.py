@@ -76,7 +76,7 @@ def draw_tally_networks(
     ]
     for letter, structure in zip("ABC", group.found[:_N_COMMON], strict=False):
         share = f"{100 * structure.n / group.n_networks:.1f} % of networks"
-        pictures.append((f"structure {letter}", share, _picture(tally, structure.example)))
+        pictures.append((f"structure {letter}", share, _picture(tally, _row_of(tally, structure.example))))
     caption = _caption(tally, condition, group)
     alt = "Networks. " + " ".join(f"{title}: {picture.description}" for title, _, picture in pictures)
     drawings = []
@@ -122,6 +122,12 @@ def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, 
     rows = tally.folder.read(condition, [replicate])
     last = rows.filter(pl.col("generation") == rows["generation"].max())
     return last.row(int(last[f"coverage_{tally.measure}"].arg_max() or 0), named=True)
+
+
+def _row_of(tally: Tally, individual: Mapping[str, Any]) -> Mapping[str, Any]:
+    rows = tally.folder.read(individual["condition"], [individual["replicate"]])
+    place = [rows[key] == individual[key] for key in ("generation", "individual")]
+    return rows.row(int((place[0] & place[1]).arg_max() or 0), named=True)
 
 
 def _picture(tally: Tally, row: Mapping[str, Any]) -> Picture:

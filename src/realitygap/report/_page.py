@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -89,7 +92,7 @@ def write_report(
     """
     if out is not None:
         _check_out(Path(out))
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _uncollected():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
         tally = read_tally(folder)
@@ -101,6 +104,18 @@ def write_report(
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
     write_whole(path, page.encode("utf-8", "replace"))
     return path
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without looking for garbage: figures are many small objects, and all of them live as long as the page."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _check_out(path: Path) -> None:
@@ -127,6 +142,14 @@ def _render(content: Mapping[str, Any]) -> str:
 
 def _content(tally: Tally) -> dict[str, Any]:
     """Everything the template shows."""
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        digest = beside.submit(tally.folder.digest)
+        statistics = beside.submit(statistics_content, tally)
+        shown = _words_and_figures(tally)
+        return shown | {"digest": digest.result(), "statistics": statistics.result()}
+
+
+def _words_and_figures(tally: Tally) -> dict[str, Any]:
     summary = summarize_tally(tally)
     description = tally.description
     return {
@@ -138,7 +161,6 @@ def _content(tally: Tally) -> dict[str, Any]:
         "banners": _banners(tally),
         "facts": _facts(tally),
         "labels": _labels(tally),
-        "digest": tally.folder.digest(),
         "results_version": tally.folder.results_version,
         "version": __version__,
         "software": description.get("software") or "unknown",
@@ -146,7 +168,6 @@ def _content(tally: Tally) -> dict[str, Any]:
         "settings": settings_tables(tally.conditions),
         "summary": summary.to_dicts(),
         "measure": tally.measure,
-        "statistics": statistics_content(tally),
         "audit": paper_audit_content(tally),
         "note": description.get("note") or "",
         "published_sources": _published_sources(tally),
@@ -177,11 +198,7 @@ def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> _Figure
 
 
 def _coverage_figure(tally: Tally) -> _FigureOnPage:
-    wide, narrow = (
-        draw_tally_coverage(tally, width=width, name=name)
-        for width, name in ((WIDE, "coverage-wide"), (NARROW, "coverage-narrow"))
-    )
-    return _on_page("figure-4", "Figure 4", wide, narrow)
+    return _on_page("figure-4", "Figure 4", *draw_tally_coverage(tally, widths=(WIDE, NARROW)))
 
 
 def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
@@ -192,17 +209,14 @@ def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
         number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
         anchor = f"figure-6-{index}"
         try:
-            wide, narrow = (
-                draw_tally_paths(tally, condition, width=width, name=f"{anchor}-{name}")
-                for width, name in ((WIDE, "wide"), (NARROW, "narrow"))
-            )
+            drawn = draw_tally_paths(tally, condition, widths=(WIDE, NARROW), name=anchor)
         except RecordVersionError:
             found.append(
                 f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
             )
         else:
-            found.append(_on_page(anchor, number, wide, narrow))
+            found.append(_on_page(anchor, number, *drawn))
     return found
 
 
@@ -220,11 +234,7 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
 def _choices_figure(tally: Tally) -> _FigureOnPage | None:
     if not compare_tally_choices(tally):
         return None
-    wide, narrow = (
-        draw_tally_choices(tally, width=width, name=name)
-        for width, name in ((WIDE, "choices-wide"), (NARROW, "choices-narrow"))
-    )
-    return _on_page("figure-10", "Figure 10", wide, narrow)
+    return _on_page("figure-10", "Figure 10", *draw_tally_choices(tally, widths=(WIDE, NARROW)))
 
 
 # --- words --------------------------------------------------------------------------------------------------

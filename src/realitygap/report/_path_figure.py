@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -77,13 +77,20 @@ def draw_paths(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    return draw_tally_paths(tally, condition or tally.runs["condition"][0], replicate, width=width)
+    name = condition or tally.runs["condition"][0]
+    (drawing,) = draw_tally_paths(tally, name, replicate, widths=[width])
+    return drawing
 
 
 def draw_tally_paths(
-    tally: Tally, condition: str, replicate: int | None = None, *, width: float = WIDE, name: str = "paths"
-) -> Drawing:
-    """As `draw_paths`, of what was read already; `name` is what the ids in the drawing begin with.
+    tally: Tally,
+    condition: str,
+    replicate: int | None = None,
+    *,
+    widths: Sequence[float] = (WIDE,),
+    name: str = "paths",
+) -> list[Drawing]:
+    """As `draw_paths`, of what was read already, in several widths; ids begin with `name`.
 
     Raises:
         ValueError: there is no such condition or run.
@@ -100,9 +107,13 @@ def draw_tally_paths(
         + ", ".join(f"generation {path.generation} {path.coverage:.3f}" for path in paths)
         + "."
     )
+    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    drawings = []
     with house_style():
-        figure = _draw(paths, resolved.arena.arena(), resolved.jyro.body, label_of(described), width)
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        for index, width in enumerate(widths):
+            figure = _draw(paths, arena, body, label, width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:
@@ -229,7 +240,7 @@ def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
     for cell in path.cells:
         row, column = divmod(cell, grid.columns)
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        axes.add_patch(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     outline = body_outline(body, arena.start)
     axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
     axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import polars as pl
+from scipy import special
 
 from realitygap.evolution import largest_cell_distance
 from realitygap.records import ResultsFolder
@@ -18,7 +20,7 @@ from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
 from realitygap.report._effects import (
     Interval,
-    bca_interval,
+    bca_intervals,
     mean_interval,
     ratio_of_robust_spreads,
     ratio_of_spreads,
@@ -50,8 +52,14 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """Its bounds, at least 95 %."""
-        bounds = stats.binomtest(self.count, self.n).proportion_ci(CONFIDENCE, method="exact")
-        return float(bounds.low), float(bounds.high)
+        beyond = (1 - CONFIDENCE) / 2
+        low = special.betaincinv(self.count, self.n - self.count + 1, beyond) if self.count > 0 else 0.0
+        high = (
+            special.betaincinv(self.count + 1, self.n - self.count, 1 - beyond)
+            if self.count < self.n
+            else 1.0
+        )
+        return float(low), float(high)
 
 
 # --- plateaus -----------------------------------------------------------------------------------------------
@@ -136,9 +144,8 @@ def _spread(tally: Tally, condition: str, reference: str) -> Spread:
     if reference != condition and min(len(samples.one), len(samples.other)) > 1:
         ratio = _ratio(float(samples.one.std(ddof=1)), float(samples.other.std(ddof=1)))
         robust_ratio = _ratio(robust_spread(samples.one), robust_spread(samples.other))
-        ratio_interval, robust_interval = (
-            bca_interval(statistic, samples.one, samples.other, paired=samples.paired)
-            for statistic in (ratio_of_spreads, ratio_of_robust_spreads)
+        ratio_interval, robust_interval = bca_intervals(
+            [ratio_of_spreads, ratio_of_robust_spreads], samples.one, samples.other, paired=samples.paired
         )
     return Spread(
         condition,
@@ -212,22 +219,32 @@ def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
     columns, lines = _grid(condition)
     points = np.stack(np.divmod(np.arange(columns * lines), lines), axis=1).astype(float)
     rng = np.random.default_rng(SEED)
-    sorted_cells, jaccard, most = [], [], 0
-    for part in rows.partition_by("replicate", maintain_order=True):
-        behaviors = part["cells"]
-        if len(behaviors) > MOST_BEHAVIORS:
-            behaviors = behaviors.gather(np.sort(rng.choice(len(behaviors), MOST_BEHAVIORS, replace=False)))
-        most = max(most, len(behaviors))
-        if len(behaviors) < 2:
-            continue
-        visited = np.zeros((len(behaviors), columns * lines), np.bool_)
-        lengths = behaviors.list.len().to_numpy()
-        row, column = np.divmod(behaviors.explode().drop_nulls().to_numpy().astype(np.int64), columns)
-        # cells are numbered row by row, and sorted by x, then y
-        visited[np.repeat(np.arange(len(behaviors)), lengths), column * lines + row] = True
-        sorted_cells.append(mean_sorted_distance(visited, points, largest_cell_distance(columns, lines)))
-        jaccard.append(mean_jaccard_distance(visited))
-    return Variety(name, np.array(sorted_cells), np.array(jaccard), most)
+    lengths = rows["replicate"].rle().struct.field("len").to_list()
+    chosen = [
+        first
+        + (np.sort(rng.choice(n, MOST_BEHAVIORS, replace=False)) if n > MOST_BEHAVIORS else np.arange(n))
+        for first, n in zip(itertools.accumulate(lengths, initial=0), lengths, strict=False)
+    ]
+    visited = _visited(rows["cells"].gather(np.concatenate(chosen)), columns, lines)
+    behaviors = np.split(visited, np.cumsum([len(each) for each in chosen])[:-1])
+    compared = [each for each in behaviors if len(each) > 1]
+    padding = largest_cell_distance(columns, lines)
+    return Variety(
+        name,
+        np.array([mean_sorted_distance(each, points, padding) for each in compared]),
+        np.array([mean_jaccard_distance(each) for each in compared]),
+        max(map(len, behaviors)),
+    )
+
+
+def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_]:
+    """(n, c) which cells each of n behaviors visits, in the order of the paper: by x, then y."""
+    visited = np.zeros((len(cells), columns * lines), np.bool_)
+    # cells are numbered row by row
+    row, column = np.divmod(cells.explode().drop_nulls().to_numpy().astype(np.int64), columns)
+    behavior = np.repeat(np.arange(len(cells)), cells.list.len().to_numpy())
+    visited[behavior, column * lines + row] = True
+    return visited
 
 
 def _grid(condition: Mapping[str, Any]) -> tuple[int, int]:

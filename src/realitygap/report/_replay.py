@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any
@@ -253,13 +253,14 @@ def pack_trial(
 
 def _differences(column: npt.NDArray[np.int64]) -> bytes:
     differences = np.diff(column, prepend=0)
-    return bytes(_sevens(np.where(differences < 0, -2 * differences - 1, 2 * differences).tolist()))
+    return _sevens(np.where(differences < 0, -2 * differences - 1, 2 * differences))
 
 
-def _sevens(numbers: Iterable[int]) -> Iterable[int]:
+def _sevens(numbers: npt.NDArray[np.int64]) -> bytes:
     """Numbers >= 0 as groups of 7 bits, the lowest first; all but the last of a number have the 8th bit set."""
-    for number in numbers:
-        while number > 127:
-            yield number & 127 | 128
-            number >>= 7
-        yield number
+    n_groups = max(1, -(-int(numbers.max(initial=0)).bit_length() // 7))
+    left = numbers[:, None] >> 7 * np.arange(n_groups + 1)
+    groups = left[:, :-1] & 127 | np.where(left[:, 1:] > 0, 128, 0)
+    there = left[:, :-1] > 0
+    there[:, 0] = True
+    return groups[there].astype(np.uint8).tobytes()

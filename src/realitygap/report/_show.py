@@ -80,7 +80,8 @@ def save_view(
         )
     if generation is None and individual is None and ending != ".gif":
         name = condition or str(tally.runs["condition"][0])
-        return _save(draw_tally_paths(tally, name, replicate), out, f"A run of {name}")
+        (drawing,) = draw_tally_paths(tally, name, replicate)
+        return _save(drawing, out, f"A run of {name}")
     trial = choose_trial(tally, condition, replicate, generation, individual)
     if ending == ".gif":
         return animate_trial(trial, out)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 CONFIDENCE = 0.95
 """The least that an interval of ours covers, unless it says otherwise."""
@@ -55,6 +56,7 @@ class Quartiles:
     q75: float
 
 
+@functools.lru_cache
 def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | None:
     """The innermost pair of symmetric ranks whose interval covers the median with at least `confidence`.
 
@@ -81,12 +83,13 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     if n == 0:
         return None
     may_miss = (1.0 - confidence) / 2.0
-    # the largest rank r with P(X <= r - 1) <= may_miss; ppf gives the smallest k with P(X <= k) >= may_miss
-    k = int(stats.binom.ppf(may_miss, n, 0.5))
-    lower = k + 1 if stats.binom.cdf(k, n, 0.5) <= may_miss else k
+    # the largest rank r with P(X <= r - 1) <= may_miss; P(X <= k) by the incomplete beta function
+    k = np.arange((n + 1) // 2)
+    misses = special.betainc(n - k, k + 1, 0.5)
+    lower = int(np.searchsorted(misses, may_miss, "right"))
     if lower < 1:
         return None
-    return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(stats.binom.cdf(lower - 1, n, 0.5)))
+    return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(misses[lower - 1]))
 
 
 def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> MedianInterval | None:

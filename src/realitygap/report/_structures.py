@@ -32,7 +32,7 @@ class Structure:
         links: enabled links, in order.
         n_hidden: hidden nodes that a link reaches.
         by_condition: how many networks of the last generation have it, by condition.
-        example: the row of the one of highest coverage: condition, replicate, generation, individual, genome.
+        example: which is the one of highest coverage: condition, replicate, generation, individual.
     """
 
     inputs: tuple[str, ...]
@@ -93,28 +93,45 @@ def selection_of(condition: Mapping[str, Any]) -> str:
 
 def count_structures(tally: Tally) -> list[Structures]:
     """How often each structure occurs among the networks of each run's last generation, by selection."""
-    rows = _last_generations(tally)
+    genes = _count_genes(tally)
     groups: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for condition in tally.conditions:
         selection = selection_of(condition)
         groups.setdefault((selection, _input_names(condition)), []).append(condition["name"])
     found = []
     for (selection, inputs), conditions in groups.items():
-        there = [name for name in conditions if name in rows]
+        there = [name for name in conditions if name in genes]
         if there:
-            found.append(_count(selection, inputs, {name: rows[name] for name in there}))
+            found.append(_count(tally, selection, inputs, {name: genes[name] for name in there}))
     return found
 
 
-def _last_generations(tally: Tally) -> dict[str, pl.DataFrame]:
-    """The rows of each condition's last generation."""
+_ROW = ("replicate", "generation", "individual")
+
+
+def _count_genes(tally: Tally) -> dict[str, pl.DataFrame]:
+    """The kinds of genes that networks of a condition's last generations have, those of each chunk apart.
+
+    A row for each: `source`, `target` and `enabled` of the genes, `n` networks, and of the one of highest
+    coverage, the first of several alike, `coverage`, `replicate`, `generation` and `individual`, which order
+    the rows.
+    """
     measure = f"coverage_{tally.measure}"
-    columns = ["condition", "replicate", "generation", "individual", measure, "genome"]
     parts: dict[str, list[pl.DataFrame]] = {}
-    for frame in tally.folder.frames(columns=columns):
-        last = frame.filter(pl.col("generation") == pl.col("generation").max().over("replicate"))
-        parts.setdefault(frame["condition"][0], []).append(last.rename({measure: "coverage"}))
-    return {name: pl.concat(frames) for name, frames in parts.items()}
+    best = pl.col("coverage").arg_max()
+    for frame in tally.folder.frames(columns=["condition", *_ROW, measure, "genome"]):
+        kinds = (
+            frame.filter(pl.col("generation") == pl.col("generation").max().over("replicate"))
+            .select(
+                pl.col("genome").struct.field("source", "target", "enabled"),
+                pl.col(measure).alias("coverage"),
+                *_ROW,
+            )
+            .group_by("source", "target", "enabled", maintain_order=True)
+            .agg(pl.len().alias("n"), pl.col("coverage", *_ROW).get(best))
+        )
+        parts.setdefault(frame["condition"][0], []).append(kinds)
+    return {name: pl.concat(frames).sort(_ROW) for name, frames in parts.items()}
 
 
 def _input_names(condition: Mapping[str, Any]) -> tuple[str, ...]:
@@ -124,40 +141,32 @@ def _input_names(condition: Mapping[str, Any]) -> tuple[str, ...]:
     return ("obstacle", "stall", "time", *(("bias",) if with_bias else ()))
 
 
-def _count(selection: str, inputs: tuple[str, ...], rows: Mapping[str, pl.DataFrame]) -> Structures:
+def _count(
+    tally: Tally, selection: str, inputs: tuple[str, ...], genes: Mapping[str, pl.DataFrame]
+) -> Structures:
     outputs = ("move", "turn")
     names = dict(enumerate([*inputs, *outputs]))
     counts: dict[Links, Counter[str]] = {}
     examples: dict[Links, dict[str, Any]] = {}
     known: dict[tuple[tuple[int, int], ...], Links] = {}
-    for condition, frame in rows.items():
-        genome = frame["genome"].struct
-        genes = zip(
-            genome.field("source").to_list(),
-            genome.field("target").to_list(),
-            genome.field("enabled").to_list(),
-            frame["coverage"].to_list(),
-            strict=True,
-        )
-        for index, (sources, targets, enabled, coverage) in enumerate(genes):
-            key = tuple(
-                (source, target) for source, target, on in zip(sources, targets, enabled, strict=True) if on
-            )
+    for condition, kinds in genes.items():
+        for kind in kinds.iter_rows(named=True):
+            gene = zip(kind["source"], kind["target"], kind["enabled"], strict=True)
+            key = tuple((source, target) for source, target, on in gene if on)
             links = known.get(key)
             if links is None:
                 links = known.setdefault(key, _canonical(key, names))
-            counts.setdefault(links, Counter())[condition] += 1
-            if links not in examples or coverage > examples[links]["coverage"]:
-                examples[links] = {"coverage": coverage, "condition": condition, "index": index}
+            counts.setdefault(links, Counter())[condition] += kind["n"]
+            if links not in examples or kind["coverage"] > examples[links]["coverage"]:
+                examples[links] = {"condition": condition, **kind}
     found = []
     for links, by_condition in counts.items():
-        example = examples[links]
-        row = rows[example["condition"]].row(example["index"], named=True)
         n_hidden = len({name for link in links for name in link if name not in names.values()})
-        found.append(Structure(inputs, outputs, links, n_hidden, dict(by_condition), row))
+        example = {key: examples[links][key] for key in ("condition", *_ROW)}
+        found.append(Structure(inputs, outputs, links, n_hidden, dict(by_condition), example))
     found.sort(key=lambda structure: (-structure.n, structure.n_hidden, structure.links))
-    n_networks = sum(frame.height for frame in rows.values())
-    return Structures(selection, inputs, tuple(rows), n_networks, tuple(found))
+    n_networks = sum(structure.n for structure in found)
+    return Structures(selection, inputs, tuple(genes), n_networks, tuple(found))
 
 
 def _canonical(links: tuple[tuple[int, int], ...], names: Mapping[int, str]) -> Links:

@@ -51,11 +51,11 @@ def retry_genomes(
     counts = np.zeros((3, len(genomes), n_repeats), np.int32)
     for key in {noise_key.key for noise_key in noise_keys}:
         rows = [row for row, noise_key in enumerate(noise_keys) if noise_key.key == key]
-        counters = [
-            counters_of(replace(noise_keys[row], repeat=repeat)) for row in rows for repeat in repeats
-        ]
-        if not counters:
+        if not n_repeats:
             continue
+        firsts = np.concatenate([counters_of(replace(noise_keys[row], repeat=0)) for row in rows])
+        counters = np.repeat(firsts, n_repeats, axis=0)
+        counters[:, 1] |= np.tile(np.array(repeats, np.uint32), len(rows))
         batch, _ = run_all(
             platform,
             arena,
@@ -63,7 +63,7 @@ def retry_genomes(
             np.repeat(np.array(rows, np.int32), n_repeats),
             noise,
             key,
-            np.concatenate(counters),
+            counters,
         )
         cells[rows] = batch.cells.reshape(len(rows), n_repeats, -1)
         counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))

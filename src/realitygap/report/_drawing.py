@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy.typing as npt
+
 from realitygap.drawing import FONT, Ink
 
 if TYPE_CHECKING:
@@ -125,6 +127,13 @@ def place_axes(figure: Figure, left: float, top: float, width: float, height: fl
         height / total_height,
     )
     return figure.add_axes(box)
+
+
+def draw_line(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, **style: Any) -> None:
+    """As `axes.plot`, where the limits of the axes are set: it does not measure what it draws."""
+    from matplotlib.lines import Line2D
+
+    axes.add_artist(Line2D(xs, ys, **style))
 
 
 def shorten(text: str, n_letters: int) -> str:

@@ -17,6 +17,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_line,
     house_style,
     new_figure,
     place_axes,
@@ -285,12 +286,23 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     outline = body_outline(body, arena.start)
-    axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
-    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
+    draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
+    draw_line(
+        axes,
+        [arena.start.x],
+        [arena.start.y],
+        marker="o",
+        linestyle="",
+        color=Ink.TEXT,
+        markersize=3.4,
+        zorder=7,
+    )
     drawn = [path for path in paths if path.poses is not None]
     for path in drawn:
         if path.poses is not None:
-            axes.plot(path.poses[:, 0], path.poses[:, 1], zorder=5, **_pen(path.individual, small=small))
+            draw_line(
+                axes, path.poses[:, 0], path.poses[:, 1], zorder=5, **_pen(path.individual, small=small)
+            )
     if drawn:
         _number_ends(axes, drawn, arena, small=small)
 
@@ -322,12 +334,16 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
     for path, end, place in zip(paths, ends, places, strict=True):
         color = _PENS[path.individual % len(_PENS)][0]
         if math.dist(end, place) * points > radius:
-            axes.plot([end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
-            axes.plot([end[0]], [end[1]], "o", color=color, markersize=2.0, zorder=8)
-        axes.plot(
+            draw_line(axes, [end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
+            draw_line(
+                axes, [end[0]], [end[1]], marker="o", linestyle="", color=color, markersize=2.0, zorder=8
+            )
+        draw_line(
+            axes,
             [place[0]],
             [place[1]],
-            "o",
+            marker="o",
+            linestyle="",
             color=color,
             markerfacecolor=Ink.GROUND,
             markersize=2 * radius - 0.8,

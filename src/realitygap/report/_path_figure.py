@@ -18,6 +18,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_line,
     house_style,
     new_figure,
     place_axes,
@@ -220,8 +221,9 @@ def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: 
         y = grid.y + row * grid.cell
         lines += [grid.x, right, math.nan]
         ends += [y, y, math.nan]
-    axes.plot(lines, ends, color=Ink.RULE, linewidth=0.4, zorder=1)
-    axes.plot(
+    draw_line(axes, lines, ends, color=Ink.RULE, linewidth=0.4, zorder=1)
+    draw_line(
+        axes,
         [grid.x, right, right, grid.x, grid.x],
         [grid.y, grid.y, top, top, grid.y],
         color=Ink.REACH,
@@ -229,7 +231,9 @@ def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: 
         zorder=2,
     )
     for x1, y1, x2, y2 in arena.walls:
-        axes.plot([x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3)
+        draw_line(
+            axes, [x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3
+        )
 
 
 def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
@@ -242,22 +246,47 @@ def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     outline = body_outline(body, arena.start)
-    axes.plot(outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
-    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=3.4, zorder=7)
+    draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
+    draw_line(
+        axes,
+        [arena.start.x],
+        [arena.start.y],
+        marker="o",
+        linestyle="",
+        color=Ink.TEXT,
+        markersize=3.4,
+        zorder=7,
+    )
     if path.poses is None or path.stalled is None:
         return
-    axes.plot(
-        path.poses[:, 0], path.poses[:, 1], color=Ink.OURS, linewidth=1.3, solid_joinstyle="round", zorder=5
+    draw_line(
+        axes,
+        path.poses[:, 0],
+        path.poses[:, 1],
+        color=Ink.OURS,
+        linewidth=1.3,
+        solid_joinstyle="round",
+        zorder=5,
     )
     blocked = np.unique(np.round(path.poses[path.stalled, :2], 6), axis=0)
     if len(blocked):
-        axes.plot(
-            blocked[:, 0], blocked[:, 1], "x", color=Ink.REACH, markersize=4.0, markeredgewidth=1.1, zorder=6
+        draw_line(
+            axes,
+            blocked[:, 0],
+            blocked[:, 1],
+            marker="x",
+            linestyle="",
+            color=Ink.REACH,
+            markersize=4.0,
+            markeredgewidth=1.1,
+            zorder=6,
         )
-    axes.plot(
+    draw_line(
+        axes,
         path.poses[-1:, 0],
         path.poses[-1:, 1],
-        "o",
+        marker="o",
+        linestyle="",
         color=Ink.OURS,
         markerfacecolor=Ink.GROUND,
         markersize=4.4,

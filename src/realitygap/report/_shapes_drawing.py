@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-from realitygap.report._drawing import new_figure, place_axes
+from realitygap.report._drawing import draw_line, new_figure, place_axes
 
 
 def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
@@ -30,10 +30,12 @@ def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
         if isinstance(shape, Line):
             _draw_line(axes, shape, order, scale)
         elif isinstance(shape, Disc):
-            axes.plot(
+            draw_line(
+                axes,
                 [shape.x],
                 [shape.y],
-                "o",
+                marker="o",
+                linestyle="",
                 color=shape.fill,
                 markeredgecolor=shape.color or shape.fill,
                 markeredgewidth=shape.width * scale if shape.color else 0.0,
@@ -64,7 +66,8 @@ def _draw_line(axes: Axes, line: Line, order: int, scale: float) -> None:
         axes.fill(points[:, 0], points[:, 1], color=line.fill, linewidth=0, zorder=2 + order, clip_on=False)
     if line.color is not None:
         dash = tuple(part / line.width for part in line.dash)
-        axes.plot(
+        draw_line(
+            axes,
             points[:, 0],
             points[:, 1],
             color=line.color,

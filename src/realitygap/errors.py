@@ -17,6 +17,10 @@ class StudyError(RealityGapError):
     """A study, or the file that describes it, cannot be carried out as written."""
 
 
+class OutgrownError(StudyError):
+    """A genome of a run grew beyond the largest that there is room for; nothing of the run was cut off and kept."""
+
+
 class RecordError(RealityGapError):
     """A folder of results holds something that cannot be trusted or cannot be written."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from realitygap.errors import RecordError, StudyError
+from realitygap.errors import OutgrownError, RecordError, StudyError
 from realitygap.records import ResultsFolder
 from realitygap.study import load_study, parse_study, run_study
 
@@ -269,3 +269,16 @@ def test_paper_study_is_carried_out_by_name(tmp_path):
     result = run_study("paper", tmp_path / "r", replicates=1)
     assert result.n_runs == 9
     assert result.folder.description["title"] == load_study("paper").about.title
+
+
+def test_a_genome_beyond_all_room_ends_the_sitting_and_is_in_the_log(tmp_path, monkeypatch):
+    monkeypatch.setattr("realitygap.runs._runs.MOST_GENES", 8)
+    monkeypatch.setattr("realitygap.runs._runs.MOST_HIDDEN", 1)
+    monkeypatch.setattr("realitygap.runs._runs.FIRST_ROOM", 1)
+    monkeypatch.setattr("realitygap.runs._runs.FIRST_HIDDEN_ROOM", 1)
+    grown = SMALL.replace("[platform", "[neat]\nadd_node = 0.9\n[platform", 1)
+    with pytest.raises(OutgrownError, match="grew beyond 8 connection genes"):
+        run_study(parse_study(grown, "small.toml"), tmp_path / "r")
+    events = ResultsFolder.open(tmp_path / "r").read_log()
+    assert [each["event"] for each in events] == ["start", "outgrown"]
+    assert "Lower add_node" in events[-1]["message"]

@@ -8,13 +8,17 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from realitygap.errors import whole_number
+from realitygap.errors import OutgrownError, whole_number
 from realitygap.kernels import _run
 from realitygap.kernels._run import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
 from realitygap.trials import jyro_rules, jyro_scene
 
 from ._condition import Condition
+
+# The largest genome that a run may grow.
+MOST_GENES = 16_384
+MOST_HIDDEN = 4_096
 
 # Room for genes beyond the first ones; doubled and run again where it was not enough.
 FIRST_ROOM = 16
@@ -85,6 +89,7 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
     Raises:
         TypeError: A number is not a whole one.
         ValueError: No run, or one beyond replicate 4,294,967,295, where random numbers would repeat.
+        OutgrownError: A genome grew beyond `MOST_GENES` or `MOST_HIDDEN`.
     """
     first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
     n_runs = whole_number("n_runs", n_runs, 1, MAX_REPLICATES - first_replicate)
@@ -106,7 +111,13 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
         key = np.uint64(condition.key)
         if _run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows):
             return rows
-        room, hidden_room = 2 * room, 2 * hidden_room
+        if room == MOST_GENES and hidden_room == MOST_HIDDEN:
+            raise OutgrownError(
+                f"Condition {condition.name!r}, replicates {first_replicate} to {first_replicate + n_runs - 1}: a "
+                f"genome grew beyond {MOST_GENES:,} connection genes or {MOST_HIDDEN:,} hidden nodes, the most there "
+                "is room for. Nothing of these runs is kept. Lower add_node and add_link, or run fewer generations."
+            )
+        room, hidden_room = min(2 * room, MOST_GENES), min(2 * hidden_room, MOST_HIDDEN)
 
 
 def prepare_kernels() -> None:

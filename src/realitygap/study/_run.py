@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import StudyError, whole_number
+from realitygap.errors import OutgrownError, StudyError, whole_number
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition
 
@@ -152,7 +152,11 @@ def _carry_out(
     if n_missing:
         executor.prepare()
         progress.begin()
-        executor.carry_out(folder, _chunks(study, missing, chunk), progress)
+        try:
+            executor.carry_out(folder, _chunks(study, missing, chunk), progress)
+        except OutgrownError as error:
+            folder.append_log({"event": "outgrown", "message": str(error)})
+            raise
     seconds = round(progress.seconds, 3)
     end = {"event": "end", "computed_runs": progress.n_computed, "seconds": seconds, **executor.facts()}
     folder.append_log(end)

@@ -85,6 +85,7 @@ def test_rules_are_the_settings_as_kernels_read_them() -> None:
 
     assert changed("activation", activation=["tanh", "sigmoid", "identity"]) == [TANH, SIGMOID, IDENTITY]
     assert changed("start_random", start_topology=["random", "full"]) == [True, False]
+    assert changed("start_layer", start_topology=["layer", "full"]) == [True, False]
     assert changed("one_structural_mutation", structural_mutations=["one", "independent"]) == [True, False]
     assert changed("disabled_bit_inherited", disabled_rule=["inherit", "coin"]) == [True, False]
     assert changed("equal_parents_mix", equal_parents=["mix", "smaller"]) == [True, False]

@@ -23,7 +23,7 @@ def random_settings(rng: random.Random) -> NeatSettings:
         "recurrent": [False, True],
         "node_bias": [False, True],
         "start_hidden": [0, 0, 1, 4],
-        "start_topology": ["full", "full", "random"],
+        "start_topology": ["full", "layer", "random"],
         "initial_weight": [0.0, 1.0, 2.5],
         "mutate_weights": [0.0, 0.8, 1.0],
         "replace_weight": [0.0, 0.1, 1.0],

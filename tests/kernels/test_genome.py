@@ -16,11 +16,13 @@ from tests.reference.philox import GENOME, Stream
 pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered")
 
 
-@pytest.mark.parametrize("start", [{}, {"start_hidden": 3}, {"start_hidden": 3, "start_topology": "random"}])
+@pytest.mark.parametrize(
+    "start", [{}] + [{"start_hidden": 3, "start_topology": name} for name in ("full", "layer", "random")]
+)
 @pytest.mark.parametrize("node_bias", [False, True])
 def test_first_genomes_equal_the_reference(node_bias: bool, start: dict[str, object]) -> None:
     neat = Neat(settings(node_bias=node_bias, initial_weight=1.5, **start), 4, 2, 3)
-    genomes = _genome.make_genomes(20, 2, 26, 3)
+    genomes = _genome.make_genomes(20, 2, 29, 3)
     _genome.first_genomes(genomes, rules_of(neat), np.uint64(2**63 + 5), np.int64(7), np.int64(3))
     for row in range(20):
         expected = neat.first_genome(Stream(2**63 + 5, 7, 3, row, GENOME))

@@ -115,15 +115,17 @@ class Neat:
 
     def history(self) -> History:
         hidden = self.settings.start_hidden
-        n_genes = self.n_inputs * self.n_outputs + hidden * (self.n_inputs + self.n_outputs)
-        return History(n_genes, self.first_hidden + hidden)
+        return History(len(self.first_links()), self.first_hidden + hidden)
 
     def first_links(self) -> list[tuple[int, int]]:
-        """Links that a start can have, by number: input to output; by hidden node, those into it and out of it."""
+        """Links that a start can have, by number: input to output; by hidden node, those into it and out of it.
+
+        A link between hidden nodes leads to the later one.
+        """
         inputs = range(self.n_inputs)
         links = [(source, target) for target in self.outputs for source in inputs]
         for node in range(self.first_hidden, self.first_hidden + self.settings.start_hidden):
-            links += [(source, node) for source in inputs]
+            links += [(source, node) for source in [*inputs, *range(self.first_hidden, node)]]
             links += [(node, target) for target in self.outputs]
         return links
 
@@ -133,12 +135,17 @@ class Neat:
         reach = settings.initial_weight
         is_random = settings.start_topology == "random"
         n_hidden = settings.start_hidden
-        if is_random and n_hidden:
-            n_hidden = 1 + stream.below(n_hidden)
+        if is_random:
+            n_hidden = stream.below(n_hidden + 1)
         end = self.first_hidden + n_hidden
         genome = Genome()
         for number, link in enumerate(self.first_links()):
-            if max(link) < end and not (is_random and not stream.chance(0.5)):
+            if max(link) >= end or (min(link) >= self.first_hidden and not is_random):
+                continue
+            direct = link[0] < self.n_inputs and link[1] in self.outputs
+            if settings.start_topology == "layer" and direct and link[0] != self.bias_input:
+                continue
+            if not is_random or stream.chance(0.3):
                 genome.genes[number] = Gene(*link, stream.signed(reach))
         for node in range(self.n_inputs, end):
             genome.biases[node] = stream.signed(reach) if settings.node_bias else 0.0

@@ -72,13 +72,14 @@ class NeatSettings(BaseModel):
         description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; without "
         "growth, 4.4: 10).",
     )
-    start_topology: Literal["full", "random"] = Field(
+    start_topology: Literal["full", "layer", "random"] = Field(
         "full",
-        description="'full': all start with the same links. 'random': each starts with a random number of the hidden "
-        "nodes, at least one, and with each link by coin (EC02 4.4, for comparison).",
+        description="'full': all start with the same links. 'layer': so do they, but of the inputs only the constant "
+        "one is wired to the outputs directly. 'random': each starts with 0 to all of the hidden nodes, drawn "
+        "uniformly, and with 30 % of the links, those between hidden nodes too (C++; EC02 4.4, for comparison).",
     )
     initial_weight: float = Field(
-        2.5,
+        5.0,
         ge=0,
         le=100,
         description="First weights, and those of new links, are uniform within +- this (C++: 1).",
@@ -96,7 +97,7 @@ class NeatSettings(BaseModel):
         1.0, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
     )
     replaced_weight: float = Field(
-        6.0,
+        8.0,
         ge=0,
         le=100,
         description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
@@ -109,7 +110,7 @@ class NeatSettings(BaseModel):
         0.03, ge=0, le=1, description="Share of mutated children that split a link (EC02 4.1: 0.03)."
     )
     add_link: float = Field(
-        0.5,
+        0.6,
         ge=0,
         le=1,
         description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
@@ -129,7 +130,7 @@ class NeatSettings(BaseModel):
         0.2,
         ge=0,
         le=1,
-        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0).",
+        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0; double pole without velocities: 0.05).",
     )
 
     crossover: float = Field(
@@ -143,7 +144,7 @@ class NeatSettings(BaseModel):
         0.0, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
     )
     average_weights: float = Field(
-        0.0,
+        0.2,
         ge=0,
         le=1,
         description="Share of crossovers in which matching weights are averaged, in place of one "
@@ -296,6 +297,7 @@ class NeatSettings(BaseModel):
             activation_slope=float(self.activation_slope),
             start_hidden=self.start_hidden,
             start_random=self.start_topology == "random",
+            start_layer=self.start_topology == "layer",
             initial_weight=float(self.initial_weight),
             weight_limit=float(self.weight_limit),
             mutate_weights=float(self.mutate_weights),
@@ -339,7 +341,8 @@ def _is_known(name: object) -> bool:
     return isinstance(name, str) and name in NAMED_SETTINGS
 
 
-# The paper's text alone, and Stanley's C++ only where the paper is silent; every value in which `default` may differ.
+# The paper's text alone; where it is silent, Stanley's C++ or what was fitted to its results on XOR (the sizes of weights,
+# re-enabling, mutation after every crossover). Every value in which `default` may differ.
 _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
@@ -347,16 +350,16 @@ _STANLEY: dict[str, Any] = {
     "initial_weight": 1.0,
     "mutate_weights": 0.8,
     "replace_weight": 0.1,
-    "weight_step": 2.5,
-    "replaced_weight": 2.5,
-    "weight_limit": 8.0,
+    "weight_step": 3.0,
+    "replaced_weight": 5.0,
+    "weight_limit": 5.0,
     "add_node": 0.03,
     "add_link": 0.05,
     "structural_mutations": "one",
     "split_bias_links": False,
-    "reenable": 0.0,
+    "reenable": 0.05,
     "crossover": 0.75,
-    "crossover_only": 0.2,
+    "crossover_only": 0.0,
     "average_weights": 0.0,
     "equal_parents": "mix",
     "weight_coefficient": 0.4,
@@ -372,10 +375,16 @@ _STANLEY: dict[str, Any] = {
     "best_species_spared": False,
 }
 
-# Table 1 on top; its words are those of an old neat-python, whose networks answered from -1 to 1.
+# Table 1 on top, and the C++ where both papers are silent; its words are those of an old neat-python, whose networks
+# answered from -1 to 1.
 _ROSENZWEIG: dict[str, Any] = {
     **_STANLEY,
     "settings": "rosenzweig-remy",
+    "weight_step": 2.5,
+    "replaced_weight": 2.5,
+    "weight_limit": 8.0,
+    "reenable": 0.0,
+    "crossover_only": 0.2,
     "population": 8,
     "generations": 5,
     "add_link": 0.1,

@@ -43,6 +43,7 @@ class NeatRules(NamedTuple):
     activation_slope: float
     start_hidden: int
     start_random: bool
+    start_layer: bool  # no links from inputs to outputs but of the constant one
     initial_weight: float
     weight_limit: float
     mutate_weights: float
@@ -83,7 +84,14 @@ class NeatRules(NamedTuple):
     @property
     def n_first_genes(self) -> int:
         """The most connection genes that a genome of the first generation has."""
-        return self.n_inputs * self.n_outputs + self.start_hidden * (self.n_inputs + self.n_outputs)
+        return first_number_after_start(self)
+
+
+@inlined
+def first_number_after_start(rules):
+    """How many numbers the links have that a start can have; one between hidden nodes leads to the later one."""
+    h = rules.start_hidden
+    return rules.n_inputs * rules.n_outputs + h * (rules.n_inputs + rules.n_outputs) + h * (h - 1) // 2
 
 
 def make_genomes(n, n_outputs, room, hidden_room):
@@ -135,9 +143,10 @@ def next_signed(stream, cursor, size):
 def first_genomes(genomes, rules, key, replicate, generation):
     """Fill all rows with inputs fully wired to outputs and random weights (EC02, section 3.4).
 
-    Where the settings want hidden nodes at the start, each is wired from all inputs and to all outputs; a
-    random start has some of these nodes, and each link with a chance of one half. The same link has the same
-    number in all. Sets `full` where there is no room.
+    Where the settings want hidden nodes at the start, each is wired from all inputs and to all outputs; as a
+    layer, they stand between all inputs but the constant one and the outputs. A random start has some of
+    these nodes, and each link, those between hidden nodes too, with a chance of `RANDOM_LINK`. The same link
+    has the same number in all. Sets `full` where there is no room.
     """
     cursor = genomes.cursor
     n = genomes.n_connections.size
@@ -147,19 +156,24 @@ def first_genomes(genomes, rules, key, replicate, generation):
         genomes.n_connections[row] = 0
         genomes.n_hidden[row] = 0
         n_hidden = rules.start_hidden
-        if rules.start_random and n_hidden > 0:
-            n_hidden = 1 + next_below(stream, cursor, n_hidden)
+        if rules.start_random:
+            n_hidden = next_below(stream, cursor, n_hidden + 1)
         number = np.int32(0)
         for output in range(rules.n_outputs):
             for source in range(rules.n_inputs):
                 target = rules.n_inputs + output
-                _first_link(genomes, row, rules, number, source, target, stream, cursor)
+                if not rules.start_layer or source == rules.bias_input:
+                    _first_link(genomes, row, rules, number, source, target, stream, cursor)
                 number += 1
         for k in range(n_hidden):
             node = rules.n_inputs + rules.n_outputs + k
             insert_hidden(genomes, row, node, 0.0)
             for source in range(rules.n_inputs):
                 _first_link(genomes, row, rules, number, source, node, stream, cursor)
+                number += 1
+            for source in range(rules.n_inputs + rules.n_outputs, node):
+                if rules.start_random:
+                    _first_link(genomes, row, rules, number, source, node, stream, cursor)
                 number += 1
             for output in range(rules.n_outputs):
                 target = rules.n_inputs + output
@@ -171,10 +185,14 @@ def first_genomes(genomes, rules, key, replicate, generation):
             )
 
 
+# Of Stanley's C++, where it starts the double pole from networks at random.
+RANDOM_LINK = 0.3
+
+
 @inlined
 def _first_link(genomes, row, rules, number, source, target, stream, cursor):
-    """Put a link of the start into a genome; into a random one with a chance of one half."""
-    if rules.start_random and next_uniform(stream, cursor) >= 0.5:
+    """Put a link of the start into a genome; into a random one with a chance of `RANDOM_LINK`."""
+    if rules.start_random and next_uniform(stream, cursor) >= RANDOM_LINK:
         return
     weight = next_signed(stream, cursor, rules.initial_weight)
     insert_gene(genomes, row, number, source, target, weight, ENABLED)

@@ -11,6 +11,7 @@ from ._compile import inlined
 from ._genome import (
     ENABLED,
     closes_cycle,
+    first_number_after_start,
     has_link,
     insert_gene,
     insert_hidden,
@@ -46,7 +47,7 @@ N_SPLITS = 3
 def clear_innovations(rules, innovations):
     """No innovation yet: the next numbers are those after the first genomes'."""
     first_node = rules.n_inputs + rules.n_outputs
-    innovations.counters[NEXT_NUMBER] = rules.n_inputs * rules.n_outputs + rules.start_hidden * first_node
+    innovations.counters[NEXT_NUMBER] = first_number_after_start(rules)
     innovations.counters[NEXT_NODE] = first_node + rules.start_hidden
     start_generation(innovations)
 

@@ -130,7 +130,8 @@ class NeatSettings(BaseModel):
         0.2,
         ge=0,
         le=1,
-        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0; double pole without velocities: 0.05).",
+        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0; in the task "
+        "without velocities 0.05).",
     )
 
     crossover: float = Field(
@@ -341,8 +342,8 @@ def _is_known(name: object) -> bool:
     return isinstance(name, str) and name in NAMED_SETTINGS
 
 
-# The paper's text alone; where it is silent, Stanley's C++ or what was fitted to its results on XOR (the sizes of weights,
-# re-enabling, mutation after every crossover). Every value in which `default` may differ.
+# The paper's text alone; where it is silent, Stanley's C++ or what was fitted to its results on XOR (the sizes of
+# weights, re-enabling, mutation after every crossover). Every value in which `default` may differ.
 _STANLEY: dict[str, Any] = {
     "settings": "stanley-2002",
     "population": 150,
@@ -375,8 +376,8 @@ _STANLEY: dict[str, Any] = {
     "best_species_spared": False,
 }
 
-# Table 1 on top, and the C++ where both papers are silent; its words are those of an old neat-python, whose networks
-# answered from -1 to 1.
+# Table 1 on top, and the C++ where both papers are silent; its words are those of an old neat-python, whose
+# networks answered from -1 to 1.
 _ROSENZWEIG: dict[str, Any] = {
     **_STANLEY,
     "settings": "rosenzweig-remy",

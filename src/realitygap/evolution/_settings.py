@@ -130,8 +130,8 @@ class NeatSettings(BaseModel):
         0.2,
         ge=0,
         le=1,
-        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0; double pole "
-        "without velocities: 0.05).",
+        description="Share of mutated children whose oldest disabled gene is switched on (C++: 0; in the task "
+        "without velocities 0.05).",
     )
 
     crossover: float = Field(
@@ -376,8 +376,8 @@ _STANLEY: dict[str, Any] = {
     "best_species_spared": False,
 }
 
-# Table 1 on top, and the C++ where both papers are silent; its words are those of an old neat-python, whose networks
-# answered from -1 to 1.
+# Table 1 on top, and the C++ where both papers are silent; its words are those of an old neat-python, whose
+# networks answered from -1 to 1.
 _ROSENZWEIG: dict[str, Any] = {
     **_STANLEY,
     "settings": "rosenzweig-remy",

@@ -127,7 +127,7 @@ def test_equal_parents_give_each_other_gene_by_a_coin() -> None:
 
 def test_matching_weights_come_from_either_parent_or_are_averaged() -> None:
     """Four standard errors: 1 in 16,000 by chance."""
-    neat = Neat(settings(node_bias=True), 5, 4)
+    neat = Neat(settings(node_bias=True, average_weights=0.0), 5, 4)
     a, b = (neat.first_genome(Stream(k, 0, 0, 0, 2)) for k in (1, 2))
     from_a = []
     for seed in range(cases(200, 20)):

@@ -290,7 +290,7 @@ def test_planes_and_segments_give_one_path_where_walls_enclose_the_robot(
     for seed in range(cases(300, 12)):
         rng = random.Random(seed)
         arena = rng.choice([paper_arena(), random_room(rng)])
-        neat = Neat(settings(activation="tanh", activation_slope=1.0), 3, 2)
+        neat = Neat(settings(activation="tanh", activation_slope=1.0, initial_weight=1.0), 3, 2)
         genome = as_genome(neat, grown(neat, seed, rng.choice([0, 4])))
         platform = JyroPlatform(precision="double", turn_per_step=rng.choice([0.1, 0.9, 3.0]))
         if not jyro_scene(platform, arena).is_enclosed:

@@ -349,3 +349,14 @@ def test_a_missing_extra_is_told_with_the_command_that_installs_it(study, tmp_pa
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ClusterError, match=r"pip install 'realitygap\[cluster\]'"):
         run_study(study, tmp_path / "r", cluster="tcp://127.0.0.1:8786")
+
+
+def test_ctrl_c_stays_ours_beside_dask_jobqueue():
+    """Its import has Ctrl-C call sys.exit."""
+    code = (
+        "import signal\nfrom realitygap.study._job_queue import load_dask_jobqueue\n"
+        "before = signal.getsignal(signal.SIGINT)\nload_dask_jobqueue()\n"
+        "assert signal.getsignal(signal.SIGINT) is before"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

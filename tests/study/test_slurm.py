@@ -1,5 +1,6 @@
 """A study as jobs of a real SLURM on this machine."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -10,7 +11,8 @@ import pytest
 from realitygap.records import ResultsFolder
 from realitygap.study import parse_study, run_study
 
-pytest.importorskip("dask_jobqueue", reason="needs the extra `cluster`")
+if importlib.util.find_spec("dask_jobqueue") is None:  # its import would take Ctrl-C from the other tests
+    pytest.skip("needs the extra `cluster`", allow_module_level=True)
 
 from .dask_processes import wait_until
 from .one_machine_slurm import PROGRAMS, OneMachineSlurm, program

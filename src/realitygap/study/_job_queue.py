@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
+import signal
 from typing import Any
 
 from realitygap.errors import StudyError, did_you_mean
@@ -19,6 +20,15 @@ CLASSES = {
 }
 
 
+def load_dask_jobqueue() -> Any:
+    """The module dask_jobqueue, whose import would have Ctrl-C end the process without a word."""
+    handler = signal.getsignal(signal.SIGINT)
+    import dask_jobqueue
+
+    signal.signal(signal.SIGINT, handler)
+    return dask_jobqueue
+
+
 class JobQueue:
     """A Dask scheduler in this process, and workers in jobs.
 
@@ -31,8 +41,8 @@ class JobQueue:
 
     def __init__(self, name: str) -> None:
         import dask
-        import dask_jobqueue
 
+        dask_jobqueue = load_dask_jobqueue()
         self.name, n_jobs = self.check_name(name)
         self._n_jobs = n_jobs or int(dask.config.get("realitygap.jobs", 1))
         kind = getattr(dask_jobqueue, CLASSES[self.name])

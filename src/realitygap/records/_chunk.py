@@ -117,7 +117,7 @@ def encode_chunk(
         path, condition, first, last, condition_hash, RESULTS_VERSION, frame.height, rows_digest(frame)
     )
     buffer = io.BytesIO()
-    frame.write_parquet(buffer, compression="zstd", metadata=_to_metadata(chunk))
+    frame.write_parquet(buffer, compression="zstd", compression_level=1, metadata=_to_metadata(chunk))
     return chunk, seal(buffer.getvalue())
 
 

@@ -77,7 +77,14 @@ def test_settings_are_of_the_set_then_of_the_task_then_changed() -> None:
     assert task_settings("xor", changes={"population": 7, "crossover": 0}).population == 7
     source = task_settings("double-pole-no-velocity", "stanley-2002")
     assert (source.add_link, source.weight_coefficient, source.threshold) == (0.3, 3.0, 4.0)
-    assert task_settings("xor", "stanley-2002").add_link == 0.05
+    assert (source.add_node, source.weight_step, source.weight_limit, source.survival) == (
+        0.01,
+        1.8,
+        8.0,
+        0.4,
+    )
+    xor = task_settings("xor", "stanley-2002")
+    assert (xor.add_node, xor.add_link, xor.survival) == (0.03, 0.05, 0.2)
 
 
 @pytest.mark.parametrize(
@@ -105,25 +112,26 @@ def test_counts_below_one_are_refused(name: str) -> None:
 
 @compiled_only
 @pytest.mark.parametrize(
-    ("task", "settings", "seeds", "low", "high"),
+    ("task", "settings", "seeds", "lost", "low", "high"),
     [
-        ("xor", "default", 30, 1_000, 3_000),
-        ("xor", "stanley-2002", 30, 3_400, 6_700),
-        ("double-pole", "default", 20, 800, 3_500),
-        ("double-pole-no-velocity", "default", 4, 5_000, 45_000),
+        ("xor", "default", 30, 0, 1_000, 3_000),
+        ("xor", "stanley-2002", 30, 2, 3_400, 7_700),
+        ("double-pole", "default", 20, 0, 900, 3_700),
+        ("double-pole-no-velocity", "default", 4, 1, 1_500, 62_000),
     ],
 )
 def test_neat_solves_the_classical_tasks_in_few_evaluations(
-    task: str, settings: str, seeds: int, low: int, high: int
+    task: str, settings: str, seeds: int, lost: int, low: int, high: int
 ) -> None:
-    """Each end lies four standard errors or more from the mean on the page of the classical tasks.
+    """Each end lies four standard errors from the mean on the page of the classical tasks, or nearly.
 
-    So chance alone fails each in less than 1 in 1,000 choices of seeds; more often, in 1 of 50, a run of
-    `stanley-2002` is left unsolved, of which two are forgiven. Random search or selection without effect is
+    The lowest is 3.3 of them away, and the means of four runs are seldom so low, being lopsided upward. So chance
+    alone fails each in less than 1 in 1,000 choices of seeds. As many runs as `lost` may be left unsolved, where
+    1 of 100 is. Random search or selection without effect is
     far off: it does not solve the second pole at all.
     """
     figures = measure_task(task, settings, seeds=seeds, seed=40)
-    assert figures["solved"] >= seeds - (2 if settings == "stanley-2002" else 0)
+    assert figures["solved"] >= seeds - lost
     assert low < figures["mean_evaluations"] < high
     if "mean_generalization" in figures:
         assert 200 <= figures["mean_generalization"] <= 625

@@ -69,7 +69,17 @@ _TASKS = (
             "mean_generalization": 286,
         },
         "Stanley & Miikkulainen (2002), section 4.3, table 2",
-        {"add_link": 0.3, "weight_coefficient": 3.0, "threshold": 4.0},
+        {
+            "add_link": 0.3,
+            "weight_coefficient": 3.0,
+            "threshold": 4.0,
+            # Of the file with which Stanley's release runs this task.
+            "add_node": 0.01,
+            "weight_step": 1.8,
+            "replaced_weight": 1.8,
+            "weight_limit": 8.0,
+            "survival": 0.4,
+        },
     ),
 )
 

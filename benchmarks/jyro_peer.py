@@ -1,4 +1,4 @@
-"""How many robot-steps a second real Jyro 0.3.2 makes, beside `realitygap bench`.
+"""How many robot-steps a second real Jyro 0.3.2 makes, beside ours called from Python (`try_genomes`).
 
     python benchmarks/jyro_peer.py [--json] [--fresh]
 

@@ -326,6 +326,7 @@ def test_fresh_deletes_nothing_where_no_scheduler_answers(study, digest, tmp_pat
         ("slurm:0", r"asks for '0' jobs"),
         ("tcp://", r"is not the address of a scheduler"),
         ("tcp://127.0.0.1:port", r"is not the address of a scheduler"),
+        ("tcp://nowhere", r"is not the address of a scheduler"),
     ],
 )
 def test_a_wrong_name_is_told(study, tmp_path, name, expected):

@@ -290,13 +290,17 @@ def _require_dask() -> None:
 
 def _connect(address: str, seconds: float) -> Any:
     from distributed import Client
+    from distributed.comm.addressing import get_address_host_port
 
     try:
-        return Client(address, timeout=seconds, set_as_default=False)
+        # Before there is a client: one that fails at its address takes 20 s to go, and says so by a traceback.
+        get_address_host_port(address, strict=True)
     except ValueError as error:
         raise StudyError(
             f"{address!r} is not the address of a scheduler ({error}). Expected such as tcp://HOST:8786."
         ) from None
+    try:
+        return Client(address, timeout=seconds, set_as_default=False)
     except (OSError, TimeoutError) as error:
         raise ClusterError(
             f"No Dask scheduler answers at {address}. Is it running (`dask scheduler`), and does this machine reach it?"

@@ -12,8 +12,6 @@ import pytest
 from realitygap.kernels import _math
 from tests.reference.effort import cases
 
-TWO_PI = 2.0 * math.pi
-
 
 def angles(n: int) -> list[float]:
     """Angles of all sizes below 1e5, and those at which the quadrant changes."""
@@ -83,21 +81,3 @@ def test_far_out_tanh_is_one_and_sigmoid_zero_or_one(x: float) -> None:
 def test_tanh_is_odd() -> None:
     for x in numbers(500):
         assert _math.tanh(-x) == -_math.tanh(x)
-
-
-def test_a_wrapped_heading_is_the_same_direction() -> None:
-    for heading in angles(cases(20_000, 1_000)):
-        wrapped = _math.wrap_heading(heading)
-        assert 0.0 <= wrapped < TWO_PI
-        turned = (wrapped - heading) / TWO_PI
-        assert abs(turned - round(turned)) < 1e-11, heading
-        if 0.0 <= heading < TWO_PI:
-            assert wrapped == heading
-
-
-def test_a_heading_beside_a_whole_turn_is_not_wrapped_to_less_than_zero() -> None:
-    """The quotient was rounded up to a whole number: -39 turns less one bit came out as -2.8e-14."""
-    for turns in range(-2_000, 2_001):
-        heading = turns * TWO_PI
-        for value in (heading, math.nextafter(heading, -math.inf), math.nextafter(heading, math.inf)):
-            assert 0.0 <= _math.wrap_heading(value) < TWO_PI, value

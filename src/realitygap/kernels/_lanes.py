@@ -101,7 +101,7 @@ def _row(like):
 
 
 def _poses(like):
-    return Poses(_row(like), _row(like), _row(like), _row(like), _row(like))
+    return Poses(*(_row(like) for _ in Poses._fields))
 
 
 def make_lanes(like, n_sensors, n_nodes, columns, rows):
@@ -120,29 +120,13 @@ def make_lanes(like, n_sensors, n_nodes, columns, rows):
         sensor_range=_row(like),
         fractions=np.zeros((n_sensors, LANES), real),
         rates=np.zeros((n_sensors, LANES), real),
-        seen=Seen(_row(like), _row(like), _row(like), _row(like), _row(like), _row(like), _row(like)),
+        seen=Seen(*(_row(like) for _ in Seen._fields)),
         counters=np.zeros((3, LANES), np.uint32),
         words=np.zeros((4, LANES), np.uint32),
         values=np.zeros((n_nodes, LANES), real),
         before=np.zeros((n_nodes, LANES), real),
         total=_row(like),
-        line=Line(
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-            _row(like),
-        ),
+        line=Line(*(_row(like) for _ in Line._fields)),
         visited=np.zeros((words, LANES), np.uint32),
         fresh=np.zeros((words, LANES), np.uint32),
         any_fresh=np.zeros(LANES, np.uint32),
@@ -156,6 +140,13 @@ def fill(row, value):
     """The same number in every lane."""
     for lane in range(LANES):
         row[lane] = value
+
+
+@stage
+def copy_row(source, target):
+    """The same numbers in another row."""
+    for lane in range(LANES):
+        target[lane] = source[lane]
 
 
 @stage

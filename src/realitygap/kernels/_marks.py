@@ -10,7 +10,7 @@ import numpy as np
 
 from ._bits import shift_left
 from ._compile import kernel, stage
-from ._lanes import LANES, words_of
+from ._lanes import LANES, copy_row, words_of
 
 
 @stage
@@ -120,12 +120,6 @@ def _mark_word(line, row, first_column, last_place, visited, fresh, any_fresh):
 
 
 @stage
-def _copy(source, target):
-    for lane in range(LANES):
-        target[lane] = source[lane]
-
-
-@stage
 def mark_line(line, snap, columns, rows, visited, fresh, any_fresh):
     """Note the cells on the lines of a step.
 
@@ -143,7 +137,7 @@ def mark_line(line, snap, columns, rows, visited, fresh, any_fresh):
         any_fresh[lane] = np.uint32(0)
     _meet_border(line, real(0.0), snap)
     for row in range(rows):
-        _copy(line.above, line.entry)
+        copy_row(line.above, line.entry)
         _meet_border(line, real(row + 1), snap)
         for k in range(words):
             last_place = min(columns - 32 * k, 32) - 1

@@ -109,11 +109,3 @@ def sigmoid(x):
     """The logistic function 1 / (1 + e^-x), within 2e-16 absolute (in single precision 1.2e-7)."""
     real = type(x)
     return real(0.5) + real(0.5) * tanh(real(0.5) * x)
-
-
-@inlined
-def wrap_heading(heading):
-    """The same direction in [0, 2 pi), float64."""
-    wrapped = heading - TWO_PI * np.floor(heading / TWO_PI)
-    # Rounding can lift a quotient just below a whole number to it, or leave a sum at the upper end.
-    return wrapped if 0.0 <= wrapped < TWO_PI else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import kernel, stage
-from ._lanes import LANES
+from ._lanes import LANES, copy_row
 from ._math import sigmoid, tanh
 from ._network import IDENTITY_LIMIT, SIGMOID, TANH
 
@@ -94,12 +94,6 @@ def _add_edge(weight, value, total):
 
 
 @stage
-def _copy(source, target):
-    for lane in range(LANES):
-        target[lane] = source[lane]
-
-
-@stage
 def _tanh(slope, total, value):
     real = total.dtype.type
     for lane in range(LANES):
@@ -137,9 +131,9 @@ def think(wiring, rules, values, before, total):
     first_hidden = rules.n_inputs + rules.n_outputs
     if rules.recurrent:
         for node in range(first_hidden + n_hidden):
-            _copy(values[node], before[node])
+            copy_row(values[node], before[node])
     for k in range(n_hidden + rules.n_outputs):
-        _copy(wiring.bias[k], total)
+        copy_row(wiring.bias[k], total)
         for edge in range(wiring.first_edge[k], wiring.first_edge[k + 1]):
             source = wiring.source[edge]
             if rules.recurrent:

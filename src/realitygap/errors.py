@@ -41,6 +41,22 @@ class TableError(RealityGapError):
     """A table of results for `realitygap audit-results` cannot be read as written."""
 
 
+class RobotError(RealityGapError):
+    """A robot cannot be reached, or does not do what was asked; the text says whether its motors are stopped."""
+
+
+class RobotTimeout(RobotError):  # noqa: N818  # the word that its users know
+    """No answer came in time."""
+
+
+class ProtocolError(RobotError):
+    """What came is not what the protocol has there."""
+
+
+class LedgerError(RecordError):
+    """A ledger of physical trials cannot be trusted, written, or does not allow what was asked."""
+
+
 class MissingExtraError(RealityGapError, ImportError):
     """Something needs packages that come with an extra of realitygap, which is not installed."""
 

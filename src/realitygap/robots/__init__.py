@@ -1,5 +1,6 @@
-"""Platforms: whatever can try a controller."""
+"""Platforms, whatever can try a controller, and the contract of a robot."""
 
+from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
 
-__all__ = ["STEP_S", "JyroPlatform"]
+__all__ = ["STEP_S", "Command", "JyroPlatform", "Label", "Observation", "Robot", "check_command"]

@@ -1,0 +1,1 @@
+"""Myro in Python 3: the functions of its courses, on a robot, an emulator or a simulator."""

@@ -84,6 +84,7 @@ class Scribbler:
         self._readers = self._all_readers()
         self._setters = self._all_setters()
         self._epoch = 0  # counts resets; what was begun before one is forgotten
+        self._motions = 0  # counts how often motions were dropped
         self._wake(0)
 
     def _wake(self, now: int) -> None:
@@ -190,18 +191,25 @@ class Scribbler:
             return
         work = setter(packet, now)
         if isinstance(work, list):
-            self._hand_on(work, packet, now)
+            self._hand_on(work, packet, self._motions, now)
         else:
             self._finish_after(work + self._block_ns, packet, self._sensor_block, now)
 
-    def _hand_on(self, segments: list[Segment], packet: bytes, now: int) -> None:
+    def drop_motions(self) -> None:
+        """Forget motions that have not begun."""
+        self.reckoning.forget()
+        self._motions += 1
+
+    def _hand_on(self, segments: list[Segment], packet: bytes, number: int, now: int) -> None:
         """Give motions to the motors; the answer waits until they have taken all of them."""
         motors = self._table.motors
         self._table.advance_to(now)
+        if number != self._motions:
+            segments = []
         while segments and isinstance(motors, S2Motors) and motors.post(segments[0]):
             segments = segments[1:]
         if segments:
-            self._later(now + RETRY_NS, lambda when: self._hand_on(segments, packet, when))
+            self._later(now + RETRY_NS, lambda when: self._hand_on(segments, packet, number, when))
         else:
             self._finish_after(self._block_ns, packet, self._sensor_block, now)
 

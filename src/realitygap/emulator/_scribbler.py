@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 from realitygap.robots.scribbler._opcodes import PACKET, Op
@@ -84,6 +85,7 @@ class Scribbler:
         self._readers = self._all_readers()
         self._setters = self._all_setters()
         self._epoch = 0  # counts resets; what was begun before one is forgotten
+        self._is_taking = False
         self._motions = 0  # counts how often motions were dropped
         self._wake(0)
 
@@ -155,13 +157,20 @@ class Scribbler:
             if len(self._packets) < MOST_PACKETS:
                 self._packets.append((at, bytes(self._partial)))
             self._partial.clear()
-            if not self._busy:
-                self._take_next(at)
+            self._take_next(at)
 
     def _take_next(self, now: int) -> None:
-        self._busy = True
-        at, packet = self._packets.popleft()
-        self._later(max(at, now), lambda when: self._execute(packet, when))
+        """Carry out the packets that wait, one after another, as far as they take no time."""
+        if self._is_taking:
+            return  # called from within the loop below, which goes on
+        self._is_taking = True
+        try:
+            while self._packets and not self._busy:
+                self._busy = True
+                at, packet = self._packets.popleft()
+                self._later(max(at, now), partial(self._execute, packet))
+        finally:
+            self._is_taking = False
 
     def _execute(self, packet: bytes, now: int) -> None:
         """Carry out a command; the answer comes when it is done."""
@@ -232,8 +241,7 @@ class Scribbler:
         self.tone = None
         self._busy = False
         self._busy_until = now + len(data) * BYTE_NS if self._timing and self.model == "s1" else now
-        if self._packets:
-            self._take_next(now)
+        self._take_next(now)
 
     # -- reading --
 

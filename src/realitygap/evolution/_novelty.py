@@ -9,22 +9,21 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from realitygap.kernels import _novelty
+from realitygap.settings import Settings
 
 Cells = Sequence[int] | NDArray[np.integer]
 
 
-class NoveltySettings(BaseModel):
+class NoveltySettings(Settings):
     """How novelty is measured, and what is remembered.
 
     `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
     mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in
     population and archive, which takes what exceeds a moving threshold. Both compare sorted lists of cells.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Which novelty search.")
     sort: Literal["x-then-y", "y-then-x"] = Field(

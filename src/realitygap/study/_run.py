@@ -16,7 +16,7 @@ from realitygap.runs import Condition
 
 from ._executors import ChunkTask, Executor, Threads, usable_processors
 from ._file import load_study
-from ._study import Study
+from ._study import Study, same_file
 
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.
 CHUNK_STEPS = 7_000_000
@@ -203,6 +203,12 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
+    for condition in new["conditions"]:
+        if (alike := same_file(condition["name"], there)) is not None:
+            differences.append(
+                f"condition {condition['name']!r} would share files with condition {alike!r} that is there; "
+                "give it another name"
+            )
     if there:
         # conditions that this study lacks may stay in a folder of its own, but not in that of another
         differences = [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
 
@@ -17,7 +16,7 @@ from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask
-from realitygap.world import ArenaSettings, is_inside
+from realitygap.world import ArenaSettings, check_start
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -64,16 +63,7 @@ class Condition(Settings):
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        pose, arena = self.arena.pose(), self.arena.arena()
-        sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-        for forward, left in self.jyro.body.corners:
-            x = pose.x + forward * cosine - left * sine
-            y = pose.y + forward * sine + left * cosine
-            if not is_inside(arena, x, y):
-                raise ValueError(
-                    f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
-                    f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
-                )
+        check_start(self.arena.arena(), self.jyro.body)
         return self
 
     @model_validator(mode="after")

@@ -27,7 +27,8 @@ def bench(
         int | None, typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}]")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="With a task: of the random numbers. [default: 1]")
+        int | None,
+        typer.Option(min=0, max=2**63 - 1, help="With a task: of the random numbers. [default: 1]"),
     ] = None,
     change: Annotated[
         list[str] | None,
@@ -59,9 +60,9 @@ def bench(
     In Python: realitygap.study.measure_task("xor", "stanley-2002", seeds=100)
     """
     if task is None:
-        given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change}
+        given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change or None}
         for option, value in given.items():
-            if value:
+            if value is not None:
                 raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
         _bench_speed(2.0 if seconds is None else seconds, as_json=as_json)
         return

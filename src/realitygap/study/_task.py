@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Any
 
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
 from realitygap.runs import TaskRun, run_task
 from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
@@ -37,8 +37,8 @@ def measure_task(
         task: 'xor', 'double-pole' or 'double-pole-no-velocity'.
         settings: A named set of NEAT's settings; population, generations, recurrence and the constant input's
             value are the task's.
-        seeds: How many runs, >= 1.
-        seed: Of the random numbers from which all runs draw.
+        seeds: How many runs, 1 to 2**32.
+        seed: Of the random numbers from which all runs draw, 0 to 2**63 - 1.
         changes: Settings by name, in place of the set's and the task's.
         threads: Runs at once; as many as there are processors when not given.
         tell: Called with the progress after each run.
@@ -51,13 +51,14 @@ def measure_task(
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
-        ValueError: A count below 1.
+        TypeError: A count or the seed is not a whole number.
+        ValueError: One of them is out of its range.
     """
-    for name, count in (("seeds", seeds), ("threads", threads)):
-        if count is not None and count < 1:
-            raise ValueError(f"{name} is {count}, expected at least 1.")
+    seeds = whole_number("seeds", seeds, 1, 2**32)
+    seed = whole_number("seed", seed, 0, 2**63 - 1)
+    threads = usable_processors() if threads is None else whole_number("threads", threads, 1)
     chosen = task_settings(task, settings, changes)
-    runs = _run_all(CLASSICAL_TASKS[task], chosen, seeds, seed, threads or usable_processors(), tell)
+    runs = _run_all(CLASSICAL_TASKS[task], chosen, seeds, seed, threads, tell)
     changed = "".join(f" {name}={value}" for name, value in (changes or {}).items())
     return summarize_runs(CLASSICAL_TASKS[task], settings + changed, runs)
 
@@ -74,6 +75,8 @@ def task_settings(
         raise StudyError(f"Unknown task {task!r}. {did_you_mean(task, CLASSICAL_TASKS)}")
     if settings not in NAMED_SETTINGS:
         raise StudyError(f"Unknown NEAT settings {settings!r}. {did_you_mean(settings, NAMED_SETTINGS)}")
+    if "settings" in (changes or {}):
+        raise StudyError(f"The set is {settings!r} already; name another one in its place (--settings).")
     chosen = {**NAMED_SETTINGS[settings], **CLASSICAL_TASKS[task].settings}
     if settings == "stanley-2002":
         chosen |= CLASSICAL_TASKS[task].published_settings

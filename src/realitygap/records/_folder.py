@@ -13,7 +13,7 @@ from typing import Any
 
 import polars as pl
 
-from realitygap.errors import RecordError, RecordVersionError, did_you_mean
+from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
 from realitygap.records._chunk import (
     MAX_REPLICATE,
     Chunk,
@@ -316,6 +316,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
@@ -337,6 +338,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
@@ -345,9 +347,7 @@ class ResultsFolder:
         if replicates is None:
             parts = list(self._frames(names, columns))
         else:
-            # what is beyond any chunk may be beyond polars' numbers, too
-            possible = {number for number in replicates if 0 <= number <= MAX_REPLICATE}
-            wanted = pl.Series(sorted(possible), dtype=pl.Int64)
+            wanted = _wanted(replicates)
             names = [name for name in names if wanted.is_between(name.first, name.last).any()]
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
@@ -368,6 +368,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition, or nothing of that name to derive.
         """
         parts = list(self.derived_frames(what, condition, replicates))
@@ -381,7 +382,7 @@ class ResultsFolder:
             raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
         self._check_selection(condition, None)
         self._warn_of_version()
-        wanted = None if replicates is None else pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+        wanted = None if replicates is None else _wanted(replicates)
         return self._derived(what, self._names(condition), wanted)
 
     def write_derived(
@@ -674,3 +675,9 @@ class ResultsFolder:
             sync_folder(self._path)
         self._checked.clear()
         self._published = None
+
+
+def _wanted(replicates: Iterable[int]) -> pl.Series:
+    """The replicates that there may be, ascending; what is beyond any chunk may be beyond polars' numbers, too."""
+    numbers = {whole_number("replicate", number) for number in replicates}
+    return pl.Series(sorted(number for number in numbers if 0 <= number <= MAX_REPLICATE), dtype=pl.Int64)

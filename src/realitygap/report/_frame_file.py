@@ -32,6 +32,7 @@ def export_frame(
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or the file lies in a folder of results or
             cannot be written.
+        TypeError: the number of the run is not a whole number.
         ValueError: there is no such condition, run, frame or ending.
     """
     out = Path(out)

@@ -121,7 +121,7 @@ def draw_tally_species(
     Raises:
         ValueError: there is no such condition or run.
     """
-    condition = condition or tally.runs["condition"][0]
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     of_runs = species.counts.filter(pl.col("condition") == condition)
     picked = replicate is None

@@ -98,7 +98,7 @@ def run_study(
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
         RealityGapError: The cluster cannot be reached, or has other software.
-        TypeError: A count is not a whole number, or the study is none of these.
+        TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.
     """
     threads = None if threads is None else whole_number("threads", threads, 1)
@@ -127,6 +127,8 @@ def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
             "threads and cluster exclude each other: how many threads a worker of a cluster has is said where it is "
             "started (`dask worker --nthreads`, or `cores` in the settings of its jobs)."
         )
+    if not isinstance(cluster, str):
+        raise TypeError(f"cluster is {cluster!r}, expected a text, such as 'tcp://HOST:8786' or 'slurm:20'.")
     from ._cluster import Cluster
 
     with Cluster(cluster) as executor:

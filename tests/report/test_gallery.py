@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 import xml.etree.ElementTree as ET
 
@@ -317,6 +318,40 @@ def ancestors_of(rows: pl.DataFrame, generation: int, individual: int) -> set[tu
         found |= {(number, each) for each in now}
         now = {parent for parents in here["parents"] for parent in parents}
     return found
+
+
+def test_numbers_of_species_keep_apart_in_a_long_run(tmp_path):
+    """Each species had its number at its largest share: hundreds of them lay over each other, and beyond the axes."""
+    text = """
+    [study]
+    name = "long"
+    replicates = 1
+    [neat]
+    population = 60
+    generations = 40
+    add_node = 0.5
+    threshold = 1.0
+    [platform.jyro]
+    steps = 5
+    [[condition]]
+    name = "coverage"
+    """
+    folder = run_study(parse_study(text, "long.toml"), tmp_path / "r").folder
+    drawing = draw_species(folder)
+    left = drawing.figure.axes[0]
+    drawing.figure.draw_without_rendering()
+    numbers = [each for each in left.texts if each.get_text().isdigit()]
+    boxes = [each.get_window_extent() for each in numbers]
+    n_species = folder.read(columns=["species"])["species"].n_unique()
+    assert 2 <= len(numbers) < n_species
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    assert all(left.bbox.y0 <= box.y0 and box.y1 <= left.bbox.y1 for box in boxes)
+    assert len(left.collections) == n_species
+    for generation in (0, 20, 39):
+        tops = [band.get_paths()[0].vertices for band in left.collections]
+        highest = max(v[np.abs(v[:, 0] - generation) <= 0.5, 1].max(initial=0) for v in tops)
+        assert highest == pytest.approx(1.0)
+    assert "numbers of larger species" in drawing.caption
 
 
 def test_a_lineage_shows_every_ancestor_with_its_coverage_and_species(tiny_study):

@@ -143,7 +143,7 @@ def draw_tally_species(
     means = species.mean_by_selection(tally)
     n_runs = tally.runs.height
     why = (
-        "picked because it has most species (the first of several alike): in a typical run there is little to see"
+        "picked because it has most species (the first of several alike) and so most to see"
         if picked
         else "chosen by number"
     )

@@ -73,9 +73,20 @@ def bench(
         "default" if settings is None else settings,
         DEFAULT_SEEDS if seeds is None else seeds,
         1 if seed is None else seed,
-        dict(map(_changed_setting, change or [])),
+        _changes(change or []),
         as_json=as_json,
     )
+
+
+def _changes(texts: list[str]) -> dict[str, Any]:
+    changes: dict[str, Any] = {}
+    for key, value in map(_changed_setting, texts):
+        if key in changes:
+            raise StudyError(
+                f"--change gives {key} twice: {changes[key]!r} and {value!r}. Leave one of them out."
+            )
+        changes[key] = value
+    return changes
 
 
 def _changed_setting(text: str) -> tuple[str, Any]:

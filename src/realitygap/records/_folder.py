@@ -396,13 +396,13 @@ class ResultsFolder:
 
         Args:
             what, condition, replicates: As of `derive`.
-            path: The file; not in a folder of results.
+            path: The file; none of a study's own.
 
         Returns:
             How many rows it has.
 
         Raises:
-            RecordError: as `chunks`, or the file lies in a folder of results or cannot be written.
+            RecordError: as `chunks`, or the file is one of a study's own or cannot be written.
             ValueError: as `derive`.
         """
         path = Path(path)

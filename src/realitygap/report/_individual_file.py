@@ -39,7 +39,7 @@ def export_individual(
     Each has the names of inputs and outputs, and says which individual it is.
 
     Args:
-        folder: the results of a study, or the path to them; nothing is ever written there.
+        folder: the results of a study, or the path to them; none of its files ever gives way.
         out: the file; one that is there gives way once the new one is complete.
         format: what kind; by the ending of `out` when not given.
         condition: of which; the first one when not given.

@@ -75,11 +75,30 @@ def tanh(x):
 
     1 - 2 / (e^2x + 1), where e^2x is a Taylor polynomial times a power of two.
     """
+    return tanh_of_series(x, exp_series(tanh_remainder(x)))
+
+
+@inlined
+def _doublings(x):
+    """2 |x|, and how many whole ln 2 there are in it."""
     real = type(x)
     size = abs(x)
     double = real(2.0) * (size if size < real(TANH_IS_ONE) else real(TANH_IS_ONE))
-    k = np.floor(double * real(ONE_OVER_LN2) + real(0.5))
-    r = (double - k * real(LN2_HIGH)) - k * real(LN2_LOW)
+    return double, np.floor(double * real(ONE_OVER_LN2) + real(0.5))
+
+
+@inlined
+def tanh_remainder(x):
+    """The first of three parts of `tanh`: what whole ln 2 leave of 2 |x|."""
+    real = type(x)
+    double, k = _doublings(x)
+    return (double - k * real(LN2_HIGH)) - k * real(LN2_LOW)
+
+
+@inlined
+def exp_series(r):
+    """The second part: e^r, |r| <= ln 2 / 2."""
+    real = type(r)
     p = real(1.0 / 479001600.0) + r * real(1.0 / 6227020800.0)
     p = real(1.0 / 39916800.0) + r * p
     p = real(1.0 / 3628800.0) + r * p
@@ -92,9 +111,15 @@ def tanh(x):
     p = real(1.0 / 6.0) + r * p
     p = real(0.5) + r * p
     p = real(1.0) + r * p
-    p = real(1.0) + r * p
-    p = p * power_of_two(k)
-    value = real(1.0) - real(2.0) / (p + real(1.0))
+    return real(1.0) + r * p
+
+
+@inlined
+def tanh_of_series(x, p):
+    """The last part: tanh(x) from e^r."""
+    real = type(x)
+    _, k = _doublings(x)
+    value = real(1.0) - real(2.0) / (p * power_of_two(k) + real(1.0))
     value = -value if x < real(0.0) else value
     return value if x == x else x
 

@@ -1,4 +1,4 @@
-"""Shifts of 32-bit words, which Numba would widen to 64 bits, and powers of two from their bits."""
+"""Shifts and places of the bits of 32-bit words, which Numba would widen to 64; powers of two from their bits."""
 
 from __future__ import annotations
 
@@ -16,6 +16,14 @@ if numba.config.DISABLE_JIT:
         """A uint32 shifted left by 0 to 31 places."""
         return np.uint32((int(word) << int(places)) & 0xFFFFFFFF)
 
+    def lowest_bit(word: Any) -> Any:
+        """The place, 0 to 31, of the lowest bit that is set in a uint32, at least one of which is."""
+        return (int(word) & -int(word)).bit_length() - 1
+
+    def highest_bit(word: Any) -> Any:
+        """The place of the highest bit, likewise."""
+        return int(word).bit_length() - 1
+
     def power_of_two(exponent: Any) -> Any:
         """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
         return type(exponent)(2.0 ** int(exponent))
@@ -30,6 +38,26 @@ else:
             return builder.shl(*arguments)
 
         return types.uint32(types.uint32, types.uint32), generate
+
+    @intrinsic
+    def lowest_bit(context, word):
+        """The place, 0 to 31, of the lowest bit that is set in a uint32, at least one of which is."""
+
+        def generate(context, builder, signature, arguments):
+            place = builder.cttz(arguments[0], ir.IntType(1)(1))
+            return builder.zext(place, ir.IntType(64))
+
+        return types.int64(types.uint32), generate
+
+    @intrinsic
+    def highest_bit(context, word):
+        """The place of the highest bit, likewise."""
+
+        def generate(context, builder, signature, arguments):
+            place = builder.sub(ir.IntType(32)(31), builder.ctlz(arguments[0], ir.IntType(1)(1)))
+            return builder.zext(place, ir.IntType(64))
+
+        return types.int64(types.uint32), generate
 
     @intrinsic
     def power_of_two(context, exponent):

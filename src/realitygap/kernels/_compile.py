@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core import caching
-from numba.core.compiler import CompilerBase
+from numba.core.compiler import CompilerBase, Flags
 from numba.core.compiler_machinery import PassManager
 from numba.core.typed_passes import (
     AnnotateTypes,
@@ -121,12 +121,23 @@ BEFORE_LOWERING = (
 )
 
 
+class _Flags(Flags):
+    """Options that compare by those that were set; type inference compares them ten thousands of times."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Flags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+
 class _Entry(CompilerBase):
     """For calls from Python."""
 
     lowering = LowerKernel
 
     def define_pipelines(self) -> Any:
+        self.state.flags = _Flags(self.state.flags)
         manager = PassManager("kernel")
         for step in (*BEFORE_LOWERING, self.lowering, NoPythonBackend):
             manager.add_pass(step, step.__name__)

@@ -65,6 +65,29 @@ class LowerKernel(NativeLowering):
     def lowering_class(self) -> Any:
         return _lowering
 
+    def run_pass(self, state: Any) -> bool:
+        if state.library is None:
+            state.library = _make_library(state)
+        return super().run_pass(state)
+
+
+def _make_library(state: Any) -> Any:
+    """What a function is lowered into."""
+    library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+    library.enable_object_caching()
+    library._optimize_functions = functools.partial(_tidy, library)
+    return library
+
+
+def _tidy(library: Any, module: Any) -> None:
+    """Make functions small for the whole that they become part of, where LLVM spends its effort."""
+    codegen = library._codegen
+    module.data_layout = codegen._data_layout
+    for function in module.functions:
+        if not function.is_declaration:
+            passes, builder = codegen._function_pass_manager(opt=1)
+            passes.run(function, builder)
+
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class LowerForCallers(LowerKernel):
@@ -76,11 +99,9 @@ class LowerForCallers(LowerKernel):
     _name = "lower_for_callers"
 
     def run_pass(self, state: Any) -> bool:
-        library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
-        library.enable_object_caching()
+        library = state.library = _make_library(state)
         library._optimize_final_module = lambda: None
         library._finalize_final_module = functools.partial(_finish_without_code, library)
-        state.library = library
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]

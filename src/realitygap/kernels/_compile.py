@@ -62,7 +62,10 @@ def cache_root() -> Path:
         return Path.home() / "Library" / "Caches" / "realitygap"
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "realitygap"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "realitygap"
+    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not caches.is_absolute():  # its specification has such a one ignored
+        caches = Path.home() / ".cache"
+    return caches / "realitygap"
 
 
 def _writable_cache() -> Path | None:

@@ -3,7 +3,7 @@
     uv run python docs/make_classical_tasks.py
 
 Carries out what `realitygap bench TASK` does, with seeds on which no setting was tuned, and writes
-docs/data/classical-tasks.csv, from which the page's tables are made. Takes 5 minutes on 2 cores; with another seed
+docs/data/classical-tasks.csv, from which the page's tables are made. Takes 6 minutes on 2 cores; with another seed
 perhaps an hour, where a population stays among networks that balance for most of 100,000 actions. `--seed` takes
 another seed, `--runs` fewer runs, for a first look, and `--out` another file.
 """

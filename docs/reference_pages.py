@@ -501,7 +501,17 @@ def classical_tasks() -> str:
             if row["task"] == task.name
         ]
     seeds = sorted({row["seed"] for row in rows})
-    return "\n".join([*lines, "", f"Seed {', '.join(seeds)}."]) + "\n"
+    return "\n".join([*lines, "", f"Seed {', '.join(seeds)}. {published_generalization(rows)}"]) + "\n"
+
+
+def published_generalization(rows: list[dict[str, str]]) -> str:
+    """How far chance alone may have moved the published mean of the generalization test."""
+    ours = [row for row in rows if row["sd_generalization"]]
+    spread = max(float(row["sd_generalization"]) for row in ours)
+    published = CLASSICAL_TASKS[ours[0]["task"]].published
+    n = published["n"]
+    interval = mean_with_interval({**published, "sd_generalization": spread}, n, "generalization")
+    return f"No spread is published of the starts passed; with our larger one, {n} runs give {interval}."
 
 
 def open_choices() -> str:

@@ -35,7 +35,9 @@ compiled_only = pytest.mark.skipif(not COMPILED, reason="takes minutes as plain 
 def test_figures_have_their_keys_and_the_published_ones_beside(task: str) -> None:
     told: list[Progress] = []
     figures = measure_task(task, seeds=3, changes=SMALL, threads=2, tell=told.append)
-    expected = KEYS if task != "double-pole-no-velocity" else [*KEYS[:-1], "mean_generalization", KEYS[-1]]
+    expected = KEYS
+    if task == "double-pole-no-velocity":
+        expected = [*KEYS[:-1], "mean_generalization", "sd_generalization", KEYS[-1]]
     assert list(figures) == expected
     assert (figures["task"], figures["seeds"]) == (task, 3)
     assert figures["settings"] == "default population=4 generations=2"
@@ -56,6 +58,7 @@ def test_figures_are_over_the_runs_that_solved_the_task() -> None:
     assert figures["worst_evaluations"] == 4_000
     assert (figures["mean_hidden"], figures["mean_connections"]) == (1.5, 6.5)
     assert figures["mean_generalization"] == 275.5
+    assert figures["sd_generalization"] == statistics.stdev([300, 251])
     nothing = summarize_runs(task, "default", [lost])
     assert nothing["solved"] == 0
     assert nothing["mean_evaluations"] is nothing["sd_evaluations"] is nothing["worst_evaluations"] is None

@@ -121,6 +121,7 @@ def _bench_task(
         "mean_hidden": "mean hidden nodes",
         "mean_connections": "mean enabled connections",
         "mean_generalization": "mean generalization, of 625",
+        "sd_generalization": "its standard deviation",
     }
     typer.echo(f"{task}, {figures['settings']}, seed {seed}")
     typer.echo(f"{'':28} {'ours':>10} {'published':>10}")

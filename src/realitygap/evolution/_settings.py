@@ -172,7 +172,13 @@ class NeatSettings(Settings):
 
     excess_coefficient: float = Field(1.0, ge=0, le=1e6, description="c1 of the distance (EC02 4.1: 1).")
     disjoint_coefficient: float = Field(1.0, ge=0, le=1e6, description="c2 of the distance (EC02 4.1: 1).")
-    weight_coefficient: float = Field(0.4, ge=0, le=1e6, description="c3 of the distance (EC02 4.1: 0.4).")
+    weight_coefficient: float = Field(
+        0.4,
+        ge=0,
+        le=1e6,
+        description="c3 of the distance (EC02 4.1: 0.4). Genomes without a gene in common are never compatible, unless "
+        "it is 0; with all three at 0 there is one species.",
+    )
     normalize_genes: Literal["never", "large", "always"] = Field(
         "never",
         description="Whether excess and disjoint genes are divided by the larger genome's size: never (C++, JAIR04), "

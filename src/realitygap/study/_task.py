@@ -46,8 +46,9 @@ def measure_task(
     Returns:
         `task`, `settings`, `seeds`, `solved` (runs); over the runs that solved it, `mean_evaluations`,
         `median_evaluations`, `sd_evaluations`, `worst_evaluations`, and of the networks that did `mean_hidden`,
-        `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts); None where too
-        few solved it. `published` holds the same of the source, as far as it is given.
+        `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts) and
+        `sd_generalization`; None where too few solved it. `published` holds the same of the source, as far as it
+        is given.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
@@ -98,19 +99,25 @@ def summarize_runs(task: ClassicalTask, settings: str, runs: Sequence[TaskRun]) 
         "solved": len(solvers),
         "mean_evaluations": _mean(evaluations),
         "median_evaluations": statistics.median(evaluations) if evaluations else None,
-        "sd_evaluations": statistics.stdev(evaluations) if len(evaluations) > 1 else None,
+        "sd_evaluations": _deviation(evaluations),
         "worst_evaluations": max(evaluations, default=None),
         "mean_hidden": _mean([run.n_hidden for run in solvers]),
         "mean_connections": _mean([run.n_connections for run in solvers]),
     }
     if "mean_generalization" in task.published:
-        figures["mean_generalization"] = _mean([run.generalization for run in solvers])
+        passed = [run.generalization for run in solvers]
+        figures["mean_generalization"] = _mean(passed)
+        figures["sd_generalization"] = _deviation(passed)
     figures["published"] = {**task.published, "source": task.source}
     return figures
 
 
 def _mean(values: Sequence[int]) -> float | None:
     return statistics.fmean(values) if values else None
+
+
+def _deviation(values: Sequence[int]) -> float | None:
+    return statistics.stdev(values) if len(values) > 1 else None
 
 
 def _run_all(

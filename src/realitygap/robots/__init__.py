@@ -1,6 +1,17 @@
 """Platforms, whatever can try a controller, and the contract of a robot."""
 
+from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
 
-__all__ = ["STEP_S", "Command", "JyroPlatform", "Label", "Observation", "Robot", "check_command"]
+__all__ = [
+    "STEP_S",
+    "Clock",
+    "Command",
+    "JyroPlatform",
+    "Label",
+    "Observation",
+    "Robot",
+    "SystemClock",
+    "check_command",
+]

@@ -98,9 +98,8 @@ class Trial:
     def name(self) -> str:
         """Which trial it is, in words."""
         again = f" (attempt {self.attempt + 1})" if self.attempt else ""
-        return (
-            f"{self.condition}, run {self.replicate}, generation {self.generation}, individual {self.individual}{again}"
-        )
+        run = f"{self.condition}, run {self.replicate}"
+        return f"{run}, generation {self.generation}, individual {self.individual}{again}"
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,12 @@ class Ledger:
         return {row["name"]: dict(row) for row in self._all("SELECT * FROM conditions ORDER BY rowid")}
 
     def begin_sitting(
-        self, label: str, port: str, robot: Mapping[str, Any], preflight: Mapping[str, Any], names: Iterable[str]
+        self,
+        label: str,
+        port: str,
+        robot: Mapping[str, Any],
+        preflight: Mapping[str, Any],
+        names: Iterable[str],
     ) -> int:
         """Note which robot drives now, for these conditions.
 
@@ -285,7 +289,7 @@ class Ledger:
         return [(row["generation"], row["closed"] is not None) for row in rows]
 
     def individuals(self, condition: str, replicate: int, generation: int) -> list[dict[str, Any]]:
-        """The individuals of a generation in order, with `genome`, and once it is closed `fitness`, `novelty`, `cells`."""
+        """The individuals of a generation in order; once it is closed with `fitness`, `novelty` and `cells`."""
         rows = self._all(
             "SELECT individuals.*, scores.cells FROM individuals LEFT JOIN scores ON scores.id = individuals.score "
             "WHERE condition = ? AND replicate = ? AND generation = ? ORDER BY individual",
@@ -325,7 +329,9 @@ class Ledger:
                 *(_now(), *run),
             )
             if not changed:
-                raise LedgerError(f"Generation {generation} of {condition!r}, run {replicate}, is closed already.")
+                raise LedgerError(
+                    f"Generation {generation} of {condition!r}, run {replicate}, is closed already."
+                )
             for trial in trials:
                 self._run(
                     "UPDATE individuals SET fitness = ?, novelty = ?, trial = ?, score = (SELECT max(id) FROM scores "
@@ -418,11 +424,13 @@ class Ledger:
             self._score(number, score, role)
 
     def undo(self, number: int) -> None:
-        """Take back the score of a trial whose generation is not closed; it is driven again, and can be entered anew."""
+        """Take back the score of a trial whose generation is not closed, so that it can be entered anew."""
         with self._writing():
             self._refuse_closed(self._require(number, "scored"))
             self._run(
-                "UPDATE scores SET undone = ? WHERE trial = ? AND role = 'score' AND undone IS NULL", _now(), number
+                "UPDATE scores SET undone = ? WHERE trial = ? AND role = 'score' AND undone IS NULL",
+                _now(),
+                number,
             )
             self._run("UPDATE trials SET state = 'driven' WHERE id = ?", number)
             self._note_event(number, "undone", {})
@@ -474,13 +482,15 @@ class Ledger:
         """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
         rows = self._all("SELECT * FROM scores ORDER BY id")
         return [
-            {**dict(row), "cells": json.loads(row["cells"]), "path": json.loads(row["path"] or "null")} for row in rows
+            {**dict(row), "cells": json.loads(row["cells"]), "path": json.loads(row["path"] or "null")}
+            for row in rows
         ]
 
     def events(self) -> list[dict[str, Any]]:
         """Everything that changed a trial, oldest first."""
         return [
-            {**dict(row), "details": json.loads(row["details"])} for row in self._all("SELECT * FROM events ORDER BY id")
+            {**dict(row), "details": json.loads(row["details"])}
+            for row in self._all("SELECT * FROM events ORDER BY id")
         ]
 
     def used_codes(self) -> set[str]:
@@ -533,7 +543,8 @@ class Ledger:
             (most,) = self._one("SELECT coalesce(max(place), 0) FROM trials") or (0,)
             place = most + 1
         return self._run(
-            "INSERT INTO trials (condition, replicate, generation, individual, attempt, place, sheet, pen, code, state) "
+            "INSERT INTO trials "
+            "(condition, replicate, generation, individual, attempt, place, sheet, pen, code, state) "
             "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'planned')",
             *(turn.condition, turn.replicate, turn.generation, turn.individual, attempt, place),
             *(turn.sheet, turn.pen, turn.code),
@@ -544,7 +555,16 @@ class Ledger:
         self._connection.executemany(
             "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
             [
-                (number, k, step.time, _json(step.raw), _json(step.readings), step.stalled, step.move, step.turn)
+                (
+                    number,
+                    k,
+                    step.time,
+                    _json(step.raw),
+                    _json(step.readings),
+                    step.stalled,
+                    step.move,
+                    step.turn,
+                )
                 for k, step in enumerate(steps)
             ],
         )
@@ -555,7 +575,9 @@ class Ledger:
 
     def _drive(self, number: int, details: Mapping[str, Any]) -> None:
         self._run(
-            "UPDATE trials SET state = 'driven', driven = ?, stalls = coalesce(stalls, 0) WHERE id = ?", _now(), number
+            "UPDATE trials SET state = 'driven', driven = ?, stalls = coalesce(stalls, 0) WHERE id = ?",
+            _now(),
+            number,
         )
         self._note_event(number, "driven", details)
 
@@ -575,7 +597,9 @@ class Ledger:
             *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
             *(role, score.who, _now()),
         )
-        self._note_event(number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)})
+        self._note_event(
+            number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)}
+        )
 
     def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
         """Cells of a trial, each at most once, all within its grid, and at least the one it starts in."""
@@ -594,7 +618,9 @@ class Ledger:
                 "entered."
             )
         if not unique:
-            raise LedgerError("No cell was named: the line crosses at least the one it starts in. Nothing was entered.")
+            raise LedgerError(
+                "No cell was named: the line crosses at least the one it starts in. Nothing was entered."
+            )
         return unique
 
     def _void(self, number: int, reason: str) -> None:
@@ -622,13 +648,17 @@ class Ledger:
     def _refuse_closed(self, trial: Trial) -> None:
         if trial.is_closed:
             raise LedgerError(
-                f"The generation of trial {trial.trial} ({trial.name}) is closed: its score bred the next one and stays. "
-                "Enter a correction, which reports use, or a note."
+                f"The generation of trial {trial.trial} ({trial.name}) is closed: its score bred the next one and "
+                "stays. Enter a correction, which reports use, or a note."
             )
 
     def _note_event(self, trial: int, what: str, details: Mapping[str, Any]) -> None:
         self._run(
-            "INSERT INTO events (time, trial, what, details) VALUES (?, ?, ?, ?)", _now(), trial, what, _json(details)
+            "INSERT INTO events (time, trial, what, details) VALUES (?, ?, ?, ?)",
+            _now(),
+            trial,
+            what,
+            _json(details),
         )
 
 

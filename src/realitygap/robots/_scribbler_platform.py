@@ -30,7 +30,10 @@ class ScribblerPlatform(BaseModel):
         1700.0, gt=0, le=65_535, description="What raw readings are divided by (section 2.3: 1700)."
     )
     ir_power: int = Field(
-        135, ge=0, le=255, description="Of the Fluke's infrared emitters. Not in the paper; 135 as Myro sets it."
+        135,
+        ge=0,
+        le=255,
+        description="Of the Fluke's infrared emitters. Not in the paper; 135 as Myro sets it.",
     )
     forwardness: Literal["fluke", "scribbler"] = Field(
         "fluke",

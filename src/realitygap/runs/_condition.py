@@ -45,7 +45,8 @@ class Condition(BaseModel):
         "random tries as many unrelated networks, the control that the paper lacks.",
     )
     platform: Platform = Field(
-        "jyro", description="What the networks are tried on: jyro, the paper's simulation, or scribbler, the robot."
+        "jyro",
+        description="What the networks are tried on: jyro, the paper's simulation, or scribbler, the robot.",
     )
     noise: float = Field(
         0.1,

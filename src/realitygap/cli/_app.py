@@ -15,6 +15,7 @@ from ._results import digest, report
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
+from ._trials import trials
 
 app = typer.Typer(
     name="realitygap",
@@ -53,3 +54,4 @@ app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)
 app.command("bench")(bench)
+app.command("trials")(trials)

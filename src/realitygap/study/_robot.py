@@ -26,7 +26,7 @@ def connect_robot(port: str) -> OpenRobot:
             port,
             step_s=platform.wait_s,
             reading_max=platform.reading_max,
-            watchdog_s=platform.wait_s + WATCHDOG_S,
+            watchdog_s=WATCHDOG_S,
         )
         try:
             if robot.info.fluke != "none":

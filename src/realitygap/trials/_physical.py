@@ -46,7 +46,7 @@ class DrivenTrial:
         return sum(step.stalled for step in self.steps)
 
 
-class TrialInterrupted(BaseException):
+class TrialInterrupted(KeyboardInterrupt):
     """The program is being stopped in the middle of a trial; the motors are stopped as far as the wire allows.
 
     Attributes:

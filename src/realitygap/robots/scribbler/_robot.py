@@ -24,7 +24,7 @@ from ._odometry import Odometry
 from ._ports import label_of, port_name
 from ._senses import Senses
 from ._sound import SoundAndLight
-from ._watchdog import WatchedClock, Watchdog
+from ._watchdog import Watchdog, WatchedClock
 
 FAR = 99
 """What an S2's distance reads where nothing is seen."""

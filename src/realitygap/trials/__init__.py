@@ -11,6 +11,7 @@ from ._jyro import (
     trace_genome,
     try_genomes,
 )
+from ._jyro_robot import JyroRobot
 from ._operator import Card, Operator, Verdict, Witness, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
@@ -21,6 +22,7 @@ __all__ = [
     "Card",
     "DrivenTrial",
     "EndReason",
+    "JyroRobot",
     "NoiseKey",
     "Operator",
     "Preflight",

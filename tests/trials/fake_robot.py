@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+
+import numpy as np
 
 from realitygap.errors import RobotError
 from realitygap.robots import Command, Observation, check_command
@@ -67,7 +69,6 @@ class FakeRobot:
         self.motors = tuple(command)
         for _ in range(10):
             self._move(self.step_s / 10)
-        self.clock.sleep(self.step_s)
 
     def stop(self) -> None:
         self._say("stop")
@@ -98,15 +99,19 @@ class FakeRobot:
         self._pose = pose
         self._stalled = False
         self.motors = (0.0, 0.0)
-        self._line = [pose]
+        self._line = [(self.clock.now(), pose)]
 
-    def path(self) -> list[tuple[float, float, float, float]]:
-        return [(0.05 * k, *pose) for k, pose in enumerate(self._line)]
+    def now(self) -> float:
+        return self.clock.now()
+
+    def path(self) -> np.ndarray:
+        return np.array([(time, *pose) for time, pose in self._line])
 
     def cells(self) -> tuple[int, ...]:
-        grid = paper_arena().grid
-        found = [cell_at(grid, pose.x, pose.y) for pose in self._line]
-        return tuple(dict.fromkeys(cell for cell in found if cell is not None))
+        return cells_of(pose for _, pose in self._line)
+
+    def cells_at(self, times) -> tuple[int, ...]:
+        return cells_of([pose for at, pose in self._line if at <= time + 1e-9][-1] for time in times)
 
     # inside
 
@@ -130,4 +135,10 @@ class FakeRobot:
         y = self._pose.y + move * SPEED * seconds * math.sin(heading)
         self._stalled = not (MARGIN < x < 1.0668 - MARGIN and MARGIN < y < 0.6096 - MARGIN)
         self._pose = Pose(self._pose.x, self._pose.y, heading) if self._stalled else Pose(x, y, heading)
-        self._line.append(self._pose)
+        self.clock.sleep(seconds)
+        self._line.append((self.clock.now(), self._pose))
+
+
+def cells_of(poses: Iterable[Pose]) -> tuple[int, ...]:
+    found = [cell_at(paper_arena().grid, pose.x, pose.y) for pose in poses]
+    return tuple(dict.fromkeys(cell for cell in found if cell is not None))

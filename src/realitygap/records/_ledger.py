@@ -130,7 +130,7 @@ class Score:
         cells: crossed by the line, columns * row + column.
         who: entered them.
         n_ends: cells in which steps end; None where nobody saw it.
-        path: x [m], y [m], heading [rad] at the ends of steps; None where nobody saw it.
+        path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.
     """
 
     cells: Sequence[int]

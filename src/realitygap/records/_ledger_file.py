@@ -105,7 +105,7 @@ CREATE TABLE scores (  -- cells as somebody entered them
     trial INTEGER NOT NULL REFERENCES trials(id),
     cells TEXT NOT NULL,  -- JSON list
     n_ends INTEGER,  -- cells in which steps end, where something saw them
-    path TEXT,  -- JSON list of x [m], y [m], heading [rad] at the ends of steps, where something saw it
+    path TEXT,  -- JSON list of x [m], y [m], heading [rad] at quarters of steps, where something saw it
     role TEXT NOT NULL CHECK (role IN ('score', 'second', 'correction')),
     who TEXT NOT NULL,
     time TEXT NOT NULL,  -- UTC

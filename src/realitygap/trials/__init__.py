@@ -12,7 +12,7 @@ from ._jyro import (
     try_genomes,
 )
 from ._jyro_robot import JyroRobot
-from ._operator import Card, Operator, Verdict, Witness, WitnessOperator, cell_at, trial_seed
+from ._operator import Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
@@ -31,7 +31,6 @@ __all__ = [
     "TrialBatch",
     "TrialInterrupted",
     "Verdict",
-    "Witness",
     "WitnessOperator",
     "cell_at",
     "counters_of",

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
 
 from realitygap.errors import RobotError
 from realitygap.records import Score, Trial
@@ -14,6 +16,9 @@ from realitygap.world import Arena, Grid, Pose
 
 from ._physical import DrivenTrial
 from ._preflight import Preflight
+
+if TYPE_CHECKING:
+    from realitygap.emulator import Witness
 
 Verdict = Literal["void", "driven"]
 """What becomes of a trial that was cut off: driven again, or scored as it is."""
@@ -78,18 +83,12 @@ class Operator(Protocol):
         ...
 
 
-class Witness(Protocol):
-    """An emulated robot's surroundings: puts it somewhere and sees what it drew."""
-
-    def place(self, pose: Pose, seed: int) -> None: ...
-
-    def path(self) -> Any: ...
-
-    def cells(self) -> tuple[int, ...]: ...
-
-
 PREFLIGHT_POSE = Pose(0.5334, 0.3048, 0.0)
 """The middle of the paper's arena, where the robot can turn on the spot [m, rad]."""
+
+
+PATH_PARTS = 4
+"""In how many parts of a step the driven path is kept, so that arcs look like arcs."""
 
 
 class WitnessOperator:
@@ -110,6 +109,7 @@ class WitnessOperator:
         """
         self._witness = witness
         self._in_flight = in_flight
+        self._times: list[float] = []
 
     @property
     def witness(self) -> Witness:
@@ -142,16 +142,27 @@ class WitnessOperator:
     def place(self, card: Card) -> None:
         """Put the robot at the start."""
         self.witness.place(card.arena.start, trial_seed(card))
+        self._times = []
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """Let it drive."""
+        """Let it drive, and note the time: a step begins where the one before ended."""
+        self._times.append(self.witness.now())
         return False
 
     def drawn(self, card: Card, driven: DrivenTrial) -> Score:
         """The cells along the driven line."""
-        poses = [[float(value) for value in row[1:4]] for row in self.witness.path()]
-        cells = [int(cell) for cell in self.witness.cells()]
-        return Score(cells, self.who, n_ends=None, path=poses)
+        times = [*self._times, self.witness.now()]
+        path = self.witness.path()
+        within = np.interp(
+            np.arange((len(times) - 1) * PATH_PARTS + 1) / PATH_PARTS, np.arange(len(times)), times
+        )
+        rows = np.searchsorted(path[:, 0], within + 1e-9, side="right") - 1
+        return Score(
+            self.witness.cells(),
+            self.who,
+            n_ends=len(self.witness.cells_at(times)),
+            path=path[np.maximum(rows, 0), 1:4].tolist(),
+        )
 
     def enter(self, cards: Sequence[Card]) -> Mapping[int, Score]:
         """Nothing: what was not seen when it was driven is not known any more."""

@@ -203,7 +203,10 @@ def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path,
     second = no_terminal("trials", "score", str(out), "1", "--cells", "13,14", "--second", "--who", "ben")
     assert second.returncode == 0, second.stderr
     agreement = no_terminal("trials", "agreement", str(out))
-    assert "1 trials counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793" in agreement.stdout
+    assert (
+        "1 trials counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
+        in agreement.stdout
+    )
     assert no_terminal(*run).returncode == 0
     with Ledger.open(out / LEDGER_NAME) as ledger:
         assert [row["fitness"] for row in ledger.individuals("robot", 0, 0)] == [3 / 72, 2 / 72]
@@ -257,7 +260,9 @@ def keys(*names: str):
 def test_cells_are_marked_cleared_and_taken_back():
     arena = paper_arena()
     written = []
-    cells = edit_cells(arena.grid, arena.start, keys("right", "space", "up", "space", "u", "enter"), written.append)
+    cells = edit_cells(
+        arena.grid, arena.start, keys("right", "space", "up", "space", "u", "enter"), written.append
+    )
     assert cells == [13, 14]
     assert "[#]" in "".join(written)
 

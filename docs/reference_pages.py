@@ -20,10 +20,17 @@ from scipy import stats
 
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.records import column_table, derived_table
-from realitygap.robots import JyroPlatform
+from realitygap.records import column_table, derived_table, ledger_tables
+from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.runs import Condition
-from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
+from realitygap.study import (
+    DEFAULT_NEAT,
+    ConditionNotes,
+    ReportSection,
+    StudySection,
+    TrialsSection,
+    load_study,
+)
 from realitygap.tasks import CLASSICAL_TASKS, CoverageTask
 from realitygap.world import ArenaSettings
 
@@ -37,6 +44,8 @@ TABLES: dict[str, type[BaseModel]] = {
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
+    "[platform.scribbler]": ScribblerPlatform,
+    "[trials]": TrialsSection,
     "[report]": ReportSection,
     "[[condition]]": Condition,
     "[[condition]], notes": ConditionNotes,
@@ -52,6 +61,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
         "parts/columns.md": columns(),
         "parts/derived-columns.md": derived_columns(),
     }
+    pages["parts/ledger.md"] = ledger()
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
     pages["parts/classical-tasks.md"] = classical_tasks()
@@ -201,6 +211,12 @@ def derived_columns() -> str:
         lines = ["| column | type | what it holds |", "|---|---|---|"]
         lines += [f"| `{name}` | {kind} | {escape(text)} |" for name, kind, text in derived_table(what)]
         parts.append(f"## `{what}`\n\nA row is {row}.\n\n" + "\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def ledger() -> str:
+    """The tables of a ledger, as SQLite is told them."""
+    parts = [f"### `{name}`\n\n```sql\n{sql}\n```" for name, sql in ledger_tables().items()]
     return "\n\n".join(parts) + "\n"
 
 

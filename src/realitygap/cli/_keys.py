@@ -1,4 +1,4 @@
-"""Single keys from a terminal, without waiting for Enter."""
+"""Lines and single keys from a terminal."""
 
 from __future__ import annotations
 
@@ -17,6 +17,25 @@ _NAMES = {
 
 _REST_S = 0.05
 """How long the rest of an arrow key's letters may take."""
+
+
+def read_line(prompt: str) -> str:
+    """A line that somebody types, without blanks around it.
+
+    Ctrl-C ends it at once: a plain `input` goes on reading, because polars has signals restart what they interrupt,
+    while `select` is never restarted.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C, or the terminal is gone.
+    """
+    sys.stdout.write(prompt)
+    sys.stdout.flush()
+    if sys.platform != "win32":
+        select.select([sys.stdin], [], [])
+    line = sys.stdin.readline()
+    if not line:
+        raise KeyboardInterrupt
+    return line.strip()
 
 
 class NoKeys:

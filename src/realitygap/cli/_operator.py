@@ -15,7 +15,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._grid_editor import edit_cells
-from ._keys import single_keys
+from ._keys import read_line, single_keys
 
 if TYPE_CHECKING:
     from realitygap.records import Score
@@ -241,10 +241,7 @@ class PersonOperator:
         if not self._is_terminal:
             answered = f" {option}." if option else ""
             raise StudyError(f"There is no terminal in which to ask '{prompt.strip(': ')}'.{answered}")
-        try:
-            return input(prompt).strip()
-        except EOFError:
-            raise KeyboardInterrupt from None
+        return read_line(prompt)
 
 
 def pick_cells(arena: Arena, cells: Sequence[int] = ()) -> list[int] | None:

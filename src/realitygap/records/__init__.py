@@ -23,7 +23,7 @@ from realitygap.records._ledger import (
     TrialState,
     Turn,
 )
-from realitygap.records._ledger_file import LEDGER_FORMAT
+from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._output import is_special, refuse_results, write_whole
@@ -61,6 +61,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "ledger_frame",
     "LEDGER_NAME",
     "LEDGER_FORMAT",
+    "ledger_tables",
     # other files, written whole
     "write_checkpoint",
     "read_checkpoint",

@@ -145,6 +145,12 @@ BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
 """
 
 
+def ledger_tables() -> dict[str, str]:
+    """What SQLite is told of each table, with a remark on each column that needs one."""
+    parts = [part.strip() + ";" for part in TABLES.split(";\n") if part.strip()]
+    return {part.split()[2]: part for part in parts}
+
+
 def create_file(path: Path) -> None:
     """Make an empty ledger; beside its place first, so that the place never holds half of one.
 

@@ -10,6 +10,7 @@ from realitygap._version import __version__
 
 from ._audit import audit_results
 from ._bench import bench
+from ._emulate import emulate
 from ._export import export
 from ._results import digest, report
 from ._show import show
@@ -52,4 +53,5 @@ app.command("export")(export)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)
+app.command("emulate")(emulate)
 app.command("bench")(bench)

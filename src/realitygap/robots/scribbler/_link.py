@@ -42,8 +42,8 @@ MAX_PROBES = 12
 """More than the bytes that any of the Fluke's counters can still wait for."""
 WRITE_S = 2.0
 """How long a port may refuse to take a command [s]."""
-ATTEMPTS = 3
-"""How often a command that is safe to repeat is sent."""
+ATTEMPTS = 5
+"""How often a command that is safe to repeat is sent: enough where half a percent of all bytes are lost."""
 RECOVERIES = 3
 """How often the same step is sought after one fault."""
 REOPENINGS = 8
@@ -541,6 +541,10 @@ class Link:
                     seen, fault = info, _Fault(f"{answer!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
                     raise _HangUp(f"The port hung up ({error})", RobotError) from error
+            except _HangUp as happened:
+                fault = happened
+                with contextlib.suppress(_LostStep):
+                    self._reopen(happened)
             except _Fault as happened:
                 fault = happened
         took = self.clock.now() - since

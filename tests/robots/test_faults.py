@@ -297,7 +297,7 @@ def test_a_port_that_is_never_silent_is_one_error_and_no_hang():
 def test_a_port_where_nobody_answers_is_one_error_after_a_few_tries():
     port = FakePort(FakeScribbler("s2"), Wire(to_robot=lambda number, byte: b""))
     with pytest.raises(
-        RobotTimeout, match=r"No Scribbler answers on /dev/test, asked 4 times within \d+ s. No answer"
+        RobotTimeout, match=r"No Scribbler answers on /dev/test, asked 3 times within \d+ s. No answer"
     ):
         Scribbler(port)
     assert not port.is_open

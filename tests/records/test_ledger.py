@@ -72,7 +72,13 @@ def test_a_trial_goes_from_planned_to_scored(ledger):
     assert ledger.steps(number) == [STEP, STEP]
     ledger.score(number, Score([14, 13, 14], "anna"))
     assert (ledger.trial(number).state, ledger.trial(number).cells) == ("scored", (14, 13))
-    assert [event["what"] for event in ledger.events()] == ["planned", "planned", "running", "driven", "scored"]
+    assert [event["what"] for event in ledger.events()] == [
+        "planned",
+        "planned",
+        "running",
+        "driven",
+        "scored",
+    ]
 
 
 def test_a_void_trial_stays_and_another_is_planned(ledger):
@@ -93,7 +99,10 @@ def test_a_score_can_be_taken_back_and_is_kept_all_the_same(ledger):
     assert ledger.trial(1).cells is None
     ledger.score(1, Score([20], "anna"))
     assert ledger.trial(1).cells == (20,)
-    assert [(row["cells"], row["undone"] is None) for row in ledger.scores()] == [([13, 14], False), ([20], True)]
+    assert [(row["cells"], row["undone"] is None) for row in ledger.scores()] == [
+        ([13, 14], False),
+        ([20], True),
+    ]
 
 
 def test_closing_freezes_the_scores(ledger):
@@ -157,13 +166,19 @@ def test_the_file_itself_lets_nothing_be_deleted(ledger, table):
 @pytest.mark.parametrize(
     ("do", "said"),
     [
-        (lambda ledger: ledger.score(1, Score([1], "anna")), "is planned; that can be done only while it is driven"),
+        (
+            lambda ledger: ledger.score(1, Score([1], "anna")),
+            "is planned; that can be done only while it is driven",
+        ),
         (lambda ledger: ledger.start(9, 1), "has no trial 9: its trials are 1 to 2"),
         (lambda ledger: ledger.undo(1), "only while it is scored"),
         (lambda ledger: ledger.settle(1, "void", "x"), "only while it is running"),
         (lambda ledger: ledger.note("x", "anna", 9), "has no trial 9"),
         (lambda ledger: plan(ledger, 0), "does not allow that"),
-        (lambda ledger: ledger.add_condition("a", "other", {}, n_generations=1, n_cells=72), "other settings"),
+        (
+            lambda ledger: ledger.add_condition("a", "other", {}, n_generations=1, n_cells=72),
+            "other settings",
+        ),
     ],
 )
 def test_what_cannot_be_done_changes_nothing(ledger, do, said):

@@ -229,6 +229,21 @@ def test_a_hang_up_is_survived_when_the_port_comes_back():
     assert port.robot.motors == STILL
 
 
+def test_a_hang_up_in_the_greeting_is_survived_too():
+    port = FakePort(FakeScribbler("s2"))
+    write = port.write
+
+    def hang_up(data: bytes) -> int:
+        port.write = write  # type: ignore[method-assign]
+        port.close()
+        raise OSError(5, "Input/output error")
+
+    port.write = hang_up  # type: ignore[method-assign]
+    with Scribbler(port) as robot:
+        assert robot.info.model == "s2"
+        assert robot.faults.hang_ups == 1
+
+
 def test_a_hang_up_for_good_is_one_error():
     port = FakePort(FakeScribbler("s2+fluke1"))
     robot = Scribbler(port)
@@ -282,7 +297,7 @@ def test_a_port_that_is_never_silent_is_one_error_and_no_hang():
 def test_a_port_where_nobody_answers_is_one_error_after_a_few_tries():
     port = FakePort(FakeScribbler("s2"), Wire(to_robot=lambda number, byte: b""))
     with pytest.raises(
-        RobotTimeout, match=r"No Scribbler answers on /dev/test, asked 4 times within \d+ s. No answer"
+        RobotTimeout, match=r"No Scribbler answers on /dev/test, asked 3 times within \d+ s. No answer"
     ):
         Scribbler(port)
     assert not port.is_open

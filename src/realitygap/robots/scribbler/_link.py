@@ -42,14 +42,16 @@ MAX_PROBES = 12
 """More than the bytes that any of the Fluke's counters can still wait for."""
 WRITE_S = 2.0
 """How long a port may refuse to take a command [s]."""
-ATTEMPTS = 3
-"""How often a command that is safe to repeat is sent."""
+ATTEMPTS = 5
+"""How often a command that is safe to repeat is sent: enough where half a percent of all bytes are lost."""
 RECOVERIES = 3
 """How often the same step is sought after one fault."""
 REOPENINGS = 8
 """How often a port that hung up is opened again, once a second."""
 GREETINGS = 4
-"""How often a robot is asked who it is; one that was reset as its port was opened is back at the third."""
+"""How often a robot is asked who it is."""
+SILENT_GREETINGS = 3
+"""How often if nothing at all comes: one that was reset as its port was opened is back by then."""
 STRANGER_PROBES = 8
 """Enough to release a Fluke, and less than a packet for a robot that has none."""
 LONGEST_LINE = 512
@@ -533,19 +535,25 @@ class Link:
                 try:
                     if greeting:
                         self._await_silence(FORGET_S)
+                    if greeting == 1:
                         self._release_counter(STRANGER_PROBES)
-                        self._await_silence(FORGET_S)
                     answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
                     if info == seen or codec.is_plain_info(answer):
                         return info
                     seen, fault = info, _Fault(f"{answer!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
                     raise _HangUp(f"The port hung up ({error})", RobotError) from error
+            except _HangUp as happened:
+                fault = happened
+                with contextlib.suppress(_LostStep):
+                    self._reopen(happened)
             except _Fault as happened:
                 fault = happened
+                if greeting == SILENT_GREETINGS - 1 and not fault.got:
+                    break
         took = self.clock.now() - since
         raise fault.kind(
-            f"No Scribbler answers on {self.name}, asked {GREETINGS} times within {took:.0f} s. {fault}. "
+            f"No Scribbler answers on {self.name}, asked {greeting + 1} times within {took:.0f} s. {fault}. "
             "Is the robot on, paired, and not in use by another program?"
         ) from fault
 

@@ -88,8 +88,8 @@ def test_a_void_trial_stays_and_another_is_planned(ledger):
     again = ledger.trials()[1]
     assert (again.code, again.place, again.sheet) == ("C00-2", 1, 1)
     assert ledger.trial(1).reason == "the pen fell out"
+    drive(ledger, 2)
     with pytest.raises(LedgerError, match="Give a reason"):
-        drive(ledger, 2)
         ledger.void(2, " ")
 
 
@@ -235,14 +235,14 @@ def test_every_torn_page_is_found_or_harmless(tmp_path):
         path = tmp_path / f"torn-{start}" / "ledger.sqlite"
         path.parent.mkdir()
         path.write_bytes(whole[:start] + bytes(4096) + whole[start + 4096 :])
+        said = ""
         try:
             with Ledger.open(path) as ledger:
-                found = (ledger.trials(), ledger.scores())
+                assert (ledger.trials(), ledger.scores()) == wanted
         except LedgerError as error:
-            n_refused += 1
-            assert "Restore" in str(error)
-        else:
-            assert found == wanted
+            said = str(error)
+        assert not said or "Restore" in said
+        n_refused += bool(said)
     assert n_refused >= 5
 
 

@@ -74,8 +74,9 @@ def before_and_after_commits(point: Point):
 
 
 def carry_out(path: Path, point: Point, selection: str) -> None:
+    study = small_study(selection, population="2", steps="2")
     with before_and_after_commits(point):
-        drive(small_study(selection), path, operator=Telling(point, path.with_suffix(".diary")), fault=point)
+        drive(study, path, operator=Telling(point, path.with_suffix(".diary")), fault=point)
 
 
 def count_points(path: Path, selection: str) -> int:
@@ -151,7 +152,7 @@ def test_a_study_killed_again_and_again_comes_to_its_end(tmp_path):
         sittings += 1
         assert sittings < 100
     assert sittings >= 3
-    drive(small_study("coverage"), tmp_path / "whole")
+    drive(small_study("coverage", population="2", steps="2"), tmp_path / "whole")
     assert scored(path) == scored(tmp_path / "whole")
     check_nothing_was_asked_twice(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import random
 import re
@@ -49,10 +50,7 @@ def test_a_study_runs_unattended_and_comes_out_the_same_again(tmp_path, selectio
         assert sitting["ended"] is not None
         steps = ledger.steps(1)
         assert len(steps) == 12
-        assert all(
-            abs((after.time - before.time) - 0.5) < 0.3
-            for before, after in zip(steps, steps[1:], strict=False)
-        )
+        assert all(abs((after.time - before.time) - 0.5) < 0.3 for before, after in itertools.pairwise(steps))
         assert len(ledger.scores()[0]["path"]) == 4 * 12 + 1
 
 

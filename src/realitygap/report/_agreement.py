@@ -27,7 +27,8 @@ class Agreement:
         n_cells: judged in all, every reachable cell of each trial.
         same: share of these that both judge alike [0..1].
         kappa: Cohen's kappa: 1 where they always agree, 0 where as often as by chance; None where all cells are alike.
-        low, high: its 95 % interval; None below 10 trials.
+        low: lower bound of its 95 % interval; None below 10 trials.
+        high: upper bound.
     """
 
     n_trials: int

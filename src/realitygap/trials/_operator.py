@@ -113,11 +113,7 @@ class WitnessOperator:
 
     @property
     def witness(self) -> Witness:
-        """Of the robot that was met.
-
-        Raises:
-            RobotError: It has none.
-        """
+        """Of the robot that was met; one that has none is a `RobotError`."""
         if self._witness is None:
             raise RobotError(
                 "This robot has no witness that would say what it drew: it is no emulator in this program. Name the "

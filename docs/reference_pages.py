@@ -20,10 +20,17 @@ from scipy import stats
 
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.records import column_table, derived_table
-from realitygap.robots import JyroPlatform
+from realitygap.records import column_table, derived_table, ledger_tables
+from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.runs import Condition
-from realitygap.study import DEFAULT_NEAT, ConditionNotes, ReportSection, StudySection, load_study
+from realitygap.study import (
+    DEFAULT_NEAT,
+    ConditionNotes,
+    ReportSection,
+    StudySection,
+    TrialsSection,
+    load_study,
+)
 from realitygap.tasks import CLASSICAL_TASKS, CoverageTask
 from realitygap.world import ArenaSettings
 
@@ -37,6 +44,8 @@ TABLES: dict[str, type[BaseModel]] = {
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
+    "[platform.scribbler]": ScribblerPlatform,
+    "[trials]": TrialsSection,
     "[report]": ReportSection,
     "[[condition]]": Condition,
     "[[condition]], notes": ConditionNotes,
@@ -52,12 +61,13 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
         "parts/columns.md": columns(),
         "parts/derived-columns.md": derived_columns(),
     }
+    pages["parts/ledger.md"] = ledger()
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
-    pages |= {f"commands/{name}.md": page for name, page in command_pages().items()}
+    pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -204,12 +214,22 @@ def derived_columns() -> str:
     return "\n\n".join(parts) + "\n"
 
 
+def ledger() -> str:
+    """The tables of a ledger, as SQLite is told them."""
+    parts = [f"### `{name}`\n\n```sql\n{sql}\n```" for name, sql in ledger_tables().items()]
+    return "\n\n".join(parts) + "\n"
+
+
 # --- commands -----------------------------------------------------------------------------------------------
 
 
 def commands() -> dict[str, Any]:
-    """Every command of the command line by name."""
-    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+    """Every command of the command line by name, those of a group with the group's before it."""
+    found: dict[str, Any] = {}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        members = getattr(command, "commands", None)
+        found |= {name: command} if members is None else {f"{name} {each}": members[each] for each in members}
+    return found
 
 
 def command_pages() -> dict[str, str]:

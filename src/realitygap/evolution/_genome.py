@@ -374,6 +374,20 @@ def genome_from_record(
     return Genome(genomes, 0, rules, bias_value)
 
 
+def genome_record(genome: Genome) -> dict[str, list[Any]]:
+    """What a row of results has of a genome; `genome_from_record` reads it."""
+    nodes = [node for node in genome.nodes if node.kind in ("output", "hidden")]
+    genes = genome.connections
+    return {
+        "hidden": [node.id for node in nodes if node.kind == "hidden"],
+        "biases": [node.bias for node in nodes] if genome.rules.node_bias else [],
+        **{
+            name: [getattr(gene, name) for gene in genes]
+            for name in ("innovation", "source", "target", "weight", "enabled")
+        },
+    }
+
+
 def _check_genome(form: _json.GenomeForm, where: str) -> None:
     """Refuse genes that no evolution of ours could have made, and kernels could not read."""
     kinds = "".join(node.kind[0] for node in form.nodes)  # i, b, o, h

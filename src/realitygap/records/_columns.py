@@ -55,7 +55,10 @@ COLUMNS: tuple[Column, ...] = (
         "coverage_line", pl.Float64(), "Visited share of the reachable cells, along the line driven [0..1]."
     ),
     Column(
-        "coverage_ends", pl.Float64(), "Visited share of the reachable cells, at the ends of steps [0..1]."
+        "coverage_ends",
+        pl.Float64(),
+        "Visited share of the reachable cells, at the ends of steps [0..1]; null where a person scored a robot's trial "
+        "and saw the line only.",
     ),
     Column(
         "cells",

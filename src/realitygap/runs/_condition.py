@@ -13,7 +13,7 @@ from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.evolution import NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
-from realitygap.robots import JyroPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings, check_start
@@ -25,6 +25,7 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 MOST_TRIALS = 5_000_000
 
 Selection = Literal["coverage", "novelty", "random"]
+Platform = Literal["jyro", "scribbler"]
 
 
 class Condition(Settings):
@@ -41,13 +42,16 @@ class Condition(Settings):
         description="What decides who has children: coverage (the paper's objective NEAT), novelty, or nothing: "
         "random tries as many unrelated networks, the control that the paper lacks.",
     )
-    platform: Literal["jyro"] = Field("jyro", description="What the networks are tried on.")
+    platform: Platform = Field(
+        "jyro",
+        description="What the networks are tried on: jyro, the paper's simulation, or scribbler, the robot.",
+    )
     noise: float = Field(
         0.1,
         ge=0,
         le=10,
         description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8).",
+        "(section 2.3: 0.1, 0.5, 0.8). On a robot 0: its readings are noisy by themselves.",
     )
     seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
     pair: bool = Field(
@@ -60,10 +64,32 @@ class Condition(Settings):
     neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
     novelty: NoveltySettings = NoveltySettings()
     jyro: JyroPlatform = JyroPlatform()
+    scribbler: ScribblerPlatform = ScribblerPlatform()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_robot_adds_its_own_noise(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("platform") == "scribbler":
+            return {"noise": 0.0, **values}
+        return values
+
+    @model_validator(mode="after")
+    def _an_operator_can_score_it(self) -> Self:
+        if self.is_physical and self.noise != 0:
+            raise ValueError(
+                f"noise is {self.noise:g}, expected none with platform 'scribbler': a robot's readings are noisy by "
+                "themselves. Leave it out."
+            )
+        if self.is_physical and self.task.cells != "line":
+            raise ValueError(
+                "task.cells is 'ends', expected 'line' with platform 'scribbler': on paper stands the line that was "
+                "driven, and not where steps end."
+            )
+        return self
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        check_start(self.arena.arena(), self.jyro.body)
+        check_start(self.arena.arena(), self.tried_on.body)
         return self
 
     @model_validator(mode="after")
@@ -78,8 +104,18 @@ class Condition(Settings):
 
     @property
     def label(self) -> str:
-        """What every figure of this condition says: SIM."""
-        return self.jyro.label
+        """What every figure of this condition says, SIM; of a robot the ledger knows whether EMULATED or REAL."""
+        return self.tried_on.label
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether its trials are driven by a robot, and scored into a ledger."""
+        return self.platform == "scribbler"
+
+    @property
+    def tried_on(self) -> JyroPlatform | ScribblerPlatform:
+        """The settings of its platform."""
+        return self.scribbler if self.platform == "scribbler" else self.jyro
 
     @property
     def key(self) -> int:
@@ -99,7 +135,8 @@ class Condition(Settings):
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
-        return self.model_dump(mode="json", exclude={"name"})
+        unused = {"jyro", "scribbler"} - {self.platform}
+        return self.model_dump(mode="json", exclude={"name", *unused})
 
     def hash(self) -> str:
         """A hash of `settings` and, where random numbers depend on it, the name."""

@@ -53,6 +53,27 @@ class ReportSection(Settings):
     )
 
 
+class TrialsSection(Settings):
+    """How trials on a robot are led through; changes no simulated result."""
+
+    order: Literal["in-order", "shuffled"] = Field(
+        "in-order",
+        description="in-order: generation by generation, run by run, condition by condition. shuffled: the same "
+        "generation of all conditions together, their individuals mixed, so that a battery that drains or a floor that "
+        "wears meets all conditions alike.",
+    )
+    blind: bool = Field(
+        False,
+        description="Show trials under codes, so that nobody who counts cells knows of which condition they are.",
+    )
+    pens: list[Annotated[Line, Field(min_length=1, max_length=20)]] = Field(
+        ["black", "red", "blue", "green", "orange", "purple", "brown", "pink"],
+        min_length=1,
+        max_length=64,
+        description="Colors to draw with, one a trial; as many trials share a sheet of paper (section 2.1: eight).",
+    )
+
+
 class ConditionNotes(Settings):
     """What is said of a condition beside its settings; changes no result."""
 
@@ -74,6 +95,7 @@ class Study(Settings):
 
     about: StudySection
     report: ReportSection
+    trials: TrialsSection = TrialsSection()
     conditions: tuple[Condition, ...]
     notes: tuple[ConditionNotes, ...]
 
@@ -107,6 +129,11 @@ class Study(Settings):
         """Runs in all."""
         return len(self.conditions) * self.about.replicates
 
+    @property
+    def n_physical(self) -> int:
+        """Conditions that a robot drives."""
+        return sum(condition.is_physical for condition in self.conditions)
+
     def description(self) -> dict[str, Any]:
         """The study as the folder of results keeps it (`study.json`)."""
         return {
@@ -118,6 +145,7 @@ class Study(Settings):
             "pair": self.about.pair,
             "replicates": self.about.replicates,
             "report": self.report.model_dump(mode="json"),
+            **({"trials": self.trials.model_dump(mode="json")} if self.n_physical else {}),
             "conditions": [
                 {
                     "name": condition.name,

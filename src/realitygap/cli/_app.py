@@ -13,9 +13,11 @@ from ._bench import bench
 from ._emulate import emulate
 from ._export import export
 from ._results import digest, report
+from ._robot import robot
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
+from ._trials import trials
 
 app = typer.Typer(
     name="realitygap",
@@ -55,3 +57,5 @@ app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)
+app.add_typer(robot, name="robot")
+app.command("trials")(trials)

@@ -1,6 +1,27 @@
 """Platforms, whatever can try a controller, and the contract of a robot."""
 
+from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
+from ._recorded_robot import RecordedRobot
+from ._recording import Recorder, Recording, read_recording
+from ._recording_mcap import export_mcap
+from ._scribbler_platform import ScribblerPlatform
 
-__all__ = ["STEP_S", "Command", "JyroPlatform", "Label", "Observation", "Robot", "check_command"]
+__all__ = [
+    "STEP_S",
+    "Clock",
+    "Command",
+    "JyroPlatform",
+    "Label",
+    "Observation",
+    "RecordedRobot",
+    "Recorder",
+    "Recording",
+    "Robot",
+    "ScribblerPlatform",
+    "SystemClock",
+    "check_command",
+    "export_mcap",
+    "read_recording",
+]

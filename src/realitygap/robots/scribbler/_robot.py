@@ -1,0 +1,235 @@
+"""The Scribbler as a robot that trials and calibration can use."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+from realitygap.errors import RecordError, RobotError
+from realitygap.robots._clock import Clock
+from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.robots._recording import Recorder
+from realitygap.world import Pose
+
+from . import _codec as codec
+from ._board import Board
+from ._camera import Camera
+from ._device import RobotInfo
+from ._driving import Driving
+from ._exits import EXITS
+from ._identity import Identity
+from ._link import Link, open_port
+from ._odometry import Odometry
+from ._ports import label_of, port_name
+from ._senses import Senses
+from ._sound import SoundAndLight
+from ._watchdog import Watchdog, WatchedClock
+
+T = TypeVar("T")
+
+FAR = 99
+"""What an S2's distance reads where nothing is seen."""
+
+
+class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Board):
+    """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
+
+    | command | least | most | unit |
+    |---|---|---|---|
+    | move | -1 | 1 | 1: full speed, the end ahead first |
+    | turn | -1 | 1 | 1: one wheel full ahead, the other full back, to the left |
+
+    | observation | with | from 0 | to 1 | raw |
+    |---|---|---|---|---|
+    | obstacle left, center, right | a Fluke | free | `reading_max` and more | 0 to 6400 |
+    | distance left, right | an S2 alone | nothing seen | touching | 99 to 0 |
+    | infrared left, right | an S1 alone | free | an obstacle | 1, 0 |
+
+    The motors are off once it is open. They stop on every way out: `close`, the end of a `with` block, an exception,
+    Ctrl-C, SIGTERM, the end of the program; for trials, also where the program is silent (`watchdog_s`).
+
+    Args:
+        port: Its name, as pyserial takes it, with or without `scribbler:` before it; or an open port.
+        step_s: How long a command of `drive` lasts [s].
+        reading_max: The obstacle reading that is as near as can be told.
+        record: A file in which all that is said is kept, command by command.
+        watchdog_s: Stop the motors when the program has not spoken to the robot for so long [s]; None for never.
+
+    Raises:
+        RobotError: The port cannot be opened, or no Scribbler answers.
+    """
+
+    def __init__(
+        self,
+        port: str | Any,
+        *,
+        step_s: float = 0.5,
+        reading_max: float = 1700.0,
+        record: Path | str | None = None,
+        watchdog_s: float | None = None,
+    ) -> None:
+        if not (step_s >= 0 and reading_max > 0):
+            raise ValueError(
+                f"step_s is {step_s} and reading_max {reading_max}, expected 0 or more and more than 0."
+            )
+        name = (
+            port_name(port) if isinstance(port, str) else str(getattr(port, "name", None) or "a given port")
+        )
+        label = label_of(name) if isinstance(port, str) else "EMULATED"
+        self.link = Link(open_port(name) if isinstance(port, str) else port, name)
+        self._recorder = None if record is None else self._record_into(record)
+        EXITS.hold()
+        self._released = weakref.finalize(self, _let_go, self.link)  # also when the program ends
+        try:
+            found = self.link.greet()
+            self._watchdog = None if watchdog_s is None else Watchdog(self.link, watchdog_s)
+        except BaseException as error:
+            self.link.close()
+            self._released()
+            if self._recorder is not None:
+                self._recorder.begin({"port": name, "error": str(error)})
+                self._recorder.close()
+            raise
+        self.info = RobotInfo(*found, port=name, label=label)
+        self.step_s = step_s
+        self.reading_max = reading_max
+        self.label: Label = label
+        self.n_sensors = 3 if self.info.fluke != "none" else 2
+        self._n_steps = 0
+        if self._recorder is not None:
+            names = ("label", "step_s", "n_sensors", "reading_max")
+            set_up = {each: getattr(self, each) for each in names}
+            self._recorder.begin(
+                {"port": name, "robot": asdict(self.info), **set_up, "watchdog_s": watchdog_s}
+            )
+
+    def _record_into(self, path: Path | str) -> Recorder:
+        try:
+            recorder = Recorder(path, self.link.clock)
+        except RecordError:
+            self.link.close()
+            raise
+        self.link.tell = lambda exchange: recorder.wire(*exchange)
+        return recorder
+
+    def _noted(self, name: str, work: Callable[[], T]) -> T:
+        """Do it; what goes wrong is recorded."""
+        try:
+            return work()
+        except RobotError as error:
+            if self._recorder is not None:
+                self._recorder.fault(name, error)
+            raise
+
+    @property
+    def clock(self) -> Clock:
+        """The time that this robot lives in; whoever waits by it is watched, too."""
+        return self.link.clock if self._watchdog is None else WatchedClock(self.link.clock, self._watchdog)
+
+    # --- the contract -----------------------------------------------------------------------------------------
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Begin a trial: motors stopped, steps counted from 0; somebody has put the robot where it starts."""
+        self.need_robot("reset")
+        if self._recorder is not None:
+            self._recorder.call("reset")
+        self._noted("reset", super().stop)
+        self._n_steps = 0
+        self.link.where = ""
+
+    def observe(self) -> Observation:
+        """Read the sensors that look ahead, and whether the robot is blocked."""
+        if self._recorder is None:
+            return self._observe()
+        seen = self._noted("observe", self._observe)
+        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw)
+        return seen
+
+    def _observe(self) -> Observation:
+        if self.info.fluke != "none":
+            raw = self.obstacle()
+            scale = self.reading_max
+            readings = tuple([min(value / scale, 1.0) for value in raw])
+            return Observation(readings, self.stall(), tuple(map(float, raw)))
+        if self.info.model == "s2":
+            far = self.distance()
+            readings = tuple([max(1.0 - value / FAR, 0.0) for value in far])
+            return Observation(readings, self.stall(), tuple(map(float, far)))
+        ir, _, stall = self._flags()
+        return Observation((1.0 - ir[0], 1.0 - ir[1]), stall, tuple(map(float, ir)))
+
+    def drive(self, command: Command) -> None:
+        """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
+
+        The robot moves on until the next command.
+        """
+        move, turn = check_command(command)
+        self._n_steps += 1
+        self.link.where = f"step {self._n_steps}"
+        left, right = _within(move - turn), _within(move + turn)
+        if self._recorder is None:
+            self.motors(left, right)
+        else:
+            self._recorder.call("drive", move=move, turn=turn)
+            self._noted("drive", lambda: self.motors(left, right))
+        if self._watchdog is not None:
+            self._watchdog.excuse(self.step_s)
+        self.link.clock.sleep(self.step_s)
+
+    def stop(self) -> None:
+        """Stop the motors; safe to call at any moment, and twice."""
+        if self._recorder is not None and self.link.is_open:
+            self._recorder.call("stop")
+        super().stop()
+
+    def close(self) -> None:
+        """Stop the motors and let go of the port; safe to call twice.
+
+        Raises:
+            RobotError: The motors could not be stopped; the port is closed all the same.
+        """
+        if not self.link.is_open:
+            return
+        try:
+            super().stop()
+        finally:
+            if self._watchdog is not None:
+                self._watchdog.end()
+            self.link.close()
+            self._released()
+            if self._recorder is not None:
+                self._recorder.call("close")
+                self._recorder.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except RobotError as failure:
+            if error is None:
+                raise
+            error.add_note(str(failure))
+
+
+def _within(wheel: float) -> float:
+    return min(max(wheel, -1.0), 1.0)
+
+
+def _let_go(link: Link) -> None:
+    """Stop the motors of a robot that nobody has closed, and close its port."""
+    try:
+        if link.has_robot and link.is_open:
+            link.ask(codec.STOP, codec.sensor_block)
+    except RobotError:
+        pass
+    finally:
+        link.close()
+        EXITS.release()

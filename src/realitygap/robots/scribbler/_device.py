@@ -1,0 +1,114 @@
+"""An open robot: its link, who it is, and what every part of the driver builds on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from realitygap.errors import RobotError
+from realitygap.robots._contract import Label
+
+from . import _codec as codec
+from ._codec import Request, SensorBlock
+from ._link import Faults, Link
+from ._opcodes import Op
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class RobotInfo:
+    """Who is at the other end of a port.
+
+    Attributes:
+        model: "s1", "s2" (also an S3), or None: a Fluke without a robot.
+        fluke: "none", "1" or "2".
+        robot_version, fluke_version: Of the firmware, as it says; empty where there is none.
+        port: Its name.
+        label: What figures say of it.
+    """
+
+    model: str | None
+    fluke: str
+    robot_version: str
+    fluke_version: str
+    port: str
+    label: Label
+
+    def __str__(self) -> str:
+        robot = {"s1": "S1", "s2": "S2", None: "no robot"}[self.model]
+        robot += f" (firmware {self.robot_version})" if self.robot_version else ""
+        board = "no Fluke" if self.fluke == "none" else f"Fluke {self.fluke} (firmware {self.fluke_version})"
+        return f"{robot}, {board} on {self.port}"
+
+
+class Device:
+    """What all parts of the driver share: asking, and knowing what the robot has."""
+
+    link: Link
+    info: RobotInfo
+    last_sensors: SensorBlock | None = None
+    """The senses that came with the answer to the last setting; None before the first."""
+
+    @property
+    def port(self) -> Any:
+        """The serial object; an emulated one has `clock` and `witness`."""
+        return self.link.port
+
+    @property
+    def faults(self) -> Faults:
+        """How often the link was disturbed so far."""
+        return self.link.faults
+
+    def _get(self, request: Request, decode: Callable[[bytes], T]) -> T:
+        return self.link.ask(request, decode)
+
+    def _set(self, request: Request) -> SensorBlock:
+        """Have a setting of the robot carried out; its answer is what the robot senses."""
+        self.last_sensors = self.link.ask(request, codec.sensor_block)
+        return self.last_sensors
+
+    def _set_late(self, request: Request) -> None:
+        """The same where a Fluke 2 may not wait for the answer."""
+        block = self.link.ask(request, codec.late_sensor_block)
+        self.last_sensors = block if block is not None else self.last_sensors
+
+    def _tell_fluke(
+        self, name: str, op: Op, arguments: bytes = b"", *, repeatable: bool = True, pause_s: float = 0.0
+    ) -> None:
+        """A setting of the Fluke, which answers none."""
+        self.need_fluke(name)
+        request = codec.fluke_request(name, op, arguments, answer=0, repeatable=repeatable, pause_s=pause_s)
+        self.link.ask(request, codec.nothing)
+
+    def _need(self, what: str, there: bool, who_has_it: str) -> None:
+        if not there:
+            raise RobotError(f"'{what}' needs {who_has_it}; here is {self.info}.")
+
+    def need_robot(self, what: str) -> None:
+        """Raise `RobotError` where no robot is behind the Fluke."""
+        self._need(what, self.info.model is not None, "a robot (S1, S2 or S3)")
+
+    def need_s2(self, what: str) -> None:
+        """Raise `RobotError` where the robot is not an S2 or S3."""
+        self._need(what, self.info.model == "s2", "an S2 or S3")
+
+    def need_fluke(self, what: str) -> None:
+        """Raise `RobotError` where there is no Fluke."""
+        self._need(what, self.info.fluke != "none", "a Fluke")
+
+    def need_fluke_2(self, what: str) -> None:
+        """Raise `RobotError` where there is no Fluke 2."""
+        self._need(what, self.info.fluke == "2", "a Fluke 2")
+
+
+def limited(name: str, value: float, low: float, high: float) -> float:
+    """The value, if it is within its range.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not low <= value <= high:
+        raise ValueError(f"{name} is {value!r}, expected {low:g} to {high:g}.")
+    return value

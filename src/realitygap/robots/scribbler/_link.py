@@ -1,0 +1,553 @@
+"""The conversation with a robot over its port: the only code that touches pyserial.
+
+A frame has no mark and no checksum, so a lost or added byte shifts all that follows. What holds the two sides together:
+one command at a time, echoes compared, values that no robot sends refused, and after every doubt silence, then a
+command whose echo proves that both count from the same byte again.
+
+Source: the protocol of Myro's firmware and clients. Differs: where a Fluke 1 has counted part of a packet, which it
+never forgets, Myro has no way out; see `Link._release_counter`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.robots._clock import Clock, SystemClock
+
+from . import _codec as codec
+from ._codec import Request
+from ._opcodes import COUNTED, JPEG_HEADER, JPEG_SCAN, LINE, PACKET, Op
+
+T = TypeVar("T")
+
+BAUD = 38400
+GAP_S = 0.5
+"""An answer that has begun and then is silent for so long has lost a byte [s]."""
+QUIET_S = 0.5
+"""Silence after which nothing more is on its way [s]. Source: Myro's manual_flush."""
+FORGET_S = 1.2
+"""Silence after which a robot has thrown half a packet away [s]: its firmware does after 1 s."""
+CHATTER_S = 10.0
+"""A port that is not silent for so long does not belong to a robot that waits for commands [s]."""
+CHATTER_BYTES = 1 << 20
+"""Likewise for so many bytes, however fast they come."""
+PROBE_S = 0.3
+"""How long a Fluke's battery reading may take when probing [s]."""
+MAX_PROBES = 12
+"""More than the bytes that any of the Fluke's counters can still wait for."""
+WRITE_S = 2.0
+"""How long a port may refuse to take a command [s]."""
+ATTEMPTS = 3
+"""How often a command that is safe to repeat is sent."""
+RECOVERIES = 3
+"""How often the same step is sought after one fault."""
+REOPENINGS = 8
+"""How often a port that hung up is opened again, once a second."""
+GREETINGS = 4
+"""How often a robot is asked who it is; one that was reset as its port was opened is back at the third."""
+STRANGER_PROBES = 8
+"""Enough to release a Fluke, and less than a packet for a robot that has none."""
+LONGEST_LINE = 512
+LONGEST_SCAN = 1 << 20
+
+
+try:
+    import termios
+
+    _HANG_UPS: tuple[type[Exception], ...] = (OSError, termios.error)
+except ImportError:  # Windows
+    _HANG_UPS = (OSError,)
+# What a port that is gone raises; pyserial's own exceptions are OSErrors.
+
+_MOVING = frozenset((Op.SET_MOTORS, Op.PATH, Op.MOVE, Op.ARC, Op.TURN))
+_STEERING = _MOVING | {Op.SET_MOTORS_OFF}
+
+
+class Port(Protocol):
+    """What is needed of a port: what `serial.Serial` offers, in the same words."""
+
+    timeout: float | None
+
+    @property
+    def in_waiting(self) -> int: ...
+    def read(self, size: int = 1, /) -> bytes: ...
+    def write(self, data: bytes, /) -> int | None: ...
+    def open(self) -> None: ...
+    def close(self) -> None: ...
+
+
+@dataclass
+class Faults:
+    """How often the link was disturbed since it was opened.
+
+    Attributes:
+        retries: Commands sent again.
+        strays: Bytes that came when none were awaited.
+        recoveries: Times at which both sides had to find the same step again; the motors stood still meanwhile.
+        hang_ups: Times at which the port was gone.
+        watchdog_stops: Times at which the motors were stopped because the controlling loop was silent.
+    """
+
+    retries: int = 0
+    strays: int = 0
+    recoveries: int = 0
+    hang_ups: int = 0
+    watchdog_stops: int = 0
+
+
+class Exchange(NamedTuple):
+    """One command and what came of it.
+
+    Attributes:
+        time_s: When it was sent, by the port's clock [s].
+        took_s: Until its answer was complete, or given up [s].
+        name: Of the command.
+        sent, answered: The bytes.
+        outcome: "ok", or what went wrong.
+    """
+
+    time_s: float
+    took_s: float
+    name: str
+    sent: bytes
+    answered: bytes
+    outcome: str
+
+
+class _Fault(Exception):  # noqa: N818  # not one that leaves this module
+    """A command that did not get its answer.
+
+    Attributes:
+        kind: What to raise when it is not put right.
+        understood: Whether the robot has certainly read the whole command.
+        got: The bytes that came.
+    """
+
+    def __init__(
+        self, text: str, kind: type[RobotError], got: bytes = b"", *, understood: bool = False
+    ) -> None:
+        super().__init__(text)
+        self.kind = kind
+        self.got = got
+        self.understood = understood
+
+
+class _HangUp(_Fault):
+    """The port is gone."""
+
+
+class _LostStep(Exception):  # noqa: N818
+    """The two sides could not be brought to agree, for this reason."""
+
+    def __init__(self, fault: _Fault | None) -> None:
+        super().__init__(str(fault))
+        self.fault = fault
+
+
+def open_port(name: str) -> Any:
+    """A port as pyserial opens it, with DTR low, as a cabled S2 needs it to speak.
+
+    Raises:
+        RobotError: it cannot be opened; the text says what to do.
+    """
+    import serial
+
+    port: Any = None
+    try:
+        port = serial.serial_for_url(name, do_not_open=True, baudrate=BAUD, timeout=GAP_S)
+        port.write_timeout = WRITE_S
+        port.dtr = False
+        with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
+            port.exclusive = True
+        port.open()
+    except (OSError, ValueError, AttributeError) as error:
+        raise RobotError(f"{name} cannot be opened: {error}. {_advice(name, error)}") from error
+    return port
+
+
+def serial_devices() -> list[Any]:
+    """The serial ports that the system knows of, as pyserial describes them."""
+    from serial.tools import list_ports
+
+    return list(list_ports.comports())
+
+
+def _advice(name: str, error: Exception) -> str:
+    text = str(error).lower()
+    if "permission" in text or "denied" in text:
+        return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
+    if "lock" in text or "busy" in text:
+        return "Another program holds it; close that one."
+    if "://" in name:
+        return "Is the address right, and does something listen there?"
+    return "Is the robot on, paired and connected? `realitygap robot list` names the ports that are there."
+
+
+class Link:
+    """A port with a robot at its other end; every method may be called from any thread.
+
+    Args:
+        port: As `open_port` gives it, or anything with the same methods; its attribute `clock` is the time.
+        name: Of the port, for messages.
+    """
+
+    def __init__(self, port: Port, name: str) -> None:
+        self.port = port
+        self.name = name
+        self.clock: Clock = getattr(port, "clock", None) or SystemClock()
+        self.has_robot = True
+        self.fluke = "none"
+        self.faults = Faults()
+        self.where = ""
+        self.motors_off: bool | None = None
+        self.tell: Callable[[Exchange], None] | None = None
+        self.lock = threading.RLock()
+        self._motors: Request | None = None
+        self._in_step = False
+        self._fault: _Fault | None = None
+        self._recoveries = RECOVERIES
+        self._is_open = True
+        port.timeout = GAP_S
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it may be used."""
+        return self._is_open
+
+    # --- one command ------------------------------------------------------------------------------------------
+
+    def ask(self, request: Request, decode: Callable[[bytes], T]) -> T:
+        """Send a command and decode its answer.
+
+        Args:
+            request: The command.
+            decode: Makes a value of the bytes after the echo; raises `ProtocolError` where no robot sends them.
+
+        Raises:
+            RobotTimeout: no answer came in time, also not to repeats where these are safe.
+            ProtocolError: the answer made no sense, likewise.
+            RobotError: the port is closed, or hung up and did not come back.
+        """
+        with self.lock:
+            if not self._is_open:
+                raise RobotError(f"{self.name} is closed: open the robot anew before '{request.name}'.")
+            fault, lost = None, False
+            for attempt in range(ATTEMPTS):
+                try:
+                    if not self._in_step:
+                        self._find_step()
+                    if attempt:
+                        self.faults.retries += 1
+                        self._move_on(request)
+                    return self._exchange(request, decode)
+                except _LostStep as happened:
+                    fault, lost = happened.fault, True
+                    break
+                except _Fault as happened:
+                    fault = happened
+                    if not request.repeatable:
+                        break
+            raise self._failure(request, fault, attempt + 1, lost=lost) from fault
+
+    def _exchange(self, request: Request, decode: Callable[[bytes], T]) -> T:
+        """Send a command once; where what is due does not come, raise `_Fault`."""
+        port = self.port
+        since = self.clock.now()
+        # A signal may take us out of here at any point, and leave the link in doubt.
+        self._in_step, self._fault = False, None
+        if request.data[0] in _MOVING:
+            self.motors_off = False
+        got = b""
+        try:
+            try:
+                if port.in_waiting:
+                    self._discard()
+                port.write(request.data)
+                if request.answer or request.echoed:
+                    got = self._read(request)
+                    if port.in_waiting:
+                        raise _Fault("More came than the answer", ProtocolError, got, understood=True)
+            except _HANG_UPS as error:
+                raise _HangUp(f"The port hung up ({error})", RobotError, got) from error
+            try:
+                value = decode(self._body(request, got))
+            except ProtocolError as error:
+                raise _Fault(str(error), ProtocolError, got, understood=True) from error
+        except _Fault as fault:
+            self._fault = fault
+            self._record(request, since, fault.got, str(fault))
+            raise
+        self._in_step = True
+        self._recoveries = RECOVERIES
+        if request.data[0] in _STEERING:
+            self._note_motors(request)
+        if request.pause_s:
+            self.clock.sleep(request.pause_s)
+        if self.tell is not None:
+            self._record(request, since, got, "ok")
+        return value
+
+    def _note_motors(self, request: Request) -> None:
+        """Keep what the motors were told last."""
+        standing = request.data[0] == Op.SET_MOTORS and request.data[1:3] == b"dd"  # 100, 100
+        if request.data[0] == Op.SET_MOTORS_OFF or standing:
+            self.motors_off, self._motors = True, None
+        else:
+            self._motors = request if request.data[0] == Op.SET_MOTORS else None
+
+    def _record(self, request: Request, since: float, got: bytes, outcome: str) -> None:
+        if self.tell is not None:
+            took = self.clock.now() - since
+            self.tell(Exchange(since, took, request.name, request.data, got, outcome))
+
+    def _body(self, request: Request, got: bytes) -> bytes:
+        """The answer without its echo, or without its length."""
+        if request.answer in (COUNTED, JPEG_HEADER):
+            return got[2:]
+        if not request.echoed:
+            return got
+        if not codec.is_echo(request.data, got[:PACKET]):
+            text = f"The echo was {got[:PACKET].hex(' ')} in place of {request.data.hex(' ')}"
+            raise _Fault(text, ProtocolError, got)
+        return got[PACKET:]
+
+    # --- reading ----------------------------------------------------------------------------------------------
+
+    def _read(self, request: Request) -> bytes:
+        """The bytes of an answer, with its echo."""
+        kind = request.answer
+        if kind >= 0:
+            return self._read_counted(request, PACKET if request.echoed else 0)
+        if kind == LINE:
+            return self._read_until(b"\n", request.wait_s, LONGEST_LINE)
+        if kind == JPEG_SCAN:
+            return self._read_until(b"\xff\xd9", request.wait_s, LONGEST_SCAN, more=12)
+        length = self._read_exactly(2, request.wait_s)
+        n = int.from_bytes(length, "big" if kind == COUNTED else "little")
+        return length + (self._read_exactly(n, GAP_S) if n else b"")
+
+    def _read_counted(self, request: Request, n_echo: int) -> bytes:
+        try:
+            return self._read_exactly(n_echo + request.answer, request.wait_s, n_echo)
+        except _Fault as fault:
+            if request.may_stay_out and self.fluke == "2" and fault.got == request.data:
+                return fault.got
+            raise
+
+    def _read_exactly(self, n: int, wait_s: float, n_echo: int = 0) -> bytes:
+        """So many bytes; `wait_s` of silence before the answer begins, or a gap within it, is a fault."""
+        got = self.port.read(n)
+        if len(got) == n:
+            return got
+        buffer = bytearray(got)
+        silent = 0.0 if got else GAP_S
+        while len(buffer) < n:
+            patience = wait_s if len(buffer) <= n_echo else GAP_S
+            if silent >= patience:
+                raise _short(bytes(buffer), n, patience, n_echo)
+            got = self.port.read(n - len(buffer))
+            buffer += got
+            silent = 0.0 if got else silent + GAP_S
+        return bytes(buffer)
+
+    def _read_until(self, end: bytes, wait_s: float, longest: int, more: int = 0) -> bytes:
+        """Bytes up to an end mark, and so many more after it."""
+        buffer = bytearray()
+        silent, searched = 0.0, 0
+        while (at := buffer.find(end, searched)) < 0:
+            searched = max(len(buffer) - len(end) + 1, 0)
+            if len(buffer) > longest:
+                raise _Fault(f"{len(buffer)} bytes came without an end", ProtocolError, bytes(buffer[:64]))
+            if silent >= (GAP_S if buffer else wait_s):
+                raise _short(bytes(buffer), len(buffer) + 1 + more, silent, 0)
+            got = self.port.read(max(self.port.in_waiting, 1 + more))
+            buffer += got
+            silent = 0.0 if got else silent + GAP_S
+        n = at + len(end) + more
+        if len(buffer) < n:
+            buffer += self._read_exactly(n - len(buffer), GAP_S)
+        if len(buffer) > n:
+            raise _Fault("More came than the answer", ProtocolError, bytes(buffer), understood=True)
+        return bytes(buffer)
+
+    def _discard(self) -> int:
+        """Throw away what has come."""
+        n_bytes = 0
+        while (n := self.port.in_waiting) and n_bytes < CHATTER_BYTES:
+            n_bytes += len(self.port.read(n))
+        self.faults.strays += n_bytes
+        return n_bytes
+
+    # --- finding the same step again --------------------------------------------------------------------------
+
+    def _find_step(self) -> None:
+        """Make both sides count from the same byte again; the motors are off afterwards.
+
+        Raises:
+            _LostStep: in vain.
+        """
+        self.faults.recoveries += 1
+        motors, fault = self._motors, self._fault
+        for _ in range(self._recoveries):
+            try:
+                if isinstance(fault, _HangUp):
+                    self._reopen(fault)
+                self._settle(fault)
+                self._motors = motors if fault is not None else None
+                return
+            except _Fault as happened:
+                fault = happened
+            except _HANG_UPS as error:
+                fault = _HangUp(f"The port hung up ({error})", RobotError)
+        self._fault = fault
+        raise _LostStep(fault)
+
+    def _settle(self, fault: _Fault | None) -> None:
+        """Silence, then commands whose answers prove that the two sides agree."""
+        if fault is None:  # a signal came in between: what was sent was whole, and stopping is urgent
+            self.port.write(codec.STOP.data)
+        understood = fault is None or fault.understood
+        self._await_silence(QUIET_S if understood else FORGET_S)
+        if self.fluke != "none" and not understood:
+            self._release_counter(MAX_PROBES)
+        if not self.has_robot:
+            self._exchange(codec.VERSION, codec.nothing)
+            return
+        self._exchange(codec.ECHO_OFF, codec.sensor_block)
+        self._exchange(codec.STOP, codec.sensor_block)
+
+    def _await_silence(self, seconds: float) -> None:
+        """Read and discard until nothing has come for so long [s]."""
+        since, n_bytes = self.clock.now(), 0
+        self.port.timeout = seconds
+        try:
+            while self.port.read(1):
+                n_bytes += 1 + self._discard()
+                if n_bytes > CHATTER_BYTES or self.clock.now() - since > CHATTER_S:
+                    raise _Fault("The port is never silent, as no Scribbler would be", ProtocolError)
+        finally:
+            self.port.timeout = GAP_S
+
+    def _release_counter(self, n_probes: int) -> None:
+        """Fill up the packet that a Fluke believes to be in the middle of.
+
+        A Fluke 1 counts the bytes of a packet and never begins anew by itself; what comes is swallowed as part of it
+        until nine have come. Requests for the battery, one at a time, are swallowed until one is answered: then it is
+        free. The robot has forgotten its part by then (`FORGET_S`), and what it gets meanwhile is less than a packet,
+        so nothing is carried out. (Bytes 0 until an echo comes, as is sometimes advised, would complete the old
+        packet, and 0 is full speed back.)
+        """
+        self.port.timeout = PROBE_S
+        try:
+            n_swallowed = 0
+            while n_swallowed < n_probes and not self._is_heard():
+                n_swallowed += 1
+        finally:
+            self.port.timeout = GAP_S
+        if n_swallowed:
+            self._await_silence(FORGET_S)
+
+    def _is_heard(self) -> bool:
+        """Whether a Fluke answers a request for the battery."""
+        self.port.write(codec.BATTERY.data)
+        got = self.port.read(2)
+        return len(got) == 2 and got[0] <= 1
+
+    def _reopen(self, fault: _Fault) -> None:
+        """Open the port again after a hang-up.
+
+        Raises:
+            _Fault: in vain.
+        """
+        self.faults.hang_ups += 1
+        for _ in range(REOPENINGS if self._recoveries > 1 else 1):
+            with contextlib.suppress(*_HANG_UPS):
+                self.port.close()
+            self.clock.sleep(1.0)
+            with contextlib.suppress(*_HANG_UPS):
+                self.port.open()
+                return
+        raise _LostStep(fault)
+
+    def _move_on(self, request: Request) -> None:
+        """After the motors were stopped for safety, let them go on as they were told last."""
+        if self._motors is not None and self.motors_off and request.data[0] not in _STEERING:
+            self._exchange(self._motors, codec.sensor_block)
+
+    # --- beginning and end ------------------------------------------------------------------------------------
+
+    def greet(self) -> codec.InfoLine:
+        """Find out who is there, switch the echo mode off and stop the motors.
+
+        Raises:
+            RobotTimeout: nobody answers.
+            ProtocolError: who answers is no Scribbler.
+        """
+        with self.lock:
+            info = self._ask_who()
+            if info.model is None:  # a robot that was just reset needs a moment
+                self._await_silence(FORGET_S)
+                info = self._ask_who()
+            self.has_robot, self.fluke = info.model is not None, info.fluke
+            if self.has_robot:
+                self.ask(codec.ECHO_OFF, codec.sensor_block)
+                self.ask(codec.STOP, codec.sensor_block)
+            return info
+
+    def _ask_who(self) -> codec.InfoLine:
+        since = self.clock.now()
+        for greeting in range(GREETINGS):
+            try:
+                try:
+                    if greeting:
+                        self._await_silence(FORGET_S)
+                        self._release_counter(STRANGER_PROBES)
+                        self._await_silence(FORGET_S)
+                    return self._exchange(codec.INFO, codec.info_line)
+                except _HANG_UPS as error:
+                    raise _HangUp(f"The port hung up ({error})", RobotError) from error
+            except _Fault as happened:
+                fault = happened
+        took = self.clock.now() - since
+        raise fault.kind(
+            f"No Scribbler answers on {self.name}, asked {GREETINGS} times within {took:.0f} s. {fault}. "
+            "Is the robot on, paired, and not in use by another program?"
+        ) from fault
+
+    def close(self) -> None:
+        """Let go of the port; safe to call twice. The motors are the caller's business."""
+        with self.lock:
+            self._is_open = False
+            with contextlib.suppress(*_HANG_UPS):
+                self.port.close()
+
+    def _failure(self, request: Request, fault: _Fault | None, n_sent: int, *, lost: bool) -> RobotError:
+        """One message for a command that failed, after the motors were stopped as far as the wire allows."""
+        if not lost:
+            with contextlib.suppress(_LostStep):
+                self._find_step()
+        if not self._in_step:
+            self._recoveries = 1  # it has been tried: do not make everybody wait as long again
+        self._motors = None
+        state = "motors stopped" if self.motors_off else "the motors may be running: switch the robot off"
+        details = [part for part in (self.where, f"sent {n_sent} times" if n_sent > 1 else "", state) if part]
+        again = (
+            "" if request.repeatable else f" It is not safe to repeat '{request.name}': was it carried out?"
+        )
+        kind = fault.kind if fault is not None else RobotError
+        return kind(
+            f"{fault}: '{request.name}' on {self.name} ({'; '.join(details)}).{again}"
+            + (" The link is in step again." if self._in_step else " Is the robot on, paired and near?")
+        )
+
+
+def _short(got: bytes, n: int, patience: float, n_echo: int) -> _Fault:
+    if not got:
+        return _Fault(f"No answer within {patience:.1f} s", RobotTimeout)
+    text = f"Only {len(got)} of {n} bytes came within {patience:.1f} s"
+    return _Fault(text, RobotTimeout, got, understood=len(got) >= max(n_echo, 1))

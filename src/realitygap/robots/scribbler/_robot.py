@@ -1,0 +1,165 @@
+"""The Scribbler as a robot that trials and calibration can use."""
+
+from __future__ import annotations
+
+import weakref
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from realitygap.errors import RobotError
+from realitygap.robots._clock import Clock
+from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.world import Pose
+
+from . import _codec as codec
+from ._device import RobotInfo
+from ._driving import Driving
+from ._identity import Identity
+from ._link import Link, open_port
+from ._ports import label_of, port_name
+from ._senses import Senses
+from ._sound import SoundAndLight
+
+FAR = 99
+"""What an S2's distance reads where nothing is seen."""
+
+
+class Scribbler(Driving, Senses, SoundAndLight, Identity):
+    """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
+
+    | command | least | most | unit |
+    |---|---|---|---|
+    | move | -1 | 1 | 1: full speed, the end ahead first |
+    | turn | -1 | 1 | 1: one wheel full ahead, the other full back, to the left |
+
+    | observation | with | from 0 | to 1 | raw |
+    |---|---|---|---|---|
+    | obstacle left, center, right | a Fluke | free | `reading_max` and more | 0 to 6400 |
+    | distance left, right | an S2 alone | nothing seen | touching | 99 to 0 |
+    | infrared left, right | an S1 alone | free | an obstacle | 1, 0 |
+
+    The motors are off once it is open. They stop on every way out: `close`, the end of a `with` block, an exception,
+    Ctrl-C, SIGTERM, the end of the program; for trials, also where the program is silent (`watchdog_s`).
+
+    Args:
+        port: Its name, as pyserial takes it, with or without `scribbler:` before it; or an open port.
+        step_s: How long a command of `drive` lasts [s].
+        reading_max: The obstacle reading that is as near as can be told.
+        record: A file in which all that is said is kept, command by command.
+        watchdog_s: Stop the motors when the program has not spoken to the robot for so long [s]; None for never.
+
+    Raises:
+        RobotError: The port cannot be opened, or no Scribbler answers.
+    """
+
+    def __init__(
+        self,
+        port: str | Any,
+        *,
+        step_s: float = 0.5,
+        reading_max: float = 1700.0,
+        record: Path | str | None = None,
+        watchdog_s: float | None = None,
+    ) -> None:
+        if not (step_s >= 0 and reading_max > 0):
+            raise ValueError(
+                f"step_s is {step_s} and reading_max {reading_max}, expected 0 or more and more than 0."
+            )
+        name = (
+            port_name(port) if isinstance(port, str) else str(getattr(port, "name", None) or "a given port")
+        )
+        label = label_of(name) if isinstance(port, str) else "EMULATED"
+        self.link = Link(open_port(name) if isinstance(port, str) else port, name)
+        weakref.finalize(self, _let_go, self.link)  # also when the program ends
+        try:
+            found = self.link.greet()
+        except BaseException:
+            self.link.close()
+            raise
+        self.info = RobotInfo(*found, port=name, label=label)
+        self.step_s = step_s
+        self.reading_max = reading_max
+        self.label: Label = label
+        self.n_sensors = 3 if self.info.fluke != "none" else 2
+        self._n_steps = 0
+
+    @property
+    def clock(self) -> Clock:
+        """The time that this robot lives in."""
+        return self.link.clock
+
+    # --- the contract -----------------------------------------------------------------------------------------
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Begin a trial: motors stopped, steps counted from 0; somebody has put the robot where it starts."""
+        self.need_robot("reset")
+        self.stop()
+        self._n_steps = 0
+        self.link.where = ""
+
+    def observe(self) -> Observation:
+        """Read the sensors that look ahead, and whether the robot is blocked."""
+        if self.info.fluke != "none":
+            raw = self.obstacle()
+            scale = self.reading_max
+            readings = tuple([min(value / scale, 1.0) for value in raw])
+            return Observation(readings, self.stall(), tuple(map(float, raw)))
+        if self.info.model == "s2":
+            far = self.distance()
+            readings = tuple([max(1.0 - value / FAR, 0.0) for value in far])
+            return Observation(readings, self.stall(), tuple(map(float, far)))
+        ir, _, stall = self._flags()
+        return Observation((1.0 - ir[0], 1.0 - ir[1]), stall, tuple(map(float, ir)))
+
+    def drive(self, command: Command) -> None:
+        """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
+
+        The robot moves on until the next command.
+        """
+        move, turn = check_command(command)
+        self._n_steps += 1
+        self.link.where = f"step {self._n_steps}"
+        self.motors(_within(move - turn), _within(move + turn))
+        self.clock.sleep(self.step_s)
+
+    def close(self) -> None:
+        """Stop the motors and let go of the port; safe to call twice.
+
+        Raises:
+            RobotError: The motors could not be stopped; the port is closed all the same.
+        """
+        if not self.link.is_open:
+            return
+        try:
+            self.stop()
+        finally:
+            self.link.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except RobotError as failure:
+            if error is None:
+                raise
+            error.add_note(str(failure))
+
+
+def _within(wheel: float) -> float:
+    return min(max(wheel, -1.0), 1.0)
+
+
+def _let_go(link: Link) -> None:
+    """Stop the motors of a robot that nobody has closed, and close its port."""
+    try:
+        if link.has_robot and link.is_open:
+            link.ask(codec.STOP, codec.sensor_block)
+    except RobotError:
+        pass
+    finally:
+        link.close()

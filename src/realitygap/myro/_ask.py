@@ -14,7 +14,10 @@ _answers: dict[str, str] = {}
 
 
 def ask(
-    item: str | Sequence[str], title: str = "Information Request", useCache: bool = False, useDict: bool = False
+    item: str | Sequence[str],
+    title: str = "Information Request",
+    useCache: bool = False,
+    useDict: bool = False,
 ) -> Any:
     """Ask for a value, or several.
 
@@ -36,7 +39,9 @@ def ask(
 
 def _answer(question: str, *, reuse: bool) -> str:
     if not (reuse and question in _answers):
-        _answers[question] = input(f"{question} " if question.endswith(("?", ":")) else f"{question}: ").strip()
+        _answers[question] = input(
+            f"{question} " if question.endswith(("?", ":")) else f"{question}: "
+        ).strip()
     return _answers[question]
 
 
@@ -81,7 +86,9 @@ def pickAFile() -> str:
         if given.is_file():
             return str(given)
         folder = given if given.is_dir() else Path()
-        names = sorted(entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if entry.name[0] != ".")
+        names = sorted(
+            entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if entry.name[0] != "."
+        )
         print(f"In {folder.resolve()}: {', '.join(names) or 'nothing'}")
 
 

@@ -31,15 +31,13 @@ class Camera(Base):
                 "blob": white where the color is that of `configureBlob`.
         """
         kind = choice("takePicture: the mode", mode or "jpeg", _KINDS)
-        with self.lock:
-            return Picture.from_array(self.driver.picture(kind))
+        return Picture.from_array(self.driver.picture(kind))
 
     def setPicSize(self, value: str) -> None:
         """Set the size of a Fluke 2's pictures: "small" (427 x 266) or "large" (1280 x 800)."""
-        with self.lock:
-            self.driver.set_picture_size(
-                choice("setPicSize: the size", value, {"small": "small", "large": "large"})
-            )
+        self.driver.set_picture_size(
+            choice("setPicSize: the size", value, {"small": "small", "large": "large"})
+        )
 
     def configureBlob(
         self,
@@ -64,8 +62,9 @@ class Camera(Base):
                 ("u_high", u_high), ("v_low", v_low), ("v_high", v_high),
             )
         }  # fmt: skip
-        with self.lock:
-            self.driver.configure_blob(**limits, smooth=whole("configureBlob: smooth_thresh", smooth_thresh, 0, _BYTE))
+        self.driver.configure_blob(
+            **limits, smooth=whole("configureBlob: smooth_thresh", smooth_thresh, 0, _BYTE)
+        )
 
     def set_blob_yuv(self, picture: Picture, x1: int, y1: int, x2: int, y2: int) -> tuple[int, ...]:
         """Set the color to look for to that of a rectangle of a picture: U and V within three standard deviations.
@@ -90,23 +89,19 @@ class Camera(Base):
 
     def darkenCamera(self, value: int = 0) -> None:
         """Make the camera's pictures dark and its settings fixed; 0 darkest, up to 255."""
-        with self.lock:
-            self.driver.darken_camera(whole("darkenCamera: the value", value, 0, _BYTE))
+        self.driver.darken_camera(whole("darkenCamera: the value", value, 0, _BYTE))
 
     def manualCamera(self, gain: int = 0, brightness: int = 128, exposure: int = 65) -> None:
         """Fix the camera's gain, brightness and exposure, each 0 to 255."""
         values = (("gain", gain), ("brightness", brightness), ("exposure", exposure))
-        with self.lock:
-            self.driver.manual_camera(
-                **{name: whole(f"manualCamera: the {name}", value, 0, _BYTE) for name, value in values}
-            )
+        self.driver.manual_camera(
+            **{name: whole(f"manualCamera: the {name}", value, 0, _BYTE) for name, value in values}
+        )
 
     def autoCamera(self, value: int = 0) -> None:
         """Let the camera set gain, exposure and white balance by itself again; the value is ignored, as in Myro."""
-        with self.lock:
-            self.driver.auto_camera()
+        self.driver.auto_camera()
 
     def setWhiteBalance(self, value: str | int) -> None:
         """Switch the camera's automatic white balance on ("on", 1) or off ("off", 0)."""
-        with self.lock:
-            self.driver.set_white_balance(is_on("setWhiteBalance: the value", value))
+        self.driver.set_white_balance(is_on("setWhiteBalance: the value", value))

@@ -18,7 +18,7 @@ def randomNumber() -> float:
 
 
 def flipCoin() -> str:
-    """ "heads" or "tails", each half of the time."""
+    """Heads or tails, as "heads" or "tails", each half of the time."""
     return random.choice(("heads", "tails"))
 
 

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Concatenate, ParamSpec, TypeVar
 
-from realitygap.robots import Clock, SystemClock
+from realitygap.robots import SystemClock
 
 from ._mistakes import MyroError
 
@@ -20,6 +20,7 @@ T = TypeVar("T")
 
 _WALL = SystemClock()
 _robot: Scribbler | None = None
+_limit_s: float | None = None
 
 
 def robot_or_none() -> Scribbler | None:
@@ -31,7 +32,18 @@ def use(robot: Scribbler | None) -> None:
     """From now on Myro's functions speak to this robot, which programs also know as `robot`."""
     global _robot
     _robot = robot
-    builtins.robot = robot  # type: ignore[attr-defined]  # as in Myro: programs say robot.forward() without an assignment
+    builtins.robot = robot  # type: ignore[attr-defined]  # as in Myro: programs just say robot.forward()
+
+
+def set_limit(seconds: float | None) -> None:
+    """Give a program so many seconds with each robot that it opens from now on; None for no limit."""
+    global _limit_s
+    _limit_s = seconds
+
+
+def limit() -> float | None:
+    """How long a program may use a robot [s]."""
+    return _limit_s
 
 
 def robot_for(function: str) -> Scribbler:
@@ -48,14 +60,9 @@ def robot_for(function: str) -> Scribbler:
     return _robot
 
 
-def clock() -> Clock:
-    """The robot's clock; the computer's where there is no robot."""
-    return _WALL if _robot is None else _robot.clock
-
-
 def now() -> float:
-    """The time on the clock [s]."""
-    return clock().now()
+    """The time on the robot's clock [s]; on the computer's where there is no robot."""
+    return _WALL.now() if _robot is None else _robot.now()
 
 
 def sleep(seconds: float) -> None:

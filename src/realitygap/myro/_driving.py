@@ -60,9 +60,7 @@ class Driving(Base):
             rotate: Speed of the turn, from -1 (right) to 1 (left).
             seconds: As for `forward`.
         """
-        self._go(
-            "move", number("move: translate", translate), number("move: rotate", rotate), seconds
-        )
+        self._go("move", number("move: translate", translate), number("move: rotate", rotate), seconds)
 
     def translate(self, amount: float, seconds: float | None = None) -> None:
         """Drive ahead or back, from 1 to -1, and keep turning as before."""
@@ -80,8 +78,7 @@ class Driving(Base):
     def stop(self) -> None:
         """Stop both wheels."""
         self._translate = self._rotate = 0.0
-        with self.lock:
-            self.driver.stop()
+        self.driver.stop()
 
     hardStop = stop
 
@@ -89,8 +86,7 @@ class Driving(Base):
         """Set both speeds; the wheels get their difference and their sum, each limited to -1..1."""
         duration = None if seconds is None else number(f"{name}: the seconds", seconds, 0)
         self._translate, self._rotate = translate, rotate
-        with self.lock:
-            self.driver.motors(_limited(translate - rotate), _limited(translate + rotate))
+        self.driver.motors(_limited(translate - rotate), _limited(translate + rotate))
         if duration is not None:
             self.pause(duration)
             self.stop()

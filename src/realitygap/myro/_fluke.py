@@ -19,8 +19,7 @@ class Fluke(Base):
 
         Obstacles that are always seen want less, those never seen more.
         """
-        with self.lock:
-            self.driver.set_ir_power(whole("setIRPower: the value", value, 0, 255))
+        self.driver.set_ir_power(whole("setIRPower: the value", value, 0, 255))
 
     def sendIRMessage(self, msg: str) -> None:
         """Send a text of up to 255 characters by infrared to robots nearby."""
@@ -28,13 +27,11 @@ class Fluke(Base):
             raise MyroError(
                 f"sendIRMessage: the message is {msg!r}, expected text of up to {_LONGEST} characters, no accents."
             )
-        with self.lock:
-            self.driver.send_ir_message(msg.encode("ascii"))
+        self.driver.send_ir_message(msg.encode("ascii"))
 
     def getIRMessage(self) -> str:
         """What came by infrared since last asked; empty where nothing came."""
-        with self.lock:
-            return self.driver.get_ir_message().decode("latin-1")
+        return self.driver.get_ir_message().decode("latin-1")
 
     def setCommunicateLeft(self, on: bool = True) -> None:
         """Send messages to the left, or not."""
@@ -55,22 +52,18 @@ class Fluke(Base):
     def _communicate(self, emitters: int, on: object) -> None:
         lit = is_on("setCommunicate", on)
         self._emitters = self._emitters | emitters if lit else self._emitters & ~emitters
-        with self.lock:
-            self.driver.set_ir_emitters(self._emitters)
+        self.driver.set_ir_emitters(self._emitters)
 
     def servo(self, id: int, position: int) -> None:
         """Turn a servo of a Fluke 2: number 0 to 3, position 0 to 255."""
-        with self.lock:
-            self.driver.servo(
-                whole("servo: the number", id, 0, 3), whole("servo: the position", position, 0, 255)
-            )
+        self.driver.servo(
+            whole("servo: the number", id, 0, 3), whole("servo: the position", position, 0, 255)
+        )
 
     def getFlukeLog(self) -> None:
         """Print the error log of a Fluke 2."""
-        with self.lock:
-            print(self.driver.error_log())
+        print(self.driver.error_log())
 
     def enablePanNetworking(self) -> None:
         """Let a Fluke 2 offer a network over Bluetooth."""
-        with self.lock:
-            self.driver.enable_pan()
+        self.driver.enable_pan()

@@ -139,5 +139,7 @@ def set(*args: Any) -> Any:
     if len(args) < 2:
         return builtins.set(*args)
     if len(args) > 3:
-        raise MyroError(f"set() was given {len(args)} values, expected an item, a position and perhaps a value.")
+        raise MyroError(
+            f"set() was given {len(args)} values, expected an item, a position and perhaps a value."
+        )
     return _current.robot_for("set").set(*args)

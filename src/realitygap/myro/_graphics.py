@@ -163,7 +163,9 @@ class GraphicsObject:
             MyroError: It is drawn already, or there is no window.
         """
         if self.window is not None:
-            raise MyroError(f"This {type(self).__name__} is drawn already; undraw() it first, or draw a clone().")
+            raise MyroError(
+                f"This {type(self).__name__} is drawn already; undraw() it first, or draw a clone()."
+            )
         self.window = graphwin if graphwin is not None else getWindow()
         self.window.items.append(self)
         self.window.redraw()
@@ -260,7 +262,9 @@ class Line(GraphicsObject):
     def setArrow(self, option: str) -> None:
         """Put a dot on its "first" or "last" end, on "both" or on "none". Differs: Myro puts an arrow there."""
         if option not in ("first", "last", "both", "none"):
-            raise MyroError(f"setArrow: the option is {option!r}, expected 'first', 'last', 'both' or 'none'.")
+            raise MyroError(
+                f"setArrow: the option is {option!r}, expected 'first', 'last', 'both' or 'none'."
+            )
         self.arrow = option
         self._changed()
 
@@ -269,7 +273,9 @@ class Line(GraphicsObject):
         (x1, y1), (x2, y2) = ends
         color = self._fill or self.outline
         dots = {"none": [], "first": ends[:1], "last": ends[1:], "both": ends}[self.arrow]
-        tips = "".join(f'<circle cx="{x:g}" cy="{y:g}" r="{2 + self.line_width:g}" fill="{color}"/>' for x, y in dots)
+        tips = "".join(
+            f'<circle cx="{x:g}" cy="{y:g}" r="{2 + self.line_width:g}" fill="{color}"/>' for x, y in dots
+        )
         return (
             f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="{color}" '
             f'stroke-width="{self.line_width:g}"/>{tips}'
@@ -320,7 +326,9 @@ class Polygon(GraphicsObject):
     """A shape with three or more corners, given one by one or as a list."""
 
     def __init__(self, *points: Any) -> None:
-        corners: Sequence[Point] = points[0] if len(points) == 1 and isinstance(points[0], Sequence) else points
+        corners: Sequence[Point] = (
+            points[0] if len(points) == 1 and isinstance(points[0], Sequence) else points
+        )
         if len(corners) < 3:
             raise MyroError(f"Polygon was given {len(corners)} points, expected three or more.")
         super().__init__(*corners)

@@ -19,28 +19,23 @@ class Identity(Base):
 
     def getName(self) -> str:
         """The robot's name."""
-        with self.lock:
-            return self.driver.name()
+        return self.driver.name
 
     def setName(self, name: str) -> None:
         """Give the robot a name of up to 16 characters."""
-        with self.lock:
-            self.driver.set_name(_short("setName: the name", name))
+        self.driver.set_name(_short("setName: the name", name))
 
     def getPassword(self) -> str:
         """The robot's password."""
-        with self.lock:
-            return self.driver.password()
+        return self.driver.password
 
     def setPassword(self, password: str) -> None:
         """Give the robot a password of up to 16 characters."""
-        with self.lock:
-            self.driver.set_password(_short("setPassword: the password", password))
+        self.driver.set_password(_short("setPassword: the password", password))
 
     def getData(self, *position: int) -> Any:
-        """The eight bytes that the robot keeps; the first four correct its motors. One or several by position 0 to 7."""
-        with self.lock:
-            data = [int(value) for value in self.driver.data()]
+        """The eight bytes that the robot keeps, or those at positions 0 to 7; the first four correct its motors."""
+        data = [int(value) for value in self.driver.data]
         picked = [data[whole("getData: the position", place, 0, 7)] for place in position]
         return data if not picked else picked[0] if len(picked) == 1 else picked
 
@@ -50,10 +45,9 @@ class Identity(Base):
 
     def setSingleData(self, position: int, value: int) -> None:
         """As `setData`."""
-        with self.lock:
-            self.driver.set_single_data(
-                whole("setData: the position", position, 0, 7), whole("setData: the value", value, 0, 255)
-            )
+        self.driver.set_single_data(
+            whole("setData: the position", position, 0, 7), whole("setData: the value", value, 0, 255)
+        )
 
     def setFudge(self, f1: float, f2: float, f3: float, f4: float) -> None:
         """Correct a robot that does not drive straight: fast ahead, slow ahead, slow back, fast back.
@@ -73,13 +67,11 @@ class Identity(Base):
 
     def getForwardness(self) -> str:
         """Which end is ahead: "fluke-forward" or "scribbler-forward"."""
-        with self.lock:
-            return f"{self.driver.forwardness()}-forward"
+        return f"{self.driver.forwardness}-forward"
 
     def setForwardness(self, value: str | int) -> None:
         """Set which end is ahead: "fluke-forward" or 1, "scribbler-forward" or 0."""
-        with self.lock:
-            self.driver.set_forwardness(choice("setForwardness: the value", value, _FORWARDNESS))
+        self.driver.set_forwardness(choice("setForwardness: the value", value, _FORWARDNESS))
 
     def identifyRobot(self) -> str:
         """Which robot it is: "SCRIBBLER-1", "SCRIBBLER-2" or "UNKNOWN".

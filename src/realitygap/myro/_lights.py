@@ -27,17 +27,14 @@ class Lights(Base):
         if led == "back" and not isinstance(value, str):
             self.setLEDBack(value)
         else:
-            with self.lock:
-                self.driver.set_led(led, is_on("setLED: the value", value))
+            self.driver.set_led(led, is_on("setLED: the value", value))
 
     def setLEDFront(self, value: str | float) -> None:
         """Switch the light on the Fluke's front on ("on", 1) or off ("off", 0)."""
-        with self.lock:
-            self.driver.set_led("front", is_on("setLEDFront: the value", value))
+        self.driver.set_led("front", is_on("setLEDFront: the value", value))
 
     def setLEDBack(self, value: str | float) -> None:
         """Set how bright the light on the Fluke's back is: 0 (off) to 1; what is beyond is limited."""
         if isinstance(value, str):
             value = int(is_on("setLEDBack: the value", value))
-        with self.lock:
-            self.driver.set_led("back", min(max(number("setLEDBack: the value", value), 0.0), 1.0))
+        self.driver.set_led("back", min(max(number("setLEDBack: the value", value), 0.0), 1.0))

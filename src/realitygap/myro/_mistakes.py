@@ -66,7 +66,7 @@ def whole(name: str, value: object, least: int, most: int) -> int:
     return int(result)
 
 
-def choice(name: str, value: object, choices: Mapping[str | int, T]) -> T:
+def choice(name: str, value: object, choices: Mapping[Any, T]) -> T:
     """What a word or a number stands for; words in any case.
 
     Args:
@@ -79,10 +79,12 @@ def choice(name: str, value: object, choices: Mapping[str | int, T]) -> T:
     """
     key = value.lower() if isinstance(value, str) else value
     if isinstance(key, (str, numbers.Real)) and key in choices:
-        return choices[key]  # type: ignore[index]  # 1.0 finds 1
+        return choices[key]  # 1.0 finds 1
     words = [repr(word) for word in choices if isinstance(word, str)]
     digits = [str(digit) for digit in choices if not isinstance(digit, str)]
-    hint = did_you_mean(key, [word for word in choices if isinstance(word, str)]) if isinstance(key, str) else ""
+    hint = (
+        did_you_mean(key, [word for word in choices if isinstance(word, str)]) if isinstance(key, str) else ""
+    )
     hint = f" {hint}" if hint.startswith("Did") else ""
     raise MyroError(f"{name} is {value!r}, expected {_either([*words, *digits])}.{hint}")
 
@@ -121,16 +123,21 @@ def explanation(error: BaseException, trace: TracebackType | None) -> str:
     return f"{where}{type(error).__name__}: {error}"
 
 
-def show_mistakes_plainly() -> None:
+def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], None]) -> None:
     """From now on a mistake ends a program, or a cell of a notebook, with one message and no traceback.
 
     Other exceptions are shown as before.
+
+    Args:
+        on_error: Called when a program, a line at the prompt or a cell ends with any exception.
+        on_cell: Called when a cell begins.
     """
     before = sys.excepthook
     if getattr(before, "of_myro", False):
         return
 
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        on_error()
         if issubclass(kind, RealityGapError):
             sys.stderr.write(explanation(error, trace) + "\n")
         else:
@@ -141,6 +148,8 @@ def show_mistakes_plainly() -> None:
     shell = notebook_shell()
     if shell is not None:
         shell.set_custom_exc((RealityGapError,), _in_notebook)
+        shell.events.register("pre_run_cell", lambda _: on_cell())
+        shell.events.register("post_run_cell", lambda result: None if result.success else on_error())
 
 
 def _in_notebook(

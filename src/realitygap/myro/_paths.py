@@ -19,37 +19,31 @@ class Paths(Base):
 
     def getPosition(self) -> list[int]:
         """[x, y] where the robot counts itself to be [mm]."""
-        with self.lock:
-            return [int(value) for value in self.driver.position()]
+        return [int(value) for value in self.driver.position]
 
     def hereIs(self, x: int = 0, y: int = 0) -> None:
         """Tell the robot where it is [mm]."""
-        with self.lock:
-            self.driver.set_position(_far("hereIs: x", x), _far("hereIs: y", y))
+        self.driver.set_position(_far("hereIs: x", x), _far("hereIs: y", y))
 
     setHereIs = hereIs
 
     def getAngle(self) -> int:
         """Where the robot counts itself to face [degrees]."""
-        with self.lock:
-            return int(self.driver.angle())
+        return int(self.driver.angle)
 
     def setAngle(self, angle: int) -> None:
         """Tell the robot where it faces [degrees]."""
-        with self.lock:
-            self.driver.set_angle(_far("setAngle: the angle", angle))
+        self.driver.set_angle(_far("setAngle: the angle", angle))
 
     def beginPath(self, speed: int = 7) -> None:
         """Begin a path: the motions that follow run into one another until `endPath`; speed 1 to 15."""
-        with self.lock:
-            self.driver.begin_path(whole("beginPath: the speed", speed, 1, 15))
+        self.driver.begin_path(whole("beginPath: the speed", speed, 1, 15))
 
     setBeginPath = beginPath
 
     def endPath(self) -> None:
         """End a path: the robot drives what is left of it."""
-        with self.lock:
-            self.driver.end_path()
+        self.driver.end_path()
 
     setEndPath = endPath
 
@@ -98,29 +92,26 @@ class Paths(Base):
 
     def getEncoders(self, zeroEncoders: bool = False) -> list[int]:
         """[left, right] what the wheels counted, about 0.25 mm each, backwards negative; perhaps begin anew at 0."""
-        with self.lock:
-            return [int(value) for value in self.driver.encoders(zero=is_on("getEncoders", zeroEncoders))]
+        return [int(value) for value in self.driver.encoders(zero=is_on("getEncoders", zeroEncoders))]
 
     def getMotorStats(self) -> dict[str, list[Any]]:
         """How the wheels turn.
 
         Returns:
-            "wheel": [left, right] counts in 1/10 s; "IdlerTimer": [1/10 s since the caster moved]; "IdlerSpeed": [of the
-            caster]; "Mov": [whether a motor turns]; "Ready": [whether the robot is ready for a new motion].
+            "wheel": [left, right] counts in 1/10 s; "IdlerTimer": [1/10 s since the caster moved];
+            "IdlerSpeed": [of the caster]; "Mov": [whether a motor turns]; "Ready": [whether the robot is ready for a new motion].
         """
-        with self.lock:
-            stats = self.driver.motor_stats()
+        stats = self.driver.motor_stats()
         return {
             "wheel": [stats.left, stats.right],
-            "IdlerTimer": [stats.idler_time],
+            "IdlerTimer": [round(stats.idler_age_s * 10)],
             "IdlerSpeed": [stats.idler_speed],
             "Mov": [bool(stats.moving)],
             "Ready": [bool(stats.ready)],
         }
 
     def _motion(self, name: str, *where: int) -> None:
-        with self.lock:
-            getattr(self.driver, name)(*where)
+        getattr(self.driver, name)(*where)
         while not self.getMotorStats()["Ready"][0]:
             self.pause(_POLL_S)
 

@@ -153,10 +153,10 @@ class Pixel:
     __hash__ = None  # type: ignore[assignment]  # equal pixels may differ a moment later
 
     def __add__(self, other: Any) -> Color:
-        return self.getColor() + other
+        return Color(self.getColor() + other)
 
     def __sub__(self, other: Any) -> Color:
-        return self.getColor() - other
+        return Color(self.getColor() - other)
 
     def getX(self) -> int:
         """Its column, from 0 at the left."""
@@ -177,7 +177,9 @@ class Pixel:
     def setColor(self, newColor: Any) -> None:
         """Give it a color, or that of another pixel."""
         if not hasattr(newColor, "getRGBA"):
-            raise MyroError(f"setColor: the color is {newColor!r}, expected one made by makeColor(red, green, blue).")
+            raise MyroError(
+                f"setColor: the color is {newColor!r}, expected one made by makeColor(red, green, blue)."
+            )
         self.picture.pixels[self.x, self.y] = newColor.getRGBA()
 
     def getRGB(self) -> tuple[int, int, int]:
@@ -229,8 +231,8 @@ def _side(name: str, value: object) -> int:
 def makePicture(*args: Any) -> Picture:
     """A picture: empty, from a file, or of a size and perhaps a color.
 
-    `makePicture()`, `makePicture("photo.jpg")`, `makePicture(width, height)` (white), `makePicture(width, height, color)`,
-    `makePicture(width, height, gray)`, `makePicture(width, height, data)` and `makePicture(width, height, data, mode)`
+    `makePicture()`, `makePicture("photo.jpg")`, `makePicture(width, height)` (white),
+    `makePicture(width, height, color)`, `makePicture(width, height, gray)`, `makePicture(width, height, data)` and `makePicture(width, height, data, mode)`
     with the bytes of all pixels, row by row, in mode "color" (3 a pixel) or "gray" (1 a pixel).
 
     Raises:
@@ -273,7 +275,8 @@ def _from_bytes(width: object, height: object, data: Any, mode: str = "color") -
     raw = bytes(data)
     if len(raw) != size[0] * size[1] * per_pixel:
         raise MyroError(
-            f"makePicture: the data has {len(raw)} bytes, expected {size[0]} x {size[1]} x {per_pixel} for mode {mode!r}."
+            f"makePicture: the data has {len(raw)} bytes, expected {size[0]} x {size[1]} x {per_pixel} "
+            f"for mode {mode!r}."
         )
     return Picture(Image.frombytes(form, size, raw))
 
@@ -306,7 +309,9 @@ def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> No
     if not pictures:
         raise MyroError("savePicture: the list is empty, expected pictures.")
     images = [_flat(item.image, filename) for item in pictures]
-    more: dict[str, Any] = {"save_all": True, "append_images": images[1:], "loop": 0} if len(images) > 1 else {}
+    more: dict[str, Any] = (
+        {"save_all": True, "append_images": images[1:], "loop": 0} if len(images) > 1 else {}
+    )
     try:
         images[0].save(Path(filename).expanduser(), **more)
     except (OSError, ValueError) as error:

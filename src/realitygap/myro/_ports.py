@@ -40,7 +40,9 @@ def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulatio
         simulation = Simulation(**(parse_simulation(name) | options))
         return simulation.driver, simulation
     if options:
-        raise MyroError(f"{', '.join(options)}: only a simulated robot has that, as initialize(\"sim\", seed=3).")
+        raise MyroError(
+            f'{", ".join(options)}: only a simulated robot has that, as initialize("sim", seed=3).'
+        )
     if name.startswith("emulator:"):
         import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
     try:
@@ -55,7 +57,9 @@ def _name(port: str | int | None) -> str:
     if port is None or port == "":
         return _asked()
     if not isinstance(port, str):
-        raise MyroError(f'initialize: the port is {port!r}, expected text as "/dev/rfcomm0", "COM3" or "sim".')
+        raise MyroError(
+            f'initialize: the port is {port!r}, expected text as "/dev/rfcomm0", "COM3" or "sim".'
+        )
     windows = port.lower().startswith("com") and port[3:].isdigit()
     return port.upper() if windows else port
 
@@ -75,7 +79,9 @@ def _asked() -> str:
 
 def _advice() -> str:
     ports = ", ".join(found.port for found in find_ports()) or "none"
-    example = "COM3" if sys.platform == "win32" else "/dev/cu.Fluke" if sys.platform == "darwin" else "/dev/rfcomm0"
+    example = (
+        "COM3" if sys.platform == "win32" else "/dev/cu.Fluke" if sys.platform == "darwin" else "/dev/rfcomm0"
+    )
     text = f"Ports of this computer: {ports}. A robot's port is named like {example}; "
     if os.name == "posix" and sys.platform != "darwin":
         text += "on Linux it is there once the robot is paired and bound; "

@@ -30,8 +30,8 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
     As a context manager it stops and lets go of the robot at the end.
 
     Args:
-        port: The robot's port ("/dev/rfcomm0", "COM3"), an emulator's ("emulator://s2?fluke=2"), or "sim" for a simulated
-            robot; asked for in the terminal where none is given.
+        port: The robot's port ("/dev/rfcomm0", "COM3"), an emulator's ("emulator://s2?fluke=2"), or "sim" for a
+            simulated robot; asked for in the terminal where none is given.
         options: For "sim", see `simulator`.
 
     Raises:
@@ -39,7 +39,6 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
     """
 
     def __init__(self, port: str | int | None = None, **options: Any) -> None:
-        super().__init__()
         before = _current.robot_or_none()
         if before is not None:
             before.close()
@@ -49,7 +48,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         self.restart()
 
     def __repr__(self) -> str:
-        info = self.driver.info
+        info = self._driver.info
         fluke = "no Fluke" if info.fluke == "none" else f"Fluke {info.fluke}"
         return f"<Scribbler {info.model or 'unknown'} with {fluke} on {info.port}, {info.label}>"
 
@@ -59,17 +58,18 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         Raises:
             MyroError: The robot cannot be opened.
         """
-        self.driver, self.simulation = open_port(self._port, **self._options)
-        self.clock = self.driver.clock
+        self._driver, self.simulation = open_port(self._port, **self._options)
+        self.clock = self._driver.clock
+        limit = _current.limit()
+        self.deadline = None if limit is None else self.clock.now() + limit
 
     open = openConnection
 
     def closeConnection(self) -> None:
         """Stop the robot and let go of its port."""
-        with self.lock:
-            if self.simulation is not None:
-                self.simulation.close()
-            self.driver.close()
+        if self.simulation is not None:
+            self.simulation.close()
+        self._driver.close()
 
     def close(self) -> None:
         """As `closeConnection`; Myro's functions then have no robot until `initialize`."""
@@ -87,7 +87,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
     def restart(self) -> None:
         """Stop the robot, switch its lights off, let it play its five tones and greet."""
-        if self.driver.info.model is None:
+        if self._driver.info.model is None:
             return
         self.stop()
         self.setLED("all", "off")
@@ -97,8 +97,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
     def reboot(self) -> None:
         """Let the robot start anew, as its reset button does."""
-        with self.lock:
-            self.driver.reset_robot()
+        self.driver.reset_robot()
 
     def update(self) -> None:
         """Do nothing: readings are always asked for anew. Kept because programs call it."""

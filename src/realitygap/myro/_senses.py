@@ -47,8 +47,8 @@ class Senses(Base):
         """How strongly the Fluke's infrared comes back: 0 nothing, up to about 6400 very near.
 
         Args:
-            position: "left", "center", "right", or 0, 1, 2; none gives all three. A Fluke 2 has one emitter and tells the
-                same for all.
+            position: "left", "center", "right", or 0, 1, 2; none gives all three. A Fluke 2 has one emitter and tells
+                the same for all.
         """
         return self._one_or_all("getObstacle", "obstacle", position)
 
@@ -139,8 +139,7 @@ class Senses(Base):
         return own if self.driver.info.fluke == "none" else own | fluke
 
     def _driven(self, name: str) -> Any:
-        with self.lock:
-            return getattr(self.driver, name)()
+        return getattr(self.driver, name)()
 
     def _picked(
         self, name: str, values: list[int], places: dict[Any, int], position: tuple[str | int, ...]
@@ -156,6 +155,18 @@ class Senses(Base):
         values = [int(value) for value in self._driven(what)]
         return values if place is None else values[place]
 
+    def _said(self) -> dict[str, str]:
+        """The info line by its keys, and our version."""
+        info = self.driver.info
+        said = {"fluke": info.fluke_version} if info.fluke != "none" else {}
+        if info.model is not None:
+            said |= {
+                "robot-version": info.robot_version,
+                "robot": "Scribbler2" if info.model == "s2" else "Scribbler",
+                "mode": "Serial",
+            }
+        return said | {"myro": __version__}
+
     def getVersion(self) -> str:
         """The version of the robot's firmware."""
         return str(self.driver.info.robot_version)
@@ -169,7 +180,7 @@ class Senses(Base):
         Raises:
             MyroError: The robot says nothing of that.
         """
-        info = dict(self.driver.info.fields) | {"myro": __version__}
+        info = self._said()
         for name in item:
             if name.lower() not in info:
                 raise MyroError(f"getInfo: this robot says nothing of {name!r}, only of {', '.join(info)}.")

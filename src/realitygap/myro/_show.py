@@ -33,7 +33,9 @@ def show(picture: Picture, name: str = "default") -> None:
         MyroError: It is not a picture, or has no pixels.
     """
     if not isinstance(picture, Picture) or not picture.width or not picture.height:
-        raise MyroError(f"show: the picture is {picture!r}, expected one made by takePicture() or makePicture(...).")
+        raise MyroError(
+            f"show: the picture is {picture!r}, expected one made by takePicture() or makePicture(...)."
+        )
     _shown[name] = picture
     longest = max(picture.width, picture.height)
     scale = _SMALL / longest if longest < _SMALL else min(1.0, _LARGE / longest)

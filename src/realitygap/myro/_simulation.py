@@ -42,10 +42,10 @@ class Simulation:
 
     Args:
         seed: Of its sensors' noise, and of a start by chance.
-        start: "corner" (of the paper's arena), "center", "left" or "random"; or (x, y, heading) [m, m, degrees], as text
-            "0.5,0.3,90". The heading is that of the end that is ahead: the Fluke's.
-        speed: 1 for real time, 10 for ten times as fast; "off" for as fast as can be: time passes only while the program
-            waits, or speaks with the robot.
+        start: "corner" (of the paper's arena), "center", "left" or "random"; or (x, y, heading) [m, m, degrees], as
+            text "0.5,0.3,90". The heading is that of the end that is ahead: the Fluke's.
+        speed: 1 for real time, 10 for ten times as fast; "off" for as fast as can be: time passes only while the
+            program waits, or speaks with the robot.
         model: "s1" or "s2".
         fluke: "none", 1 or 2.
         arena: What the emulator knows: "paper", or a file.
@@ -72,9 +72,16 @@ class Simulation:
         self.seed = whole('initialize("sim"): the seed', _plain(seed), 0, 2**31 - 1)
         choice('initialize("sim"): the model', model, {"s1": "s1", "s2": "s2"})
         choice('initialize("sim"): the fluke', _plain(fluke), {"none": 0, 1: 1, 2: 2})
-        self.speed = None if speed in ("off", None) else number('initialize("sim"): the speed', _plain(speed), 0.01)
+        self.speed = (
+            None if speed in ("off", None) else number('initialize("sim"): the speed', _plain(speed), 0.01)
+        )
         query = urlencode(
-            {"fluke": fluke, "arena": arena, "seed": self.seed, "speed": "off" if self.speed is None else f"{self.speed:g}"}
+            {
+                "fluke": fluke,
+                "arena": arena,
+                "seed": self.seed,
+                "speed": "off" if self.speed is None else f"{self.speed:g}",
+            }
         )
         self._port = open_emulator(f"emulator://{model}?{query}")
         self.arena: Arena = self._port.arena
@@ -93,7 +100,7 @@ class Simulation:
 
     def pose(self) -> Pose:
         """Where the robot is [m], and where the end looks that is ahead [rad]."""
-        return self.witness.pose()
+        return Pose(*self.witness.pose())
 
     def cells(self) -> tuple[int, ...]:
         """The cells of the arena's grid that the pen went through, in order of first visits."""

@@ -22,8 +22,8 @@ _OCTAVE = 5  # of a note without a number
 def frequency(name: str) -> float:
     """The frequency of a note [Hz], from its name ("C", "C#5", "Bb3", "pause") or from a number as text.
 
-    Octaves run from 0 (low) to 9; a note without one is of octave 5, where C is 523.3 Hz. Equal temperament, A4 = 440 Hz,
-    to four digits, as Myro's own table has them.
+    Octaves run from 0 (low) to 9; a note without one is of octave 5, where C is 523.3 Hz. Equal temperament,
+    A4 = 440 Hz, to four digits, as Myro's own table has them.
 
     Raises:
         MyroError: It is neither a note nor a number.
@@ -112,7 +112,9 @@ def _note(words: list[str]) -> Note:
         return (frequency(words[0]), _part(words[1]))
     if len(words) == 3:
         return (frequency(words[0]), frequency(words[1]), _part(words[2]))
-    raise MyroError(f"It has {len(words)} words, expected a note, perhaps a second one, and how long it lasts.")
+    raise MyroError(
+        f"It has {len(words)} words, expected a note, perhaps a second one, and how long it lasts."
+    )
 
 
 def _part(text: str) -> float:
@@ -138,8 +140,8 @@ def saveSong(song: Iterable[Note] | str, filename: str, append: bool = False) ->
     Args:
         song: What `makeSong` returns or reads.
         filename: Where to.
-        append: Whether it follows what the file holds already. Differs: Myro has 1 as the default and overwrites all the
-            same; a program that does not say gets what it got.
+        append: Whether it follows what the file holds already. Differs: Myro has 1 as the default and overwrites all
+            the same; a program that does not say gets what it got.
 
     Raises:
         MyroError: The file cannot be written.

@@ -16,6 +16,7 @@ WHOLE_NOTE = 0.545
 """How long a whole note lasts by default [s]."""
 
 _HIGHEST = 65535  # [Hz], a word on the wire
+_HEARD = 10_000  # the highest tone that a Scribbler 2 plays [Hz]; a higher one becomes this
 _PIECE = 5.0  # the longest tone in one command [s]; a longer one is played in pieces: a Scribbler 2 knows up to 8.2 s
 
 
@@ -59,8 +60,8 @@ class Plays:
         """
         if not isinstance(tup, Sequence) or isinstance(tup, str) or len(tup) not in (2, 3):
             raise MyroError(
-                f"playNote: the note is {tup!r}, expected (frequency, part of a whole note); makeSong() makes a song of "
-                "them from text."
+                f"playNote: the note is {tup!r}, expected (frequency, part of a whole note); makeSong() makes a song "
+                "of them from text."
             )
         part = number("playNote: the part of a whole note", tup[-1], 0)
         self.beep(part * number("playNote: the whole note's duration", wholeNoteDuration, 0), *tup[:-1])
@@ -68,7 +69,9 @@ class Plays:
     def playSong(self, song: Sequence[Note], wholeNoteDuration: float = WHOLE_NOTE) -> None:
         """Play a song that `makeSong` or `readSong` made; a whole note lasts `wholeNoteDuration` [s]."""
         if isinstance(song, str):
-            raise MyroError("playSong: the song is text, expected what makeSong(text) or readSong(filename) returns.")
+            raise MyroError(
+                "playSong: the song is text, expected what makeSong(text) or readSong(filename) returns."
+            )
         for note in song:
             self.playNote(note, wholeNoteDuration)
 
@@ -82,15 +85,13 @@ class Sound(Plays, Base):
     def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
         while duration > 0:
             piece = min(duration, _PIECE)
-            with self.lock:
-                self.driver.beep(piece, hz, hz2)
+            self.driver.beep(piece, min(hz, _HEARD), None if hz2 is None else min(hz2, _HEARD))
             duration -= piece
 
     def setVolume(self, value: str | int) -> None:
         """Switch the robot's speaker on ("on", 1) or off ("off", 0); the robot remembers it."""
         self._volume = int(is_on("setVolume: the value", value))
-        with self.lock:
-            self.driver.set_loud(bool(self._volume))
+        self.driver.set_loud(bool(self._volume))
 
     def getVolume(self) -> int:
         """1 if the speaker is on, else 0, as last set by `setVolume`."""
@@ -98,8 +99,7 @@ class Sound(Plays, Base):
 
     def setS2Volume(self, value: int) -> None:
         """Set how loud the speaker of a Scribbler 2 is, 0 to 100."""
-        with self.lock:
-            self.driver.set_s2_volume(whole("setS2Volume: the value", value, 0, 100))
+        self.driver.set_s2_volume(whole("setS2Volume: the value", value, 0, 100))
 
     def setStartSong(self, songName: str) -> None:
         """Remember a name for `getStartSong`; as in Myro, the robot itself never learns of it."""

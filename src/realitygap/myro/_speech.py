@@ -46,7 +46,9 @@ def numberGame(stop: int = 100, maxGuesses: int = 10) -> None:
         if guess == secret:
             speak(f"You guessed my secret number in {count} tries! It was {secret}.")
             return
-        speak(f"On try number {count} you guessed {guess} and that is too {'low' if guess < secret else 'high'}.")
+        speak(
+            f"On try number {count} you guessed {guess} and that is too {'low' if guess < secret else 'high'}."
+        )
     speak(f"Sorry, but you did not guess it in {maxGuesses} tries. My number was {secret}.")
 
 

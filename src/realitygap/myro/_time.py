@@ -48,7 +48,8 @@ def timer(seconds: float = 0) -> Iterator[float]:
 def timeRemaining(seconds: float = 0) -> bool:
     """For loops: `while timeRemaining(5):` runs for 5 seconds.
 
-    Each place in a program has a timer of its own, which begins when the place is reached first and anew after it ended.
+    Each place in a program has a timer of its own, which begins when the place is reached first and anew after it
+    ended.
 
     Args:
         seconds: How long; 0 for ever.

@@ -23,7 +23,9 @@ def loop(*functions: Any) -> str:
     """
     *steps, count = functions or (None,)
     if not steps or not all(callable(step) for step in steps):
-        raise MyroError("loop() was called without functions, expected loop(step, turn, 4): functions, then how often.")
+        raise MyroError(
+            "loop() was called without functions, expected loop(step, turn, 4): functions, then how often."
+        )
     for turn in range(1, whole("loop: how often", count, 0, 10**9) + 1):
         for step in steps:
             print(f"   loop #{turn}: running {_name(step)}()... ", end="")
@@ -58,7 +60,7 @@ def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
 
 def getFilenames(pattern: str) -> list[str]:
     """The names of files that a pattern describes, in order: `getFilenames("picture*.jpg")`."""
-    return sorted(glob.glob(pattern))
+    return sorted(glob.glob(pattern))  # noqa: PTH207  # the pattern may name folders and begin anywhere
 
 
 def _name(function: object) -> str:

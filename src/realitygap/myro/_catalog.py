@@ -75,8 +75,8 @@ _FILE_SOUND = (
 )
 _CHAT = "It needs the chat server of the institute that made Myro, which is gone."
 _FIRMWARE = (
-    "It replaces the firmware of robot or Fluke, or Myro itself, from addresses that are gone; a mistake there can leave "
-    "a robot useless. Update realitygap with pip, and a robot with its maker's tools."
+    "It replaces the firmware of robot or Fluke, or Myro itself, from addresses that are gone; a mistake there can "
+    "leave a robot useless. Update realitygap with pip, and a robot with its maker's tools."
 )
 _OTHER_ROBOT = (
     "It is another robot, for which there is no driver here. Use Scribbler(port) or SimScribbler()."

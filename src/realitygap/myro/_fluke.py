@@ -31,7 +31,7 @@ class Fluke(Base):
 
     def getIRMessage(self) -> str:
         """What came by infrared since last asked; empty where nothing came."""
-        return self.driver.get_ir_message().decode("latin-1")
+        return bytes(self.driver.get_ir_message()).decode("latin-1")
 
     def setCommunicateLeft(self, on: bool = True) -> None:
         """Send messages to the left, or not."""
@@ -52,7 +52,11 @@ class Fluke(Base):
     def _communicate(self, emitters: int, on: object) -> None:
         lit = is_on("setCommunicate", on)
         self._emitters = self._emitters | emitters if lit else self._emitters & ~emitters
-        self.driver.set_ir_emitters(self._emitters)
+        self.driver.set_ir_emitters(
+            left=bool(self._emitters & _LEFT),
+            center=bool(self._emitters & _CENTER),
+            right=bool(self._emitters & _RIGHT),
+        )
 
     def servo(self, id: int, position: int) -> None:
         """Turn a servo of a Fluke 2: number 0 to 3, position 0 to 255."""

@@ -49,11 +49,11 @@ class Paths(Base):
 
     def moveTo(self, x: int, y: int) -> None:
         """Face a place, drive there and go on when arrived [half mm]."""
-        self._motion("move_to", _far("moveTo: x", x), _far("moveTo: y", y))
+        self._motion("move_to", _far("moveTo: x", x), _far("moveTo: y", y), "half-mm")
 
     def moveBy(self, x: int, y: int) -> None:
         """As `moveTo`, from where the robot is [half mm]."""
-        self._motion("move_by", _far("moveBy: x", x), _far("moveBy: y", y))
+        self._motion("move_by", _far("moveBy: x", x), _far("moveBy: y", y), "half-mm")
 
     def turnTo(self, angle: float, radsOrDegrees: str = "deg") -> None:
         """Turn to face an angle, the shorter way round.
@@ -64,19 +64,23 @@ class Paths(Base):
 
         Differs: "rad" means radians; Myro sends the number as units of 1/955 of a turn.
         """
-        self._motion("turn_to", _degrees("turnTo", angle, radsOrDegrees))
+        self._motion("turn_to", _degrees("turnTo", angle, radsOrDegrees), "deg")
 
     def turnBy(self, angle: float, radsOrDegrees: str = "deg") -> None:
         """Turn by an angle, to the left where positive; arguments as for `turnTo`."""
-        self._motion("turn_by", _degrees("turnBy", angle, radsOrDegrees))
+        self._motion("turn_by", _degrees("turnBy", angle, radsOrDegrees), "deg")
 
     def arcTo(self, x: int, y: int, radius: int) -> None:
         """Drive to a place along an arc and go on when arrived [half mm]; a positive radius turns to the left."""
-        self._motion("arc_to", _far("arcTo: x", x), _far("arcTo: y", y), _far("arcTo: the radius", radius))
+        self._motion(
+            "arc_to", _far("arcTo: x", x), _far("arcTo: y", y), _far("arcTo: the radius", radius), "half-mm"
+        )
 
     def arcBy(self, x: int, y: int, radius: int) -> None:
         """As `arcTo`, from where the robot is [half mm]."""
-        self._motion("arc_by", _far("arcBy: x", x), _far("arcBy: y", y), _far("arcBy: the radius", radius))
+        self._motion(
+            "arc_by", _far("arcBy: x", x), _far("arcBy: y", y), _far("arcBy: the radius", radius), "half-mm"
+        )
 
     def setMove(self, x: int, y: int, moveType: str = "to") -> None:
         """`moveTo` or `moveBy`, as the type says: "to" or "by"."""
@@ -99,7 +103,8 @@ class Paths(Base):
 
         Returns:
             "wheel": [left, right] counts in 1/10 s; "IdlerTimer": [1/10 s since the caster moved];
-            "IdlerSpeed": [of the caster]; "Mov": [whether a motor turns]; "Ready": [whether the robot is ready for a new motion].
+            "IdlerSpeed": [of the caster]; "Mov": [whether a motor turns];
+            "Ready": [whether the robot is ready for a new motion].
         """
         stats = self.driver.motor_stats()
         return {
@@ -110,7 +115,7 @@ class Paths(Base):
             "Ready": [bool(stats.ready)],
         }
 
-    def _motion(self, name: str, *where: int) -> None:
+    def _motion(self, name: str, *where: int | str) -> None:
         getattr(self.driver, name)(*where)
         while not self.getMotorStats()["Ready"][0]:
             self.pause(_POLL_S)

@@ -232,8 +232,8 @@ def makePicture(*args: Any) -> Picture:
     """A picture: empty, from a file, or of a size and perhaps a color.
 
     `makePicture()`, `makePicture("photo.jpg")`, `makePicture(width, height)` (white),
-    `makePicture(width, height, color)`, `makePicture(width, height, gray)`, `makePicture(width, height, data)` and `makePicture(width, height, data, mode)`
-    with the bytes of all pixels, row by row, in mode "color" (3 a pixel) or "gray" (1 a pixel).
+    `makePicture(width, height, color)`, `makePicture(width, height, gray)`, `makePicture(width, height, data)`
+    and `makePicture(width, height, data, mode)` with the bytes of all pixels, row by row, in mode "color" (3 a pixel) or "gray" (1 a pixel).
 
     Raises:
         MyroError: None of these was meant.
@@ -329,8 +329,11 @@ def _as_picture(item: Picture | str) -> Picture:
 
 
 def _flat(image: Image.Image, filename: str) -> Image.Image:
-    """Without alpha where the kind of file has none."""
-    return image.convert("RGB") if filename.lower().endswith((".jpg", ".jpeg", ".bmp")) else image
+    """Without alpha where the kind of file has none, or nothing is see-through: a GIF's colors then stay exact."""
+    is_opaque = image.getextrema()[3] == (255, 255)
+    return (
+        image.convert("RGB") if is_opaque or filename.lower().endswith((".jpg", ".jpeg", ".bmp")) else image
+    )
 
 
 def getWidth(picture: Picture) -> int:

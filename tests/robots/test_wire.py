@@ -178,3 +178,69 @@ def test_what_a_set_up_lacks_is_said_with_who_has_it(setup, call, who):
     with pytest.raises(RobotError, match=who):
         call(robot)
     port.check_all_said()
+
+
+S2_CALLS = [
+    (lambda r: r.position, [echoed(165, answer=bytes([0, 0, 0, 9, 255, 255, 255, 254]))], (9, -2)),
+    (lambda r: r.set_position(-1, 258), [echoed(166, 255, 255, 255, 255, 0, 0, 1, 2)], None),
+    (lambda r: r.angle, [echoed(167, answer=bytes([255, 255, 255, 166]))], -90),
+    (lambda r: r.set_angle(90), [echoed(168, 0, 0, 0, 90)], None),
+    (lambda r: r.begin_path(7), [echoed(161, 1, 0, 7)], None),
+    (lambda r: r.end_path(), [echoed(161, 0, 0, 0)], None),
+    (lambda r: r.move_to(100, -1), [echoed(162, 3, 0, 100, 255, 255)], None),
+    (lambda r: r.move_by(100, 0, "half-mm"), [echoed(162, 4, 0, 100)], None),
+    (lambda r: r.turn_to(90), [echoed(164, 3, 0, 90)], None),
+    (lambda r: r.turn_by(955, "units"), [echoed(164, 4, 3, 187)], None),
+    (lambda r: r.arc_to(1, 2, 3), [echoed(163, 3, 0, 1, 0, 2, 0, 3)], None),
+    (lambda r: r.arc_by(1, 2, -3), [echoed(163, 5, 0, 1, 0, 2, 255, 253)], None),
+    (lambda r: r.encoders(), [echoed(171, 1, answer=bytes([0, 0, 1, 0, 255, 255, 255, 255]))], (256, -1)),
+    (lambda r: r.encoders(zero=True), [echoed(171, 0, answer=bytes(8))], (0, 0)),
+    (
+        lambda r: r.motor_stats(),
+        [echoed(170, answer=bytes([16, 240, 5, 0b1011, 1]))],
+        (16, -16, 0.5, 2, True, True),
+    ),
+]
+
+
+@pytest.mark.parametrize(("call", "script", "value"), S2_CALLS)
+def test_a_call_of_an_s2_sends_exactly_these_bytes(call, script, value):
+    robot, port = opened("s2", *script)
+    assert call(robot) == value
+    port.check_all_said()
+
+
+FLUKE_CALLS = [
+    ("s2+fluke2", lambda r: r.servo(2, 128), [(bytes([12, 2, 128]), b"")], None),
+    ("s2+fluke2", lambda r: r.enable_pan(), [(bytes([13, 1, 35]), b"")], None),
+    ("s2+fluke2", lambda r: r.error_log(), [(bytes([10]), b"\x00\x05hello")], "hello"),
+    ("s2+fluke1", lambda r: r.send_ir_message(b"hi"), [(b"\x97\x02hi", b"")], None),
+    ("s2+fluke1", lambda r: r.get_ir_message(), [(bytes([150]), b"\x00\x00")], b""),
+    ("s2+fluke1", lambda r: r.set_ir_emitters(center=False), [(bytes([152, 5]), b"")], None),
+    ("s2+fluke1", lambda r: r.set_white_balance(False), [(bytes([130]), b"")], None),
+]
+
+
+@pytest.mark.parametrize(("setup", "call", "script", "value"), FLUKE_CALLS)
+def test_a_call_of_a_fluke_sends_exactly_these_bytes(setup, call, script, value):
+    robot, port = opened(setup, *script)
+    assert call(robot) == value
+    port.check_all_said()
+
+
+def test_after_a_reset_the_robot_is_greeted_anew():
+    script = [(bytes([124]), b"IPREScribby\0\0"), *greeting(INFOS["s2+fluke1"])]
+    robot, port = opened("s2+fluke1", *script)
+    robot.reset_robot()
+    assert port.clock.now() == 3.0
+    port.check_all_said()
+    robot, port = opened("s2", (bytes([33]).ljust(9, b"\0"), bytes([33, 0, 0])), *greeting(INFOS["s2"]))
+    robot.reset_robot()
+    port.check_all_said()
+
+
+def test_a_tone_whose_answer_a_fluke_2_swallows_is_a_tone_all_the_same():
+    robot, port = opened("s2+fluke2", (echoed(113, 3, 232, 1, 184)[0], echoed(113, 3, 232, 1, 184)[0]))
+    robot.beep(1, 440)
+    port.check_all_said()
+    assert robot.faults.recoveries == 0

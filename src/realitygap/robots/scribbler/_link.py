@@ -194,6 +194,15 @@ class Link:
     Args:
         port: As `open_port` gives it, or anything with the same methods; its attribute `clock` is the time.
         name: Of the port, for messages.
+
+    Attributes:
+        has_robot, fluke: Who is there, known after `greet`.
+        where: What the caller is at, for messages.
+        motors_off: Whether the motors are known to be off; None before anything is known.
+        tell: Is given each exchange, as it is over.
+        watch: Is called before each command.
+        spoken_s: When the last command was carried out, by the clock [s].
+        lock: Held while a command is under way.
     """
 
     def __init__(self, port: Port, name: str) -> None:
@@ -206,6 +215,8 @@ class Link:
         self.where = ""
         self.motors_off: bool | None = None
         self.tell: Callable[[Exchange], None] | None = None
+        self.watch: Callable[[], None] | None = None
+        self.spoken_s = self.clock.now()
         self.lock = threading.RLock()
         self._motors: Request | None = None
         self._in_step = False
@@ -236,6 +247,8 @@ class Link:
         with self.lock:
             if not self._is_open:
                 raise RobotError(f"{self.name} is closed: open the robot anew before '{request.name}'.")
+            if self.watch is not None:
+                self.watch()
             fault, lost = None, False
             for attempt in range(ATTEMPTS):
                 try:
@@ -284,6 +297,7 @@ class Link:
             raise
         self._in_step = True
         self._recoveries = RECOVERIES
+        self.spoken_s = self.clock.now()
         if request.data[0] in _STEERING:
             self._note_motors(request)
         if request.pause_s:
@@ -518,6 +532,25 @@ class Link:
             f"No Scribbler answers on {self.name}, asked {GREETINGS} times within {took:.0f} s. {fault}. "
             "Is the robot on, paired, and not in use by another program?"
         ) from fault
+
+    def forget(self, request: Request, seconds: float) -> None:
+        """Send a command that makes the robot forget all it was told, and leave it alone for so long [s].
+
+        What it still answers is thrown away; `greet` has to follow.
+
+        Raises:
+            RobotError: the port hung up.
+        """
+        with self.lock:
+            self._in_step, self._motors = False, None
+            try:
+                self.port.write(request.data)
+                self.clock.sleep(seconds)
+                self._discard()
+            except _HANG_UPS as error:
+                raise RobotError(
+                    f"The port {self.name} hung up as '{request.name}' was sent: {error}."
+                ) from error
 
     def close(self) -> None:
         """Let go of the port; safe to call twice. The motors are the caller's business."""

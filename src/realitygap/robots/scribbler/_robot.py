@@ -13,19 +13,24 @@ from realitygap.robots._contract import Command, Label, Observation, check_comma
 from realitygap.world import Pose
 
 from . import _codec as codec
+from ._board import Board
+from ._camera import Camera
 from ._device import RobotInfo
 from ._driving import Driving
+from ._exits import EXITS
 from ._identity import Identity
 from ._link import Link, open_port
+from ._odometry import Odometry
 from ._ports import label_of, port_name
 from ._senses import Senses
 from ._sound import SoundAndLight
+from ._watchdog import WatchedClock, Watchdog
 
 FAR = 99
 """What an S2's distance reads where nothing is seen."""
 
 
-class Scribbler(Driving, Senses, SoundAndLight, Identity):
+class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Board):
     """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
 
     | command | least | most | unit |
@@ -71,11 +76,14 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity):
         )
         label = label_of(name) if isinstance(port, str) else "EMULATED"
         self.link = Link(open_port(name) if isinstance(port, str) else port, name)
-        weakref.finalize(self, _let_go, self.link)  # also when the program ends
+        EXITS.hold()
+        self._released = weakref.finalize(self, _let_go, self.link)  # also when the program ends
         try:
             found = self.link.greet()
+            self._watchdog = None if watchdog_s is None else Watchdog(self.link, watchdog_s)
         except BaseException:
             self.link.close()
+            self._released()
             raise
         self.info = RobotInfo(*found, port=name, label=label)
         self.step_s = step_s
@@ -86,8 +94,8 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity):
 
     @property
     def clock(self) -> Clock:
-        """The time that this robot lives in."""
-        return self.link.clock
+        """The time that this robot lives in; whoever waits by it is watched, too."""
+        return self.link.clock if self._watchdog is None else WatchedClock(self.link.clock, self._watchdog)
 
     # --- the contract -----------------------------------------------------------------------------------------
 
@@ -121,7 +129,9 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity):
         self._n_steps += 1
         self.link.where = f"step {self._n_steps}"
         self.motors(_within(move - turn), _within(move + turn))
-        self.clock.sleep(self.step_s)
+        if self._watchdog is not None:
+            self._watchdog.excuse(self.step_s)
+        self.link.clock.sleep(self.step_s)
 
     def close(self) -> None:
         """Stop the motors and let go of the port; safe to call twice.
@@ -134,7 +144,10 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity):
         try:
             self.stop()
         finally:
+            if self._watchdog is not None:
+                self._watchdog.end()
             self.link.close()
+            self._released()
 
     def __enter__(self) -> Self:
         return self
@@ -163,3 +176,4 @@ def _let_go(link: Link) -> None:
         pass
     finally:
         link.close()
+        EXITS.release()

@@ -1,0 +1,242 @@
+"""The camera of the Fluke."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal
+
+from realitygap.errors import ProtocolError, did_you_mean, whole_number
+
+from . import _codec as codec
+from ._codec import Blob, Request, fluke_request
+from ._device import Device
+from ._opcodes import COUNTED, Op
+
+if TYPE_CHECKING:
+    from ._images import Pixels, Size
+
+Kind = Literal["jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayraw", "color", "blob"]
+KINDS = ("jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayraw", "color", "blob")
+
+PICTURE_WAIT_S = 6.0
+"""How long a camera may take before the first byte of a picture [s]."""
+SETTLE_S = 0.15
+"""How long a register of the camera takes to settle [s]. Source: Myro's scribbler.py."""
+RAW_WINDOW = 3
+"""Of the four windows, the one that raw gray pictures use; the other three are those of `bright`."""
+DEFAULT_BLOB = (90, 4, 0, 255, 51, 136, 190, 255)
+"""Delay, smoothing and limits of Y, U, V. Source: what Myro sets as it connects."""
+
+
+class Camera(Device):
+    """Pictures, brightness and blobs. The camera is set up at its first use, as Myro does as it connects."""
+
+    _is_prepared = False
+    _is_small = False
+    # of JPEG files, gray or not, which a Fluke gives once for all pictures of a size
+    _headers: Mapping[bool, bytes] = MappingProxyType({})
+
+    # --- setting up -------------------------------------------------------------------------------------------
+
+    def _prepare(self, what: str) -> None:
+        """At the first use: automatic colors and exposure, the three windows of `bright`, the color of blobs."""
+        self.need_fluke(what)
+        if self._is_prepared:
+            return
+        if self.info.fluke == "2":
+            self.set_picture_size("small" if self._is_small else "large")
+        self._set_register(0x12, 0x14)
+        self._set_register(0x13, 0xA3)
+        self._is_prepared = True
+        self._set_bright_windows()
+        self.configure_blob(*DEFAULT_BLOB)
+
+    def _set_register(self, register: int, value: int) -> None:
+        arguments = bytes((register, value))
+        self._tell_fluke("camera register", Op.SET_CAMERA_PARAMETER, arguments, pause_s=SETTLE_S)
+
+    def _set_bright_windows(self) -> None:
+        if self.info.fluke == "2":
+            lefts, width, bottom = (3, 321, 641), 637, 799
+        else:
+            lefts, width, bottom = (3, 65, 129), 125, 191
+        for number, left in enumerate(lefts):
+            self.set_window(number, left, 0, left + width, bottom, 2, 1)
+
+    @property
+    def picture_size(self) -> Size:
+        """Width and height of a picture as the camera is set."""
+        from ._images import FLUKE_1, FLUKE_2_LARGE, FLUKE_2_SMALL
+
+        if self.info.fluke != "2":
+            return FLUKE_1
+        return FLUKE_2_SMALL if self._is_small else FLUKE_2_LARGE
+
+    def set_picture_size(self, size: Literal["small", "large"]) -> None:
+        """Choose 427 x 266 or 1280 x 800 pixels; a Fluke 2 only."""
+        self.need_fluke_2("set_picture_size")
+        if size not in ("small", "large"):
+            raise ValueError(f"size is {size!r}, expected 'small' or 'large'.")
+        self._tell_fluke("set_picture_size", Op.SET_PICTURE_SIZE, bytes((71 if size == "small" else 213,)))
+        self._is_small = size == "small"
+        self._headers = {}
+
+    def set_window(
+        self, number: int, x_low: int, y_low: int, x_high: int, y_high: int, x_step: int, y_step: int
+    ) -> None:
+        """Define window 0 to 3: columns and rows from low to high, both included, every so many.
+
+        Odd columns are brightness, so an odd `x_low` with an even `x_step` sees brightness alone.
+        """
+        window = whole_number("number", number, 0, 3)
+        is_2 = self.info.fluke == "2"
+        most = 65535 if is_2 else 255
+        corners = [
+            whole_number(name, value, 0, most)
+            for name, value in (("x_low", x_low), ("y_low", y_low), ("x_high", x_high), ("y_high", y_high))
+        ]
+        steps = [
+            whole_number(name, value, 1, 255) for name, value in (("x_step", x_step), ("y_step", y_step))
+        ]
+        arguments = struct.pack(">B4H2B" if is_2 else ">B4B2B", window, *corners, *steps)
+        self._tell_fluke("set_window", Op.SET_WINDOW, arguments)
+
+    def set_white_balance(self, on: bool) -> None:
+        """Let the camera correct colors by itself, or not."""
+        self._tell_fluke("set_white_balance", Op.WHITE_BALANCE_ON if on else Op.WHITE_BALANCE_OFF)
+
+    def darken_camera(self, level: int = 0) -> None:
+        """Switch automatic exposure off and make pictures darker, 0 (darkest) to 255."""
+        self._prepare("darken_camera")
+        level = whole_number("level", level, 0, 255)
+        if self.info.fluke == "2":
+            self._set_register(0, min(level + 128, 255))
+            return
+        for register, value in ((0x12, 0x10), (0x13, 0xA0), (0x06, level), (0x01, 0x80), (0x02, 0x80)):
+            self._set_register(register, value)
+        for register in (0x00, 0x10):
+            self._set_register(register, level)
+
+    def auto_camera(self) -> None:
+        """Let the camera choose exposure, gain and colors, as it does at first."""
+        self._prepare("auto_camera")
+        if self.info.fluke == "2":
+            self._set_register(0x0D, 0x01)
+            self._set_register(0, 128)
+            return
+        for register, value in ((0x12, 0x14), (0x13, 0xA3), (0x06, 0x80)):
+            self._set_register(register, value)
+
+    def manual_camera(self, gain: int = 0x00, brightness: int = 0x80, exposure: int = 0x41) -> None:
+        """Choose gain, brightness and exposure, each 0 to 255; a Fluke 2 takes the exposure alone."""
+        self._prepare("manual_camera")
+        chosen = (("gain", gain), ("brightness", brightness), ("exposure", exposure))
+        values = [whole_number(name, value, 0, 255) for name, value in chosen]
+        if self.info.fluke == "2":
+            self._set_register(0x0D, values[2])
+            return
+        for register, value in ((0x12, 0x10), (0x13, 0xA0)):
+            self._set_register(register, value)
+        for register, value in zip((0x00, 0x06, 0x10), values, strict=True):
+            self._set_register(register, value)
+
+    # --- seeing -----------------------------------------------------------------------------------------------
+
+    def picture(self, kind: Kind = "jpeg") -> Pixels:
+        """A picture, (h, w, 3) uint8 red, green, blue, or (h, w) uint8 in gray; rows from the top.
+
+        Args:
+            kind: "jpeg" or "jpeg-fast" in color, "grayjpeg" (also "gray") or "grayjpeg-fast" in gray; "color" and
+                "grayraw" without compression, which takes many seconds; "blob": 255 where the color of
+                `configure_blob` is.
+        """
+        if kind not in KINDS:
+            raise ValueError(f"Unknown kind of picture {kind!r}. {did_you_mean(str(kind), KINDS)}")
+        self._prepare("picture")
+        if kind == "color":
+            return self._raw_picture()
+        if kind == "grayraw":
+            return self._raw_gray_picture()
+        if kind == "blob":
+            return self._blob_picture()
+        return self._jpeg_picture(gray=kind.startswith("gray"), fast=kind.endswith("-fast"))
+
+    def _jpeg_picture(self, *, gray: bool, fast: bool) -> Pixels:
+        from ._images import jpeg_pixels
+
+        header_op = Op.GET_JPEG_GRAY_HEADER if gray else Op.GET_JPEG_COLOR_HEADER
+        scan_op = Op.GET_JPEG_GRAY_SCAN if gray else Op.GET_JPEG_COLOR_SCAN
+        if gray not in self._headers:
+            header = self._get(_camera_request("picture header", header_op), bytes)
+            self._headers = {**self._headers, gray: header}
+        header, size = self._headers[gray], self.picture_size
+        request = _camera_request("picture", scan_op, bytes((0 if fast else 1,)))
+        try:
+            return self._get(request, lambda scan: jpeg_pixels(header, scan, size, gray=gray))
+        except ProtocolError:
+            self._headers = {}  # it may be the header that was damaged
+            raise
+
+    def _raw_picture(self) -> Pixels:
+        from ._images import raw_pixels
+
+        size = self.picture_size
+        request = _camera_request("picture", Op.GET_IMAGE, answer=size.width * size.height)
+        return self._get(request, lambda data: raw_pixels(data, size))
+
+    def _raw_gray_picture(self) -> Pixels:
+        from ._images import Size, gray_window_pixels
+
+        whole = self.picture_size
+        size = Size(whole.width // 2 * 2, whole.height // 2 * 2)
+        self.set_window(RAW_WINDOW, 1, 0, size.width - 1, size.height - 1, 2, 2)
+        n_bytes = size.width * size.height // 4
+        request = _camera_request("picture", Op.GET_WINDOW, bytes((RAW_WINDOW,)), answer=n_bytes)
+        return self._get(request, lambda data: gray_window_pixels(data, size))
+
+    def _blob_picture(self) -> Pixels:
+        from ._images import run_pixels
+
+        size, word = self.picture_size, 3 if self.info.fluke == "2" else 2
+        request = _camera_request("picture", Op.GET_RLE, answer=COUNTED)
+        return self._get(request, lambda data: run_pixels(data, size, word))
+
+    def bright(self) -> tuple[int, int, int]:
+        """How bright it is to the left, center and right: sums of the pixels of the camera's three windows."""
+        self._prepare("bright")
+        left, center, right = (
+            self._get(
+                fluke_request("bright", Op.GET_WINDOW_LIGHT, bytes((number,)), wait_s=PICTURE_WAIT_S),
+                codec.word,
+            )
+            for number in range(3)
+        )
+        return left, center, right
+
+    def blob(self) -> Blob:
+        """How many pixels have the color of `configure_blob`, and where their middle is."""
+        self._prepare("blob")
+        return self._get(_camera_request("blob", Op.GET_BLOB), codec.blob)
+
+    def configure_blob(
+        self,
+        delay: int = 90,
+        smooth: int = 4,
+        y_low: int = 0,
+        y_high: int = 255,
+        u_low: int = 51,
+        u_high: int = 136,
+        v_low: int = 190,
+        v_high: int = 255,
+    ) -> None:
+        """Choose which colors are a blob: limits of brightness Y and colors U and V, each 0 to 255."""
+        self._prepare("configure_blob")
+        values = (delay, smooth, y_low, y_high, u_low, u_high, v_low, v_high)
+        arguments = bytes(whole_number("A value", value, 0, 255) for value in values)
+        self._tell_fluke("configure_blob", Op.SET_RLE, arguments)
+
+
+def _camera_request(name: str, op: Op, arguments: bytes = b"", *, answer: int | None = None) -> Request:
+    return fluke_request(name, op, arguments, answer=answer, wait_s=PICTURE_WAIT_S)

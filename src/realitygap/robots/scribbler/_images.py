@@ -1,0 +1,84 @@
+"""The bytes of the camera as arrays; nothing here waits."""
+
+from __future__ import annotations
+
+import io
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from realitygap.errors import ProtocolError
+
+Pixels = NDArray[np.uint8]
+
+
+class Size(NamedTuple):
+    """Of a picture, in pixels."""
+
+    width: int
+    height: int
+
+
+FLUKE_1 = Size(256, 192)
+FLUKE_2_LARGE = Size(1280, 800)
+FLUKE_2_SMALL = Size(427, 266)
+RUN_PIXELS = 4
+"""A run of a blob picture counts groups of so many columns."""
+
+
+def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels:
+    """(h, w, 3) or, in gray, (h, w) uint8 from the two parts of a JPEG file, stretched to the size of the camera.
+
+    A Fluke 1 describes half the width.
+
+    Raises:
+        ProtocolError: it is no picture.
+    """
+    try:
+        with Image.open(io.BytesIO(header + scan[:-12]), formats=("JPEG",)) as file:
+            picture = file.convert("L" if gray else "RGB")
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise ProtocolError(f"The picture cannot be read ({error}): a byte was lost or added") from error
+    if picture.size != size:
+        picture = picture.resize(size, Image.Resampling.NEAREST)
+    return np.asarray(picture, np.uint8)
+
+
+def raw_pixels(data: bytes, size: Size) -> Pixels:
+    """(h, w, 3) uint8 from one byte a pixel, in the order V Y U Y along a row."""
+    rows = np.frombuffer(data, np.uint8).reshape(size.height, size.width).astype(np.float32)
+    columns = np.arange(size.width)
+    group = columns // RUN_PIXELS * RUN_PIXELS
+    last = size.width - 1
+    v = rows[:, group] - 128.0
+    u = rows[:, np.minimum(group + 2, last)] - 128.0
+    y = rows[:, np.minimum(columns | 1, last - (last + 1) % 2)]
+    colors = np.stack([y + 1.402 * v, y - 0.344136 * u - 0.714136 * v, y + 1.772 * u], axis=-1)
+    pixels: Pixels = np.clip(np.rint(colors), 0, 255).astype(np.uint8)
+    return pixels
+
+
+def gray_window_pixels(data: bytes, size: Size) -> Pixels:
+    """(h, w) uint8 from a window of every other pixel and row."""
+    window = np.frombuffer(data, np.uint8).reshape(size.height // 2, size.width // 2)
+    return np.ascontiguousarray(window.repeat(2, axis=0).repeat(2, axis=1))
+
+
+def run_pixels(data: bytes, size: Size, word: int) -> Pixels:
+    """(h, w) uint8: 255 where a color was seen, from run lengths that begin with "not seen".
+
+    Args:
+        data: Run after run, in groups of four columns.
+        size: Of the picture.
+        word: Bytes of a run: 2 of a Fluke 1, 3 of a Fluke 2.
+    """
+    n_runs = len(data) // word
+    runs = np.frombuffer(data[: n_runs * word], np.uint8).reshape(n_runs, word).astype(np.int64)
+    lengths = runs @ (256 ** np.arange(word - 1, -1, -1))
+    n_groups = -(-size.width // RUN_PIXELS) * size.height
+    lengths = np.minimum(lengths, n_groups)
+    flat = np.repeat(np.arange(n_runs) % 2 * 255, lengths)[:n_groups].astype(np.uint8)
+    flat = np.pad(flat, (0, n_groups - len(flat)))
+    return np.ascontiguousarray(flat.reshape(size.height, -1).repeat(RUN_PIXELS, axis=1)[:, : size.width])

@@ -1,0 +1,103 @@
+"""Stops a robot whose program has fallen silent: it would drive on for ever."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import weakref
+
+from realitygap.errors import RobotError
+from realitygap.robots._clock import Clock, SystemClock
+
+from . import _codec as codec
+from ._link import Link
+
+SHORTEST_LOOK_S = 0.02
+
+
+class Watchdog:
+    """Stops the motors when nobody has spoken to a robot for a while.
+
+    In real time a thread of its own looks. On any other clock time passes only where somebody lets it, so
+    that `clock` looks there, and results do not depend on threads.
+
+    Args:
+        link: To the robot.
+        silence_s: How long nobody may speak while motors may be running [s].
+    """
+
+    def __init__(self, link: Link, silence_s: float) -> None:
+        if not silence_s > 0:
+            raise ValueError(f"watchdog_s is {silence_s}, expected more than 0.")
+        self._link = link
+        self.silence_s = silence_s
+        self._excused_until = link.clock.now()
+        self._is_stopping = False
+        self._ended = threading.Event()
+        link.watch = self.look
+        if isinstance(link.clock, SystemClock):
+            threading.Thread(target=_keep_looking, args=(weakref.ref(self), self._ended), daemon=True).start()
+
+    def excuse(self, seconds: float) -> None:
+        """Nobody need speak for so long from now on [s]: a command lasts."""
+        self._excused_until = self._link.clock.now() + seconds
+
+    @property
+    def due_s(self) -> float:
+        """When the motors will be stopped, if nobody speaks before [s]."""
+        return max(self._link.spoken_s, self._excused_until) + self.silence_s
+
+    def look(self) -> None:
+        """Stop the motors if they may be running and it is time to."""
+        link = self._link
+        if link.motors_off or link.clock.now() <= self.due_s:
+            return
+        with link.lock:
+            if self._is_stopping or link.motors_off or not link.is_open or link.clock.now() <= self.due_s:
+                return
+            self._is_stopping = True
+            link.faults.watchdog_stops += 1
+            try:
+                with contextlib.suppress(RobotError):  # whoever speaks next will hear of it
+                    link.ask(codec.STOP, codec.sensor_block)
+            finally:
+                self._is_stopping = False
+
+    def end(self) -> None:
+        """Look no more."""
+        self._ended.set()
+
+
+class WatchedClock:
+    """A clock under whose sleep a silent robot is stopped in time."""
+
+    def __init__(self, clock: Clock, watchdog: Watchdog) -> None:
+        self._clock = clock
+        self._watchdog = watchdog
+
+    def now(self) -> float:
+        """The time [s]."""
+        return self._clock.now()
+
+    def sleep(self, seconds: float) -> None:
+        """Let so much time pass [s]."""
+        until = self._clock.now() + seconds
+        due = self._watchdog.due_s
+        if due < until:
+            self._clock.sleep(max(due - self._clock.now(), 0.0))
+            self._clock.sleep(min(1e-6, max(until - self._clock.now(), 0.0)))  # beyond, not at
+            self._watchdog.look()
+        self._clock.sleep(max(until - self._clock.now(), 0.0))
+
+
+def _keep_looking(watched: weakref.ref[Watchdog], ended: threading.Event) -> None:
+    wait_s = SHORTEST_LOOK_S
+    while not ended.wait(wait_s):
+        watchdog = watched()
+        if watchdog is None:
+            return
+        watchdog.look()
+        wait_s = min(
+            max(watchdog.due_s - watchdog._link.clock.now(), SHORTEST_LOOK_S), watchdog.silence_s / 4
+        )
+        del watchdog

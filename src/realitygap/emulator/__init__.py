@@ -1,1 +1,34 @@
-"""A Scribbler for real client programs: bytes in front, any simulated robot behind."""
+"""A Scribbler for real client programs: bytes in front, any simulated robot behind.
+
+Importing this package lets pyserial open ports such as `emulator://s2?fluke=2&seed=1&speed=off`.
+"""
+
+from ._emulator import Emulator
+from ._faults import Faults
+from ._port import EmulatedPort, EmulatorClock, register
+from ._scene import Lamp, Scene
+from ._scene_file import open_scene
+from ._serve import Server, serve_pty, serve_tcp
+from ._simulated import BoxOnWheels, SimulatedRobot
+from ._witness import DirectWitness, RemoteWitness, Witness, connect_witness
+
+register()
+
+__all__ = [
+    "BoxOnWheels",
+    "DirectWitness",
+    "EmulatedPort",
+    "Emulator",
+    "EmulatorClock",
+    "Faults",
+    "Lamp",
+    "RemoteWitness",
+    "Scene",
+    "Server",
+    "SimulatedRobot",
+    "Witness",
+    "connect_witness",
+    "open_scene",
+    "serve_pty",
+    "serve_tcp",
+]

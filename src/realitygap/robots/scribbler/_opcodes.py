@@ -195,7 +195,7 @@ FLUKE_COMMANDS: dict[Op, FlukeLengths] = {
         (
             *(Op.SET_FRONT_LED_ON, Op.SET_FRONT_LED_OFF, Op.RESET_SCRIBBLER, Op.RESET_SCRIBBLER_2),
             *(Op.WHITE_BALANCE_ON, Op.WHITE_BALANCE_OFF, Op.RELAY_ON, Op.RELAY_OFF, Op.WATCHDOG_RESET),
-            *(Op.UPDATE_FIRMWARE, Op.SAVE_EEPROM, Op.RESTORE_EEPROM),
+            *(Op.SAVE_EEPROM, Op.RESTORE_EEPROM),
         ),
         FlukeLengths(0, 0),
     ),
@@ -210,7 +210,7 @@ FLUKE_COMMANDS: dict[Op, FlukeLengths] = {
     Op.SET_SERIAL_MEMORY: FlukeLengths(5, 0),
     Op.SET_SCRIBBLER_PROGRAM: FlukeLengths(3, 0),
     **dict.fromkeys((Op.SET_START_PROGRAM, Op.SET_START_PROGRAM_2), FlukeLengths(4, 0)),
-    Op.ERASE_SERIAL_MEMORY: FlukeLengths(2, 0),
+    **dict.fromkeys((Op.ERASE_SERIAL_MEMORY, Op.UPDATE_FIRMWARE), FlukeLengths(2, 0)),
     Op.SET_WINDOW: FlukeLengths(7, 0),
     Op.SET_CAMERA_PARAMETER: FlukeLengths(2, 0),
     Op.SET_UART0: FlukeLengths(4, 0),

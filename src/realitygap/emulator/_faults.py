@@ -1,0 +1,121 @@
+"""What goes wrong on a real link: lost and late bytes, hang-ups, a supply that sags."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, fields
+
+from realitygap.errors import RobotError, did_you_mean
+
+from ._time import SECOND, nanoseconds
+
+HANG_UP_S = (1.0, 3.0)  # how long the link stays away; chosen
+SAG_HANG_UP_S = 3.0  # after the supply dropped out
+
+
+@dataclass(frozen=True)
+class Faults:
+    """How often and how badly a link fails.
+
+    Attributes:
+        drop: Share of the bytes that are lost, either way, 0 to 1.
+        extra: Share of the bytes that are followed by one that nobody sent, either way, 0 to 1.
+        flip: Share of the bytes of which one bit is turned, either way, 0 to 1.
+        delay: Longest time that a piece of data comes late [s]; each is late by a random part of it.
+        hangup: Mean time between hang-ups [s], 0 for none. The link is away for one to three seconds; the robot goes
+            on with what it was told.
+        sag: Share of its voltage that the supply loses while the motors work as hard as they can, 0 to 1. Below 5.5 V
+            Bluetooth drops out.
+    """
+
+    drop: float = 0.0
+    extra: float = 0.0
+    flip: float = 0.0
+    delay: float = 0.0
+    hangup: float = 0.0
+    sag: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            most = 3600.0 if field.name in ("delay", "hangup") else 1.0
+            if not 0 <= value <= most:
+                raise RobotError(f"fault {field.name}={value:g}: expected 0 to {most:g}.")
+
+    @classmethod
+    def parse(cls, text: str) -> Faults:
+        """Faults as on the command line: drop=0.001,delay=0.05,hangup=60,sag=0.2.
+
+        Raises:
+            RobotError: A name is not known or a value is out of range.
+        """
+        values: dict[str, float] = {}
+        known = [field.name for field in fields(cls)]
+        for part in filter(None, (piece.strip() for piece in text.split(","))):
+            name, _, value = part.partition("=")
+            if name not in known:
+                raise RobotError(f"Unknown fault {name!r}. {did_you_mean(name, known)}")
+            try:
+                values[name] = float(value)
+            except ValueError:
+                raise RobotError(f"fault {name}={value}: expected a number, as in drop=0.001.") from None
+        return cls(**values)
+
+    @property
+    def any_on_the_wire(self) -> bool:
+        """Whether bytes may get lost, changed, added or late."""
+        return bool(self.drop or self.extra or self.flip or self.delay)
+
+
+class FaultyLink:
+    """The same faults for the same seed and the same bytes.
+
+    Args:
+        faults: What goes wrong.
+        seed: Of when.
+    """
+
+    def __init__(self, faults: Faults, seed: int) -> None:
+        self._faults = faults
+        self._random = random.Random(f"{seed} faults")
+        self.away_until = 0  # [ns]
+        self.n_hang_ups = 0
+        self._next_hang_up = self._after(0)
+
+    def _after(self, now: int) -> int | None:
+        if not self._faults.hangup:
+            return None
+        return now + nanoseconds(self._random.expovariate(1 / self._faults.hangup))
+
+    def is_up(self, now: int) -> bool:
+        """Whether the link is there at a time [ns]."""
+        while self._next_hang_up is not None and self._next_hang_up <= now:
+            self.hang_up(self._next_hang_up, self._random.uniform(*HANG_UP_S))
+            self._next_hang_up = self._after(self.away_until)
+        return now >= self.away_until
+
+    def hang_up(self, now: int, seconds: float) -> None:
+        """Let the link be away for a while."""
+        self.n_hang_ups += 1
+        self.away_until = max(self.away_until, now + nanoseconds(seconds))
+
+    def spoil(self, data: bytes) -> bytes:
+        """What arrives of some bytes."""
+        faults = self._faults
+        if not (faults.drop or faults.extra or faults.flip):
+            return data
+        out = bytearray()
+        for byte in data:
+            chance = self._random.random()
+            if chance < faults.drop:
+                continue
+            if self._random.random() < faults.flip:
+                byte ^= 1 << self._random.randrange(8)
+            out.append(byte)
+            if self._random.random() < faults.extra:
+                out.append(self._random.randrange(256))
+        return bytes(out)
+
+    def lateness(self) -> int:
+        """How late a piece of data comes [ns]."""
+        return int(self._random.random() * self._faults.delay * SECOND) if self._faults.delay else 0

@@ -1,0 +1,34 @@
+"""The six cells that feed robot and Fluke: they drain, and sag when the motors pull."""
+
+from __future__ import annotations
+
+from ._time import SECOND
+
+FULL_VOLTS, EMPTY_VOLTS = 9.0, 6.0  # a full set; the Fluke blinks below 6.15 V
+CAPACITY_AS = 2.0 * 3600  # of fresh AA cells [A s]; chosen
+IDLE_A, MOTORS_A = 0.15, 0.35  # chosen
+OWN_SAG = 0.015  # share of the voltage that fresh cells lose under full load; chosen
+DROP_OUT_VOLTS = 5.5  # below it Bluetooth drops out; chosen
+LOW_VOLTS = 6.15
+
+
+class Battery:
+    """What is left, and the voltage under load.
+
+    Args:
+        sag: Share of the voltage lost under full load, of weak cells.
+    """
+
+    def __init__(self, sag: float = 0.0) -> None:
+        self._sag = OWN_SAG + sag
+        self.used = 0.0  # share of the capacity
+
+    def drain(self, load: float, duration_ns: int) -> None:
+        """Use what robot and motors take in a while, with the motors at a load of 0 to 1."""
+        amperes = IDLE_A + MOTORS_A * load
+        self.used = min(1.0, self.used + amperes * duration_ns / SECOND / CAPACITY_AS)
+
+    def volts(self, load: float) -> float:
+        """The voltage with the motors at a load of 0 to 1."""
+        resting = FULL_VOLTS - (FULL_VOLTS - EMPTY_VOLTS) * self.used
+        return resting * (1 - self._sag * load)

@@ -1,0 +1,479 @@
+"""Serving an emulator to other programs, on a pseudo-terminal or a TCP port of this machine."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import selectors
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from threading import RLock, Thread
+from typing import Protocol
+
+from realitygap.errors import RobotError
+
+from ._emulator import Emulator
+from ._time import SECOND, nanoseconds
+from ._witness import DirectWitness, answer_witness
+
+HOST = "127.0.0.1"
+PIECE = 1 << 16
+LONGEST_REQUEST = 1 << 16  # bytes of a line that a witness may send
+IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
+
+
+class Channel(Protocol):
+    """Where a client connects.
+
+    Attributes:
+        name: What a client opens.
+    """
+
+    name: str
+
+    def watch(self, selector: selectors.BaseSelector) -> None:
+        """Let the selector know what may bring bytes."""
+        ...
+
+    def read(self, ready: object) -> bytes:
+        """What a client sent; nothing where there is none."""
+        ...
+
+    def write(self, data: bytes) -> int:
+        """How many of these bytes could be handed on."""
+        ...
+
+    def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
+        """Whether to be woken when bytes can be handed on again."""
+        ...
+
+    def hang_up(self) -> None:
+        """The link goes away."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it."""
+        ...
+
+
+class PtyChannel:
+    """A pseudo-terminal; the emulator keeps its other side open, so that clients may come and go.
+
+    Args:
+        link: Where a symbolic link to it is made.
+
+    Raises:
+        RobotError: There are no pseudo-terminals here, or the link cannot be made.
+    """
+
+    def __init__(self, link: Path | None = None) -> None:
+        try:
+            import tty
+        except ImportError as error:
+            raise RobotError("There are no pseudo-terminals on this system; use --tcp PORT.") from error
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.name = os.ttyname(self._slave)
+        self._link: Path | None = None
+        if link is not None:
+            try:
+                self._make_link(link)
+            except RobotError:
+                self.close()
+                raise
+
+    def _make_link(self, link: Path) -> None:
+        if link.exists() and not link.is_symlink():
+            raise RobotError(f"{link} exists and is not a link; choose another --link, or remove it.")
+        beside = link.with_name(f".{link.name}.{os.getpid()}")
+        try:
+            beside.symlink_to(self.name)
+            beside.replace(link)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                beside.unlink()
+            raise RobotError(f"{link}: no link can be made ({error.strerror}).") from error
+        self._link = link
+
+    def watch(self, selector: selectors.BaseSelector) -> None:
+        """The master side brings bytes."""
+        selector.register(self._master, selectors.EVENT_READ, self)
+
+    def read(self, ready: object) -> bytes:
+        """What a client sent."""
+        try:
+            return os.read(self._master, PIECE)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno == errno.EIO:
+                return b""
+            raise
+
+    def write(self, data: bytes) -> int:
+        """How many bytes the terminal took; it holds a few thousand for a client who does not read."""
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            return 0
+
+    def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
+        """Whether to be woken when it takes more."""
+        selector.modify(self._master, selectors.EVENT_READ | (selectors.EVENT_WRITE if wanted else 0), self)
+
+    def hang_up(self) -> None:
+        """A pseudo-terminal goes silent; what was on its way is lost."""
+        with contextlib.suppress(OSError):
+            import termios
+
+            termios.tcflush(self._slave, termios.TCIOFLUSH)
+
+    def close(self) -> None:
+        """Remove the link if it is still ours, and close both sides."""
+        if self._link is not None:
+            with contextlib.suppress(OSError):
+                if str(self._link.readlink()) == self.name:
+                    self._link.unlink()
+            self._link = None
+        for side in (self._master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(side)
+
+
+class TcpChannel:
+    """A port on this machine, for one client at a time.
+
+    Args:
+        port: Its number; 0 for any that is free.
+
+    Raises:
+        RobotError: The port cannot be had.
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        self._listening = listen(port)
+        self.name = f"socket://{HOST}:{self._listening.getsockname()[1]}"
+        self._client: socket.socket | None = None
+        self._selector: selectors.BaseSelector | None = None
+
+    def watch(self, selector: selectors.BaseSelector) -> None:
+        """New clients may come."""
+        self._selector = selector
+        selector.register(self._listening, selectors.EVENT_READ, self)
+
+    def read(self, ready: object) -> bytes:
+        """What the client sent; a second client is turned away while there is one."""
+        if ready is self._listening:
+            self._accept()
+            return b""
+        client = self._client
+        if client is None:
+            return b""
+        try:
+            data = client.recv(PIECE)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self.hang_up()
+        return data
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            client, _ = self._listening.accept()
+            if self._client is not None:
+                client.close()
+                return
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._client = client
+            if self._selector is not None:
+                self._selector.register(client, selectors.EVENT_READ, self)
+
+    def write(self, data: bytes) -> int:
+        """How many bytes the client took; without one, all are lost."""
+        if self._client is None:
+            return len(data)
+        try:
+            return self._client.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            self.hang_up()
+            return len(data)
+
+    def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
+        """Whether to be woken when it takes more."""
+        if self._client is not None:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if wanted else 0)
+            selector.modify(self._client, events, self)
+
+    def hang_up(self) -> None:
+        """Let go of the client."""
+        if self._client is not None:
+            if self._selector is not None:
+                with contextlib.suppress(KeyError, ValueError):
+                    self._selector.unregister(self._client)
+            self._client.close()
+            self._client = None
+
+    def close(self) -> None:
+        """Let go of the client and the port."""
+        self.hang_up()
+        self._listening.close()
+
+
+def listen(port: int) -> socket.socket:
+    """A socket that listens on this machine only.
+
+    Raises:
+        RobotError: The port cannot be had.
+    """
+    listening = socket.socket()
+    try:
+        if os.name == "posix":
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((HOST, port))
+        listening.listen(4)
+        listening.setblocking(False)
+    except (OSError, OverflowError) as error:
+        listening.close()
+        raise RobotError(
+            f"Port {port} cannot be used on {HOST} ({error}). Choose another, or 0 for any that is free."
+        ) from error
+    return listening
+
+
+class WitnessDoor:
+    """Serves an emulator's witness as lines of JSON on a TCP port of this machine.
+
+    Args:
+        witness: Who answers.
+        port: Its number; 0 for any that is free.
+    """
+
+    def __init__(self, witness: DirectWitness, port: int = 0) -> None:
+        self._witness = witness
+        self._listening = listen(port)
+        self.address = f"{HOST}:{self._listening.getsockname()[1]}"
+        self._selector: selectors.BaseSelector | None = None
+        self._clients: dict[socket.socket, bytearray] = {}
+
+    def watch(self, selector: selectors.BaseSelector) -> None:
+        """New clients may come."""
+        self._selector = selector
+        selector.register(self._listening, selectors.EVENT_READ, self)
+
+    def serve(self, ready: object) -> None:
+        """Accept a client, or answer one."""
+        if ready is self._listening:
+            with contextlib.suppress(OSError):
+                client, _ = self._listening.accept()
+                client.settimeout(5.0)
+                self._clients[client] = bytearray()
+                if self._selector is not None:
+                    self._selector.register(client, selectors.EVENT_READ, self)
+        elif isinstance(ready, socket.socket):
+            try:
+                self._answer(ready)
+            except OSError:
+                self._forget(ready)
+
+    def _answer(self, client: socket.socket) -> None:
+        data = client.recv(PIECE)
+        held = self._clients[client]
+        held += data
+        if not data or len(held) > LONGEST_REQUEST:
+            self._forget(client)
+            return
+        while b"\n" in held:
+            line, _, rest = bytes(held).partition(b"\n")
+            held[:] = rest
+            client.sendall(answer_witness(self._witness, line))
+
+    def _forget(self, client: socket.socket) -> None:
+        if self._selector is not None:
+            with contextlib.suppress(KeyError, ValueError):
+                self._selector.unregister(client)
+        self._clients.pop(client, None)
+        client.close()
+
+    def close(self) -> None:
+        """Let go of everybody."""
+        for client in list(self._clients):
+            self._forget(client)
+        self._listening.close()
+
+
+class Server:
+    """Carries bytes between an emulator and a channel, in real time or a multiple of it.
+
+    Args:
+        emulator: The robot.
+        channel: Where clients connect.
+        speed: Seconds of the emulator in one of real time.
+        witness: The port on which its witness is served, 0 for any; None for not at all.
+        watch: Called about every `watch_s`, with the emulator.
+        watch_s: See there [s].
+
+    Attributes:
+        name: What a client opens.
+        witness: The witness, in this process.
+        witness_address: Where it is served, host:port.
+    """
+
+    def __init__(
+        self,
+        emulator: Emulator,
+        channel: Channel,
+        *,
+        speed: float = 1.0,
+        witness: int | None = None,
+        watch: Callable[[Emulator], None] | None = None,
+        watch_s: float = 0.125,
+    ) -> None:
+        self.emulator, self._channel, self._speed = emulator, channel, speed
+        self.name = channel.name
+        self._lock = RLock()
+        self.witness = DirectWitness(emulator, self._lock)
+        self._watch, self._watch_s, self._watched = watch, watch_s, 0.0
+        try:
+            self._door = None if witness is None else WitnessDoor(self.witness, witness)
+        except RobotError:
+            channel.close()
+            raise
+        self.witness_address = self._door.address if self._door else None
+        self._selector = selectors.DefaultSelector()
+        channel.watch(self._selector)
+        if self._door:
+            self._door.watch(self._selector)
+        self._wake_read, self._wake_write = socket.socketpair()
+        self._selector.register(self._wake_read, selectors.EVENT_READ, None)
+        self._waiting = b""
+        self._stopped = False
+        self._is_away = False
+        self._thread: Thread | None = None
+        self._begun = time.monotonic() - emulator.now / speed
+
+    def start(self) -> Server:
+        """Serve in a thread of its own until `close`."""
+        self._thread = Thread(target=self.run, daemon=True)
+        self._thread.start()
+        return self
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        while not self._stopped:
+            for key, _ in self._selector.select(self._pause()):
+                self._take(key.data, key.fileobj)
+            self._exchange()
+
+    def stop(self) -> None:
+        """Let `run` return; may be called from another thread or a signal handler."""
+        self._stopped = True
+        with contextlib.suppress(OSError):
+            self._wake_write.send(b"!")
+
+    def close(self) -> None:
+        """Stop, and let go of the channel."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join(5.0)
+        self._channel.close()
+        if self._door:
+            self._door.close()
+        self._selector.close()
+        self._wake_read.close()
+        self._wake_write.close()
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _pause(self) -> float | None:
+        """How long nothing needs to be done [s]; None while only a client can change anything."""
+        with self._lock:
+            due = self.emulator.next_event()
+            turning = self.emulator.table.motors.turning
+        times = []
+        if due is not None and not self._waiting:
+            times.append((due - self.emulator.now_ns) / SECOND / self._speed - self._behind())
+        if turning:
+            times.append(IDLE_S)
+        if self._watch:
+            times.append(self._watched + self._watch_s - time.monotonic())
+        if self.emulator.faults.hangup:
+            times.append(IDLE_S)
+        return max(0.0, min(times)) if times else None
+
+    def _behind(self) -> float:
+        """How far the emulator's time is behind [real s]."""
+        return time.monotonic() - self._begun - self.emulator.now / self._speed
+
+    def _take(self, who: object, ready: object) -> None:
+        if who is None:
+            with contextlib.suppress(OSError):
+                self._wake_read.recv(64)
+        elif who is self._door and self._door is not None:
+            with self._lock:
+                self._catch_up()
+            self._door.serve(ready)
+        else:
+            data = self._channel.read(ready)
+            if data:
+                with self._lock:
+                    self._catch_up()
+                    self.emulator.receive(data)
+
+    def _catch_up(self) -> None:
+        self.emulator.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
+
+    def _exchange(self) -> None:
+        """Let time pass, and hand on what has come out."""
+        with self._lock:
+            self._catch_up()
+            self._follow_link()
+            had = bool(self._waiting)
+            self._waiting = self._waiting or self.emulator.transmit()
+            if self._waiting:
+                self._waiting = self._waiting[self._channel.write(self._waiting) :]
+            if had or self._waiting:
+                self._channel.want_write(self._selector, wanted=bool(self._waiting))
+        if self._watch and time.monotonic() >= self._watched + self._watch_s:
+            self._watched = time.monotonic()
+            with self._lock:
+                self._watch(self.emulator)
+
+    def _follow_link(self) -> None:
+        """When the emulated link goes away, the client's does too."""
+        is_away = not self.emulator.is_connected
+        if is_away and not self._is_away:
+            self._waiting = b""
+            self._channel.hang_up()
+        self._is_away = is_away
+
+
+def serve_pty(
+    emulator: Emulator, link: Path | None = None, *, speed: float = 1.0, witness: int | None = None
+) -> Server:
+    """An emulator on a pseudo-terminal, served by a thread until the server is closed.
+
+    Args:
+        emulator: The robot.
+        link: Where a symbolic link to it is made.
+        speed: Seconds of the emulator in one of real time.
+        witness: The port on which its witness is served, 0 for any; None for not at all.
+    """
+    return Server(emulator, PtyChannel(link), speed=speed, witness=witness).start()
+
+
+def serve_tcp(emulator: Emulator, port: int = 0, *, speed: float = 1.0, witness: int | None = None) -> Server:
+    """An emulator on a TCP port of this machine, 0 for any, served by a thread until the server is closed."""
+    return Server(emulator, TcpChannel(port), speed=speed, witness=witness).start()

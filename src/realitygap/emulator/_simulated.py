@@ -1,0 +1,109 @@
+"""What stands behind the emulator: any simulated robot on two wheels, and the one there is."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from realitygap.world import Arena, Body, Pose
+
+from ._walls import Floats, Walls
+
+SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0.089, 0.0795)))
+"""The outline of the Scribbler, 178 x 159 mm; its origin is the pen, midway between the wheels."""
+
+
+class SimulatedRobot(Protocol):
+    """A robot on two wheels in a world of its own.
+
+    Attributes:
+        pose: Where it is: the point midway between its wheels, and where the Scribbler's end without the caster
+            looks.
+        stalled: Whether it was blocked when it last tried to move.
+    """
+
+    pose: Pose
+    stalled: bool
+
+    def place(self, pose: Pose) -> None:
+        """Put it somewhere else."""
+        ...
+
+    def advance(self, left: float, right: float, seconds: float) -> tuple[float, float]:
+        """Move on for a short time with the wheels at `left` and `right` [m/s].
+
+        Returns:
+            How far each wheel rolled [m]; nothing where it was blocked.
+        """
+        ...
+
+    def ranges(self, mounts: Floats, reach: float) -> Floats:
+        """Distances to the nearest obstacle [m], at most `reach`.
+
+        Args:
+            mounts: (r, 3) forward [m], left [m] of the origin and direction [rad, positive to the left].
+            reach: The largest distance that counts [m].
+        """
+        ...
+
+
+class BoxOnWheels:
+    """A box with two wheels between straight walls: a blocked robot stays where it is, as in Jyro.
+
+    Args:
+        arena: The walls, and the start.
+        spacing: Of its wheels [m].
+        body: Its outline.
+    """
+
+    def __init__(self, arena: Arena, spacing: float, body: Body = SCRIBBLER_BODY) -> None:
+        self.arena = arena
+        self.spacing = spacing
+        self.walls = Walls(arena.walls)
+        self._corners = np.array(body.corners)
+        self._radius = float(np.hypot(*self._corners.T).max())
+        self.place(arena.start)
+
+    def place(self, pose: Pose) -> None:
+        """Put it somewhere else."""
+        self.pose = Pose(*map(float, pose))
+        self.stalled = False
+        self._free = 0.0  # how far the origin can go before the outline may touch a wall [m]
+
+    def advance(self, left: float, right: float, seconds: float) -> tuple[float, float]:
+        """Move on along the circle that the wheels' speeds make."""
+        rolled_left, rolled_right = left * seconds, right * seconds
+        far = (rolled_left + rolled_right) / 2
+        turn = (rolled_right - rolled_left) / self.spacing
+        x, y, heading = self.pose
+        middle = heading + turn / 2
+        chord = far * (math.sin(turn / 2) / (turn / 2)) if abs(turn) > 1e-9 else far
+        pose = Pose(x + chord * math.cos(middle), y + chord * math.sin(middle), heading + turn)
+        if self._is_blocked(pose, abs(chord)):
+            self.stalled = True
+            return 0.0, 0.0
+        self.pose, self.stalled = pose, False
+        return rolled_left, rolled_right
+
+    def _is_blocked(self, pose: Pose, moved: float) -> bool:
+        """Whether the outline touches a wall at a pose this far on."""
+        self._free -= moved
+        if self._free > 0:
+            return False
+        self._free = self.walls.nearest(pose.x, pose.y) - self._radius
+        if self._free > 0:
+            return False
+        xs, ys = self._corners.T
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        return self.walls.touch(pose.x + cos * xs - sin * ys, pose.y + sin * xs + cos * ys)
+
+    def ranges(self, mounts: Floats, reach: float) -> Floats:
+        """Distances to the walls [m]."""
+        x, y, heading = self.pose
+        cos, sin = math.cos(heading), math.sin(heading)
+        forward, left = mounts[:, 0], mounts[:, 1]
+        return self.walls.ranges(
+            x + cos * forward - sin * left, y + sin * forward + cos * left, heading + mounts[:, 2], reach
+        )

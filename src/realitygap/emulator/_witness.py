@@ -1,0 +1,214 @@
+"""The operator's eyes and hands for an emulated robot."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Sequence
+from threading import RLock
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import RobotError
+from realitygap.kernels._coverage import to_grid
+from realitygap.world import Grid, Pose
+
+from ._emulator import Emulator
+
+
+class Witness(Protocol):
+    """Puts an emulated robot somewhere and sees where it drives.
+
+    Headings are those of the end that is ahead at present: the Fluke's with "Fluke ahead", else the Scribbler's.
+    """
+
+    def now(self) -> float:
+        """The emulator's time [s], in which `path` is told."""
+        ...
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put the robot somewhere, motors off; pen path and sensor noise begin anew."""
+        ...
+
+    def pose(self) -> Pose:
+        """Where it is."""
+        ...
+
+    def motors(self) -> tuple[float, float]:
+        """How fast its wheels turn, left and right [m/s]."""
+        ...
+
+    def path(self) -> NDArray[np.float64]:
+        """(t, 4) time [s], x [m], y [m] and heading [rad] of the pen since it was placed."""
+        ...
+
+    def cells(self) -> tuple[int, ...]:
+        """Cells of the arena's grid along the driven line, in order of first visits."""
+        ...
+
+    def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
+        """Cells of the grid that the pen was in at given times [s], in order of first visits."""
+        ...
+
+
+class DirectWitness:
+    """The witness of an emulator in the same process.
+
+    Args:
+        emulator: Whom to watch.
+        lock: Held while doing so.
+    """
+
+    def __init__(self, emulator: Emulator, lock: RLock | None = None) -> None:
+        self._emulator = emulator
+        self._lock = lock or RLock()
+
+    def now(self) -> float:
+        """The emulator's time [s]."""
+        return self._emulator.now
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put the robot somewhere, motors off."""
+        with self._lock:
+            self._emulator.place(Pose(*pose), seed)
+
+    def pose(self) -> Pose:
+        """Where it is."""
+        with self._lock:
+            return self._emulator.pose
+
+    def motors(self) -> tuple[float, float]:
+        """How fast its wheels turn [m/s]."""
+        with self._lock:
+            return self._emulator.wheel_speeds()
+
+    def path(self) -> NDArray[np.float64]:
+        """(t, 4) path of the pen."""
+        with self._lock:
+            return self._emulator.path()
+
+    def cells(self) -> tuple[int, ...]:
+        """Cells along the driven line."""
+        with self._lock:
+            return self._emulator.cells()
+
+    def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
+        """Cells at given times."""
+        return _cells_at(self.path(), self._emulator.scene.arena.grid, times)
+
+
+def _cells_at(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
+    found = np.searchsorted(path[:, 0], np.asarray(times, dtype=float) + 1e-9, side="right") - 1
+    cells: dict[int, None] = {}
+    for row in path[np.maximum(found, 0)]:
+        column, line = (int(to_grid(row[k], (grid.x, grid.y)[k - 1], grid.cell) // 1) for k in (1, 2))
+        if 0 <= column < grid.columns and 0 <= line < grid.rows:
+            cells[grid.columns * line + column] = None
+    return tuple(cells)
+
+
+def answer_witness(witness: Witness, line: bytes) -> bytes:
+    """The answer to one request over the wire, a line of JSON: {"do": "place", "pose": [x, y, heading], "seed": 1}."""
+    try:
+        request = json.loads(line)
+        result = _do(witness, request["do"], request)
+    except (ValueError, KeyError, TypeError) as error:
+        reply: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
+    else:
+        reply = {"result": result}
+    return json.dumps(reply).encode() + b"\n"
+
+
+def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
+    if what == "place":
+        return witness.place(Pose(*map(float, request["pose"])), int(request["seed"]))
+    if what == "cells_at":
+        return witness.cells_at([float(time) for time in request["times"]])
+    if what == "path":
+        return witness.path().tolist()
+    if what in ("now", "pose", "motors", "cells"):
+        return getattr(witness, what)()
+    raise ValueError(f"cannot do {what!r}")
+
+
+class RemoteWitness:
+    """The witness of an emulator in another process, over TCP.
+
+    Args:
+        address: Host and port, as in 127.0.0.1:7002.
+        timeout_s: How long to wait for an answer.
+
+    Raises:
+        RobotError: Nobody answers there.
+    """
+
+    def __init__(self, address: str, timeout_s: float = 5.0) -> None:
+        self._address = address
+        host, _, port = address.rpartition(":")
+        try:
+            self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)
+        except (OSError, ValueError) as error:
+            raise RobotError(
+                f"No witness at {address} ({error}). Start the emulator with --witness PORT and give 127.0.0.1:PORT."
+            ) from error
+        self._file = self._socket.makefile("rb")
+
+    def _ask(self, what: str, **values: Any) -> Any:
+        try:
+            self._socket.sendall(json.dumps({"do": what, **values}).encode() + b"\n")
+            line = self._file.readline()
+        except OSError as error:
+            raise RobotError(f"The witness at {self._address} does not answer ({error}).") from error
+        if not line:
+            raise RobotError(f"The witness at {self._address} has gone; is the emulator still running?")
+        reply = json.loads(line)
+        if "error" in reply:
+            raise RobotError(f"The witness at {self._address} says: {reply['error']}")
+        return reply["result"]
+
+    def now(self) -> float:
+        """The emulator's time [s]."""
+        return float(self._ask("now"))
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put the robot somewhere, motors off."""
+        self._ask("place", pose=list(pose), seed=seed)
+
+    def pose(self) -> Pose:
+        """Where it is."""
+        return Pose(*self._ask("pose"))
+
+    def motors(self) -> tuple[float, float]:
+        """How fast its wheels turn [m/s]."""
+        left, right = self._ask("motors")
+        return left, right
+
+    def path(self) -> NDArray[np.float64]:
+        """(t, 4) path of the pen."""
+        return np.array(self._ask("path"), dtype=float).reshape(-1, 4)
+
+    def cells(self) -> tuple[int, ...]:
+        """Cells along the driven line."""
+        return tuple(self._ask("cells"))
+
+    def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
+        """Cells at given times."""
+        return tuple(self._ask("cells_at", times=list(times)))
+
+    def close(self) -> None:
+        """Let go of the connection."""
+        self._file.close()
+        self._socket.close()
+
+    def __enter__(self) -> RemoteWitness:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def connect_witness(address: str) -> RemoteWitness:
+    """The witness that `realitygap emulate --witness PORT` serves, by 127.0.0.1:PORT."""
+    return RemoteWitness(address)

@@ -173,7 +173,7 @@ def _on_the_robots_clock() -> Iterator[None]:
         else:
             sleep(seconds)
 
-    time.sleep = on_clock
+    time.sleep = on_clock  # type: ignore[assignment]  # takes what sleep takes
     time.time = lambda: myro.currentTime() if _is_untimed() else now()
     try:
         yield

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ._base import Base
@@ -9,7 +11,7 @@ from ._colors import rgb2yuv
 from ._mistakes import choice, is_on, whole
 from ._pictures import Picture
 
-_KINDS = {
+_KINDS: dict[str, Any] = {
     "color": "color",
     "jpeg": "jpeg", "jpeg-fast": "jpeg-fast",
     "gray": "gray", "grey": "gray", "grayjpeg": "grayjpeg", "greyjpeg": "grayjpeg",
@@ -31,7 +33,10 @@ class Camera(Base):
                 "blob": white where the color is that of `configureBlob`.
         """
         kind = choice("takePicture: the mode", mode or "jpeg", _KINDS)
-        return Picture.from_array(self.driver.picture(kind))
+        picture = Picture.from_array(self.driver.picture(kind))
+        if (picture.width, picture.height) != self.driver.picture_size:
+            picture.resize(*self.driver.picture_size)  # a raw gray one has half the pixels of an even width
+        return picture
 
     def setPicSize(self, value: str) -> None:
         """Set the size of a Fluke 2's pictures: "small" (427 x 266) or "large" (1280 x 800)."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from ._base import Base
 from ._mistakes import MyroError, choice, number, whole
 
-_FORWARDNESS = {
+_FORWARDNESS: dict[Any, Literal["fluke", "scribbler"]] = {
     "fluke-forward": "fluke", 1: "fluke",
     "scribbler-forward": "scribbler", 0: "scribbler",
 }  # fmt: skip

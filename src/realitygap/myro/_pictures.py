@@ -233,7 +233,8 @@ def makePicture(*args: Any) -> Picture:
 
     `makePicture()`, `makePicture("photo.jpg")`, `makePicture(width, height)` (white),
     `makePicture(width, height, color)`, `makePicture(width, height, gray)`, `makePicture(width, height, data)`
-    and `makePicture(width, height, data, mode)` with the bytes of all pixels, row by row, in mode "color" (3 a pixel) or "gray" (1 a pixel).
+    and `makePicture(width, height, data, mode)` with the bytes of all pixels, row by row, in mode "color"
+    (3 a pixel) or "gray" (1 a pixel).
 
     Raises:
         MyroError: None of these was meant.

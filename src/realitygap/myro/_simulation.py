@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
+from realitygap.errors import RobotError
 from realitygap.robots.scribbler import Scribbler as Driver
 from realitygap.world import NAMED_STARTS, Arena, Pose, is_inside
 
@@ -67,7 +69,7 @@ class Simulation:
         arena: str = "paper",
         view: Any = None,
     ) -> None:
-        from realitygap.emulator import open_emulator
+        import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
 
         self.seed = whole('initialize("sim"): the seed', _plain(seed), 0, 2**31 - 1)
         choice('initialize("sim"): the model', model, {"s1": "s1", "s2": "s2"})
@@ -83,10 +85,9 @@ class Simulation:
                 "speed": "off" if self.speed is None else f"{self.speed:g}",
             }
         )
-        self._port = open_emulator(f"emulator://{model}?{query}")
-        self.arena: Arena = self._port.arena
-        self.witness = self._port.witness
-        self.driver = Driver(self._port)
+        self.driver = _opened(f"emulator://{model}?{query}")
+        self.witness = self.driver.port.witness
+        self.arena: Arena = self.driver.port.emulator.scene.arena
         self.witness.place(self._start(_plain(start)), self.seed)
         self._view: View | None = best_view(self, view)
 
@@ -119,6 +120,10 @@ class Simulation:
         if self._view is not None:
             self._view.look()
 
+    def catch_up(self) -> None:
+        """Let a robot that moves in real time move on to where it is now."""
+        self.driver.clock.now()
+
     def close(self) -> None:
         """Show the robot once more and stop showing it."""
         if self._view is not None:
@@ -132,8 +137,8 @@ class Simulation:
             return _random_pose(self.arena, self.seed)
         if isinstance(start, str) and "," not in start:
             return choice('initialize("sim"): the start', start, {**NAMED_STARTS, "random": self.arena.start})
-        parts = start.split(",") if isinstance(start, str) else list(start)
-        if len(parts) != 3:
+        parts = start.split(",") if isinstance(start, str) else start
+        if not isinstance(parts, Sequence) or len(parts) != 3:
             raise MyroError(
                 f'initialize("sim"): the start is {start!r}, expected three numbers: x and y [m], heading [degrees].'
             )
@@ -141,6 +146,13 @@ class Simulation:
         if not is_inside(self.arena, x, y):
             raise MyroError(f'initialize("sim"): the start ({x:g}, {y:g}) is not inside the arena.')
         return Pose(x, y, math.radians(heading))
+
+
+def _opened(url: str) -> Driver:
+    try:
+        return Driver(url)
+    except RobotError as error:
+        raise MyroError(f'initialize("sim"): {error}') from error
 
 
 def _plain(value: Any) -> Any:

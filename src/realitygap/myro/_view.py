@@ -103,6 +103,7 @@ class NotebookView:
     def _draw(self) -> None:
         with self._lock:
             self._last = time.monotonic()
+            self._simulation.catch_up()
             self._screen(to_svg(self._simulation))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from types import TracebackType
 from typing import Any, Self
 
@@ -41,7 +42,8 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
     def __init__(self, port: str | int | None = None, **options: Any) -> None:
         before = _current.robot_or_none()
         if before is not None:
-            before.close()
+            with contextlib.suppress(RobotError):  # a robot that is gone shall not keep the next one away
+                before.close()
         self._port, self._options = port, options
         self.openConnection()
         _current.use(self)
@@ -73,9 +75,11 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
     def close(self) -> None:
         """As `closeConnection`; Myro's functions then have no robot until `initialize`."""
-        self.closeConnection()
-        if _current.robot_or_none() is self:
-            _current.use(None)
+        try:
+            self.closeConnection()
+        finally:
+            if _current.robot_or_none() is self:
+                _current.use(None)
 
     def __enter__(self) -> Self:
         return self

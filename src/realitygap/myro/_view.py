@@ -120,9 +120,9 @@ def _screen(svg: str) -> Any:
 
     class RobotView(anywidget.AnyWidget):  # type: ignore[misc]  # anywidget comes with the extra 'notebook'
         _esm = _WIDGET
-        svg = traitlets.Unicode(svg).tag(sync=True)
+        svg = traitlets.Unicode().tag(sync=True)
 
-    widget = RobotView()
+    widget = RobotView(svg=svg)
     display(widget)
     return lambda picture: widget.set_trait("svg", picture)
 

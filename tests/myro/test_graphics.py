@@ -57,6 +57,16 @@ def test_every_shape_is_drawn_moved_colored_and_taken_out():
     assert (drawn[4].getP1().x, drawn[4].getP2().y, drawn[4].getRadius()) == (46, 56, 5)
 
 
+def test_a_line_has_arrows_at_the_ends_that_were_asked_for():
+    line = Line(Point(0, 0), Point(50, 0))
+    line.draw(GraphWin("Arrows"))
+    for option, tips in (("none", 0), ("first", 1), ("last", 1), ("both", 2)):
+        line.setArrow(option)
+        assert line.window.to_svg().count("<polygon") == tips
+    line.setArrow("last")
+    assert 'points="50,0 ' in line.window.to_svg()
+
+
 def test_a_clone_is_not_drawn_and_moves_by_itself():
     window = GraphWin("Clones")
     line = Line(Point(0, 0), Point(1, 1))

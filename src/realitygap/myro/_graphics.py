@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import html
+import math
 from base64 import b64encode
 from collections.abc import Sequence
 from typing import Any, Self
@@ -260,7 +261,7 @@ class Line(GraphicsObject):
         super().__init__(p1, p2)
 
     def setArrow(self, option: str) -> None:
-        """Put a dot on its "first" or "last" end, on "both" or on "none". Differs: Myro puts an arrow there."""
+        """Put an arrow on its "first" or "last" end, on "both" or on "none"."""
         if option not in ("first", "last", "both", "none"):
             raise MyroError(
                 f"setArrow: the option is {option!r}, expected 'first', 'last', 'both' or 'none'."
@@ -272,10 +273,8 @@ class Line(GraphicsObject):
         ends = self._on(window)
         (x1, y1), (x2, y2) = ends
         color = self._fill or self.outline
-        dots = {"none": [], "first": ends[:1], "last": ends[1:], "both": ends}[self.arrow]
-        tips = "".join(
-            f'<circle cx="{x:g}" cy="{y:g}" r="{2 + self.line_width:g}" fill="{color}"/>' for x, y in dots
-        )
+        away = {"none": [], "first": [ends[::-1]], "last": [ends], "both": [ends, ends[::-1]]}[self.arrow]
+        tips = "".join(_tip(tail, head, 6 + 2 * self.line_width, color) for tail, head in away)
         return (
             f'<line x1="{x1:g}" y1="{y1:g}" x2="{x2:g}" y2="{y2:g}" stroke="{color}" '
             f'stroke-width="{self.line_width:g}"/>{tips}'
@@ -418,6 +417,17 @@ class Image(GraphicsObject):
             f'<image x="{x - width / 2:g}" y="{y - height / 2:g}" width="{width}" height="{height}" '
             f'href="data:image/png;base64,{source}"/>'
         )
+
+
+def _tip(tail: tuple[float, float], head: tuple[float, float], size: float, color: str) -> str:
+    """The tip of an arrow from tail to head."""
+    length = math.dist(tail, head) or 1.0
+    along = ((head[0] - tail[0]) / length * size, (head[1] - tail[1]) / length * size)
+    wings = [
+        (head[0] - along[0] - side * along[1], head[1] - along[1] + side * along[0]) for side in (0.4, -0.4)
+    ]
+    corners = " ".join(f"{x:g},{y:g}" for x, y in (head, *wings))
+    return f'<polygon points="{corners}" fill="{color}"/>'
 
 
 def _color(color: Any) -> str:

@@ -331,7 +331,7 @@ def _as_picture(item: Picture | str) -> Picture:
 
 def _flat(image: Image.Image, filename: str) -> Image.Image:
     """Without alpha where the kind of file has none, or nothing is see-through: a GIF's colors then stay exact."""
-    is_opaque = image.getextrema()[3] == (255, 255)
+    is_opaque = image.getchannel("A").getextrema() == (255, 255)
     return (
         image.convert("RGB") if is_opaque or filename.lower().endswith((".jpg", ".jpeg", ".bmp")) else image
     )

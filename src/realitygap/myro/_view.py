@@ -78,6 +78,7 @@ class NotebookView:
         self._simulation = simulation
         self._screen = _screen(to_svg(simulation))
         self._last = time.monotonic()
+        self._pose = simulation.pose()
         self._ended = threading.Event()
         self._lock = threading.Lock()
         if simulation.is_timed:
@@ -101,10 +102,14 @@ class NotebookView:
                 return
 
     def _draw(self) -> None:
+        """Show it, unless it stands where it was shown last."""
         with self._lock:
             self._last = time.monotonic()
             self._simulation.catch_up()
-            self._screen(to_svg(self._simulation))
+            pose = self._simulation.pose()
+            if pose != self._pose:
+                self._pose = pose
+                self._screen(to_svg(self._simulation))
 
 
 def _screen(svg: str) -> Any:

@@ -21,6 +21,8 @@ _OURS = str(Path(__file__).resolve().parents[1])
 class MyroError(RealityGapError):
     """A mistake in a program that uses Myro's functions; its text says what to do instead."""
 
+    __module__ = "realitygap.myro"  # where people find it
+
 
 def number(name: str, value: object, least: float | None = None, most: float | None = None) -> float:
     """A number that a learner gave, checked.

@@ -61,7 +61,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
     pages["parts/myro.md"] = myro_functions()
-    pages |= {f"commands/{name}.md": page for name, page in command_pages().items()}
+    pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -255,8 +255,12 @@ def derived_columns() -> str:
 
 
 def commands() -> dict[str, Any]:
-    """Every command of the command line by name."""
-    return dict(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+    """Every command of the command line by name, those of a group with the group's before it."""
+    found: dict[str, Any] = {}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        members = getattr(command, "commands", None)
+        found |= {name: command} if members is None else {f"{name} {each}": members[each] for each in members}
+    return found
 
 
 def command_pages() -> dict[str, str]:

@@ -90,7 +90,10 @@ def test_named_sets_stand_side_by_side_with_every_setting():
 
 def test_every_command_has_a_page_with_every_option_an_example_and_its_python_twin():
     pages = reference_pages.command_pages()
-    assert sorted(pages) == sorted(command.name for command in app.registered_commands)
+    names = [command.name for command in app.registered_commands]
+    for group in app.registered_groups:
+        names += [f"{group.name} {command.name}" for command in group.typer_instance.registered_commands]
+    assert sorted(pages) == sorted(names)
     for name, command in reference_pages.commands().items():
         page = pages[name]
         for parameter in command.params:

@@ -147,10 +147,10 @@ def test_a_picture_that_is_none_is_asked_again_and_then_one_clear_error():
     port = Port([*greeting(INFOS["s2+fluke1"]), *PREPARE_1])
     robot = Scribbler(port)
     with pytest.raises(
-        ProtocolError, match=r"picture cannot be read .*'picture' on /dev/test \(sent 3 times; motors"
+        ProtocolError, match=r"picture cannot be read .*'picture' on /dev/test \(sent 5 times; motors"
     ):
         robot.picture("gray")
-    assert port.writes.count(bytes([136, 1])) == 3
+    assert port.writes.count(bytes([136, 1])) == 5
 
 
 def test_an_unknown_kind_and_a_missing_camera_are_said():

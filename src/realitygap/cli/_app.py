@@ -10,8 +10,10 @@ from realitygap._version import __version__
 
 from ._audit import audit_results
 from ._bench import bench
+from ._emulate import emulate
 from ._export import export
 from ._results import digest, report
+from ._robot import robot
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
@@ -52,4 +54,6 @@ app.command("export")(export)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("simulate")(simulate)
+app.command("emulate")(emulate)
 app.command("bench")(bench)
+app.add_typer(robot, name="robot")

@@ -174,8 +174,10 @@ class Camera:
         return _jpeg(blank, blank if in_color else None, blank)[0]
 
     def jpeg_scan(self, *, in_color: bool, careful: bool) -> bytes:
-        """The compressed data and the end mark; a Fluke 1 votes over several pictures when it is to be careful,
-        which makes no difference here: the tables are those of the header either way."""
+        """The compressed data and the end mark.
+
+        To be careful makes no difference here: the tables are those of the header either way.
+        """
         picture = self.raw()
         if self._model == "1":
             y, u, v = picture[:, 1::2], np.repeat(picture[:, 2::4], 2, 1), np.repeat(picture[:, 0::4], 2, 1)
@@ -188,8 +190,8 @@ class Camera:
     def _take(self) -> Bytes:
         width, height = self._size
         columns = (width + 3) // 4 * 4
-        image = _draw(self._robot, self._scene, self._walls, columns // 2, height)
-        image = self._exposed(image)
+        drawn = _draw(self._robot, self._scene, self._walls, columns // 2, height)
+        image = self._exposed(drawn)
         picture = np.empty((height, columns), dtype=np.uint8)
         picture[:, 1::2] = image[..., 0]
         picture[:, 2::4] = image[:, ::2, 1]

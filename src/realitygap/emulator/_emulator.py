@@ -99,7 +99,7 @@ class Emulator:
         self.senses = Senses(body, self.scene, seed)
         to_client = self._from_robot if self.fluke_model == "none" else self._through_fluke
         self.robot = Scribbler(
-            self.model,  # type: ignore[arg-type]  # checked
+            self.model,
             self.table,
             self.senses,
             self.memory,
@@ -111,7 +111,7 @@ class Emulator:
         if self.fluke_model != "none":
             camera = Camera(body, self.scene, self.fluke_model)
             self.fluke = Fluke(
-                self.fluke_model,  # type: ignore[arg-type]  # checked
+                self.fluke_model,
                 *(
                     self.robot,
                     self.table,

@@ -329,7 +329,8 @@ class Fluke:
         return b""
 
     def _set_serial_memory(self, given: bytes, now: int) -> bytes:
-        self._memory.write_page(*_words(given[:4]), given[4])
+        page, offset = _words(given[:4])
+        self._memory.write_page(page, offset, given[4])
         return b""
 
     def _erase(self, given: bytes, now: int) -> bytes:
@@ -383,14 +384,14 @@ class Fluke:
             Op.SET_WINDOW: self._set_window,
             Op.GET_WINDOW: lambda given, _: camera.window(given[0]).tobytes(),
             Op.GET_WINDOW_LIGHT: lambda given, _: camera.window_sum(given[0]).to_bytes(3, "big"),
-            Op.SET_RLE: lambda given, _: self._done(camera.set_colors(given[1], given[2:])),
+            Op.SET_RLE: self._set_colors,
             Op.GET_RLE: self._get_runs,
             Op.GET_BLOB: lambda _, __: self._blob(None),
             Op.GET_BLOB_WINDOW: lambda given, _: self._blob(given[0]),
-            Op.WHITE_BALANCE_ON: lambda _, __: self._done(camera.set_register(0x12, 0x14)),
-            Op.WHITE_BALANCE_OFF: lambda _, __: self._done(camera.set_register(0x12, 0x10)),
+            Op.WHITE_BALANCE_ON: lambda _, __: self._set_register(bytes((0x12, 0x14))),
+            Op.WHITE_BALANCE_OFF: lambda _, __: self._set_register(bytes((0x12, 0x10))),
             Op.GET_CAMERA_PARAMETER: lambda given, _: bytes((camera.register(given[0]),)),
-            Op.SET_CAMERA_PARAMETER: lambda given, _: self._done(camera.set_register(given[0], given[1])),
+            Op.SET_CAMERA_PARAMETER: lambda given, _: self._set_register(given),
             Op.GET_JPEG_GRAY_HEADER: lambda _, __: _with_length(camera.jpeg_header(in_color=False)),
             Op.GET_JPEG_COLOR_HEADER: lambda _, __: _with_length(camera.jpeg_header(in_color=True)),
             Op.GET_JPEG_GRAY_SCAN: lambda given, now: self._scan(given, now, in_color=False),
@@ -400,7 +401,12 @@ class Fluke:
             acts[Op.SET_PICTURE_SIZE] = self._set_size
         return acts
 
-    def _done(self, _: None) -> bytes:
+    def _set_register(self, given: bytes) -> bytes:
+        self._camera.set_register(given[0], given[1])
+        return b""
+
+    def _set_colors(self, given: bytes, now: int) -> bytes:
+        self._camera.set_colors(given[1], given[2:])
         return b""
 
     def _set_window(self, given: bytes, now: int) -> bytes:

@@ -139,7 +139,13 @@ class S2Motors:
         self._strained = 0
         self._recent: deque[tuple[int, float, float]] = deque()
         self._idler_ns = 0
-        self.stop()
+        self._shares = (0.0, 0.0)
+        self._step = self._target = self._phase = 0
+        self._left: float | None = (
+            None  # what the faster wheel of a motion by distance has still to drive [counts]
+        )
+        self._rolls_on = False
+        self._next: Segment | None = None
 
     def drive(self, right: int, left: int) -> None:
         """Take the two bytes of SET_MOTORS; those above 200 reach the path speed of 15."""
@@ -165,11 +171,7 @@ class S2Motors:
         """Stop at once and forget what was to come."""
         self._shares = (0.0, 0.0)
         self._target = self._step = self._phase = 0
-        self._left: float | None = (
-            None  # what the faster wheel has still to drive [counts], of a motion by distance
-        )
-        self._rolls_on = False
-        self._next: Segment | None = None
+        self._left, self._rolls_on, self._next = None, False, None
 
     def post(self, segment: Segment) -> bool:
         """Whether a motion was accepted: at most one waits while another is under way."""

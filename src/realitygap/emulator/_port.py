@@ -64,6 +64,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._speed: float | None = 1.0
         self._begun = 0.0
         self.clock = EmulatorClock(self)
+        self.is_open = False
         super().__init__(*args, **kwargs)
 
     # -- opening --

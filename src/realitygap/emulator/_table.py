@@ -7,7 +7,6 @@ from array import array
 
 import numpy as np
 
-from realitygap.kernels._coverage import to_grid, visit, visit_line
 from realitygap.world import Arena, Grid, Pose
 
 from ._motors import STEP_NS, STEP_S, Motors
@@ -70,7 +69,7 @@ class Table:
         self.motors.rolled(self.time, *rolled)
         self.wheels = (rolled[0] / STEP_S, rolled[1] / STEP_S)
         if rolled[0] or rolled[1]:
-            self._draw()
+            self._note()
 
     @property
     def stalled(self) -> bool:
@@ -78,49 +77,61 @@ class Table:
         return self.motors.turning and self.robot.stalled
 
     def _begin_path(self) -> None:
-        grid = self.arena.grid
-        self.points = array("d")
-        self._visited = np.zeros(grid.n_cells, dtype=np.bool_)
-        self._order = np.zeros(grid.n_cells, dtype=np.int64)
-        self._at = self._in_grid()
-        self._n_visited = int(
-            visit(
-                math.floor(self._at[0]),
-                math.floor(self._at[1]),
-                grid.columns,
-                grid.rows,
-                self._visited,
-                self._order,
-                0,
-            )
-        )
-        self._note()
-
-    def _in_grid(self) -> tuple[float, float]:
-        grid: Grid = self.arena.grid
-        x, y, _ = self.robot.pose
-        return to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell)
-
-    def _draw(self) -> None:
-        """The pen follows; only a line into another cell needs to be looked at."""
-        grid = self.arena.grid
-        before, self._at = self._at, self._in_grid()
-        if (math.floor(before[0]), math.floor(before[1])) != (
-            math.floor(self._at[0]),
-            math.floor(self._at[1]),
-        ):
-            self._n_visited = int(
-                visit_line(
-                    *before, *self._at, grid.columns, grid.rows, self._visited, self._order, self._n_visited
-                )
-            )
+        self.points = array("d")  # time [s], x, y [m], heading [rad] of each point
+        self._n_followed = 0  # points whose cells have been noted
+        self._cells: CellsOnLine | None = None
         self._note()
 
     def _note(self) -> None:
         self.points.extend((self.time / SECOND, *self.robot.pose))
         if len(self.points) > 4 * MOST_POINTS:
-            del self.points[: len(self.points) // 16 * 4]
+            self.cells()
+            gone = len(self.points) // 16
+            del self.points[: 4 * gone]
+            self._n_followed -= gone
 
     def cells(self) -> tuple[int, ...]:
         """The cells of the grid along the line since the robot was placed, in order of first visits."""
-        return tuple(self._order[: self._n_visited].tolist())
+        self._cells = self._cells or CellsOnLine(self.arena.grid)
+        self._cells.follow(self.points[4 * self._n_followed :])
+        self._n_followed = len(self.points) // 4
+        return self._cells.visited
+
+
+class CellsOnLine:
+    """The cells that a line visits, which comes piece by piece.
+
+    Args:
+        grid: Of cells.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self._grid = grid
+        self._found = np.zeros(grid.n_cells, dtype=np.bool_)
+        self._order = np.zeros(grid.n_cells, dtype=np.int64)
+        self._n = 0
+        self._at: tuple[float, float] | None = None
+
+    def follow(self, points: array[float]) -> None:
+        """Go on along points of time, x, y and heading each."""
+        from realitygap.kernels._coverage import (
+            to_grid,
+            visit,
+            visit_line,
+        )  # compiled code takes a while to import
+
+        grid = self._grid
+        size = (grid.columns, grid.rows)
+        for k in range(0, len(points), 4):
+            at = to_grid(points[k + 1], grid.x, grid.cell), to_grid(points[k + 2], grid.y, grid.cell)
+            cell = (math.floor(at[0]), math.floor(at[1]))
+            if self._at is None:
+                self._n = int(visit(*cell, *size, self._found, self._order, self._n))
+            elif cell != (math.floor(self._at[0]), math.floor(self._at[1])):
+                self._n = int(visit_line(*self._at, *at, *size, self._found, self._order, self._n))
+            self._at = at
+
+    @property
+    def visited(self) -> tuple[int, ...]:
+        """In order of first visits."""
+        return tuple(self._order[: self._n].tolist())

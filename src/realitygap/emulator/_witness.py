@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.kernels._coverage import to_grid
 from realitygap.world import Grid, Pose
 
 from ._emulator import Emulator
@@ -100,6 +99,8 @@ class DirectWitness:
 
 
 def _cells_at(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
+    from realitygap.kernels._coverage import to_grid  # compiled code takes a while to import
+
     found = np.searchsorted(path[:, 0], np.asarray(times, dtype=float) + 1e-9, side="right") - 1
     cells: dict[int, None] = {}
     for row in path[np.maximum(found, 0)]:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ._compile import inlined, kernel
 from ._lanes import LANES, Lanes, Line, Poses, make_lanes
 from ._marks import count_cells, list_fresh
-from ._trial import arrive, largest_noisy_readings, move, start_lanes
+from ._trial import _larger_noisy as larger_noisy
+from ._trial import arrive, draw_lanes, largest_noisy_readings, move, start_lanes
 
 
 class Fleet(NamedTuple):
@@ -161,6 +162,29 @@ def observe_robots(rules, fleet, key, step, observations):
             observations[block * LANES + lane, 0] = seen[lane]
             observations[block * LANES + lane, 1] = lanes.stalled[lane]
             observations[block * LANES + lane, 2] = seen.dtype.type(step) / seen.dtype.type(rules.n_steps)
+
+
+@kernel
+def read_robots(rules, fleet, key, step, readings):
+    """What each sensor of all robots reads before a step; the largest of a robot is what `observe_robots` sees.
+
+    Args:
+        rules, fleet: How, and who.
+        key: Of the random numbers.
+        step: Number of the step, from 0.
+        readings: (n, s) written: 0 (nothing within range) to 1 (touching), and noise.
+    """
+    n, n_sensors = readings.shape
+    words_a_step = (n_sensors + 3) >> 2
+    for block in range(fleet.stalled.shape[0]):
+        lanes = _lanes_of(fleet, block)
+        one = lanes.total
+        for sensor in range(n_sensors):
+            draw_lanes(step * words_a_step + (sensor >> 2), lanes.counters, key, lanes.words)
+            one[:] = -np.inf
+            larger_noisy(lanes.fractions[sensor], lanes.words[sensor & 3], lanes.noise, rules.clip, one)
+            for lane in range(min(LANES, n - block * LANES)):
+                readings[block * LANES + lane, sensor] = one[lane]
 
 
 @kernel

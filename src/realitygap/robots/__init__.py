@@ -3,6 +3,9 @@
 from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
+from ._recorded_robot import RecordedRobot
+from ._recording import Recorder, Recording, read_recording
+from ._recording_mcap import export_mcap
 
 __all__ = [
     "STEP_S",
@@ -11,7 +14,12 @@ __all__ = [
     "JyroPlatform",
     "Label",
     "Observation",
+    "RecordedRobot",
+    "Recorder",
+    "Recording",
     "Robot",
     "SystemClock",
     "check_command",
+    "export_mcap",
+    "read_recording",
 ]

@@ -11,10 +11,12 @@ from ._jyro import (
     trace_genome,
     try_genomes,
 )
+from ._jyro_robot import JyroRobot
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 
 __all__ = [
+    "JyroRobot",
     "NoiseKey",
     "SceneTrack",
     "Trajectory",

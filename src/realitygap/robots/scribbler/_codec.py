@@ -324,6 +324,17 @@ def info_line(answer: bytes) -> InfoLine:
     return InfoLine(model, fluke, values.get("robot-version", values.get("api", "")), fluke_version)
 
 
+_PLAIN_INFO = re.compile(
+    rb"[Pp \0]*((fluke|dongle):[\d.]+(, ?|\n$))?((robot-version|api):[\d.]+,robot:scribbler[23]?,mode:serial\n)?$",
+    re.IGNORECASE,
+)
+
+
+def is_plain_info(answer: bytes) -> bool:
+    """Whether an info line is letter by letter as the firmware known to us writes it."""
+    return _PLAIN_INFO.match(answer) is not None
+
+
 def fluke_arguments(op: Op, fluke: str) -> int:
     """How many bytes follow an opcode on this Fluke."""
     return (FLUKE_2_COMMANDS if fluke == "2" else FLUKE_COMMANDS)[op].arguments

@@ -32,8 +32,8 @@ QUIET_S = 0.5
 """Silence after which nothing more is on its way [s]. Source: Myro's manual_flush."""
 FORGET_S = 1.2
 """Silence after which a robot has thrown half a packet away [s]: its firmware does after 1 s."""
-CHATTER_S = 10.0
-"""A port that is not silent for so long does not belong to a robot that waits for commands [s]."""
+CHATTER_S = 4.0
+"""A port that is not silent for so long belongs to a robot that calls out its name, or to something else [s]."""
 CHATTER_BYTES = 1 << 20
 """Likewise for so many bytes, however fast they come."""
 PROBE_S = 0.3
@@ -42,8 +42,8 @@ MAX_PROBES = 12
 """More than the bytes that any of the Fluke's counters can still wait for."""
 WRITE_S = 2.0
 """How long a port may refuse to take a command [s]."""
-ATTEMPTS = 3
-"""How often a command that is safe to repeat is sent."""
+ATTEMPTS = 5
+"""How often a command that is safe to repeat is sent: enough where half a percent of all bytes are lost."""
 RECOVERIES = 3
 """How often the same step is sought after one fault."""
 REOPENINGS = 8
@@ -426,24 +426,36 @@ class Link:
         if fault is None:  # a signal came in between: what was sent was whole, and stopping is urgent
             self.port.write(codec.STOP.data)
         understood = fault is None or fault.understood
-        self._await_silence(QUIET_S if understood else FORGET_S)
+        silence_s = QUIET_S if understood else FORGET_S
+        if not self._await_silence(silence_s):
+            self.port.write(codec.ECHO_OFF.data)  # a robot calls out its name until its first command
+            if not self._await_silence(silence_s):
+                raise _Fault("The port is never silent, as no Scribbler would be", ProtocolError)
         if self.fluke != "none" and not understood:
             self._release_counter(MAX_PROBES)
         if not self.has_robot:
             self._exchange(codec.VERSION, codec.nothing)
             return
+        try:
+            self._exchange(codec.STOP, codec.sensor_block)
+        except _Fault as disturbed:
+            if disturbed.kind is not ProtocolError:
+                raise
         self._exchange(codec.ECHO_OFF, codec.sensor_block)
-        self._exchange(codec.STOP, codec.sensor_block)
+        if not self.motors_off:
+            self._exchange(codec.STOP, codec.sensor_block)
 
-    def _await_silence(self, seconds: float) -> None:
-        """Read and discard until nothing has come for so long [s]."""
+    def _await_silence(self, seconds: float) -> bool:
+        """Read and discard until nothing has come for so long [s]; False if that does not happen."""
         since, n_bytes = self.clock.now(), 0
         self.port.timeout = seconds
         try:
             while self.port.read(1):
+                self.faults.strays += 1
                 n_bytes += 1 + self._discard()
                 if n_bytes > CHATTER_BYTES or self.clock.now() - since > CHATTER_S:
-                    raise _Fault("The port is never silent, as no Scribbler would be", ProtocolError)
+                    return False
+            return True
         finally:
             self.port.timeout = GAP_S
 
@@ -514,7 +526,8 @@ class Link:
             return info
 
     def _ask_who(self) -> codec.InfoLine:
-        since = self.clock.now()
+        """Who answers; a line that is not letter by letter as we know it has to come twice."""
+        since, seen = self.clock.now(), None
         for greeting in range(GREETINGS):
             try:
                 try:
@@ -522,9 +535,16 @@ class Link:
                         self._await_silence(FORGET_S)
                         self._release_counter(STRANGER_PROBES)
                         self._await_silence(FORGET_S)
-                    return self._exchange(codec.INFO, codec.info_line)
+                    answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
+                    if info == seen or codec.is_plain_info(answer):
+                        return info
+                    seen, fault = info, _Fault(f"{answer!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
                     raise _HangUp(f"The port hung up ({error})", RobotError) from error
+            except _HangUp as happened:
+                fault = happened
+                with contextlib.suppress(_LostStep):
+                    self._reopen(happened)
             except _Fault as happened:
                 fault = happened
         took = self.clock.now() - since

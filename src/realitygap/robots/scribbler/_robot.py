@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
-from realitygap.errors import RobotError
+from realitygap.errors import RecordError, RobotError
 from realitygap.robots._clock import Clock
 from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.robots._recording import Recorder
 from realitygap.world import Pose
 
 from . import _codec as codec
@@ -24,7 +27,9 @@ from ._odometry import Odometry
 from ._ports import label_of, port_name
 from ._senses import Senses
 from ._sound import SoundAndLight
-from ._watchdog import WatchedClock, Watchdog
+from ._watchdog import Watchdog, WatchedClock
+
+T = TypeVar("T")
 
 FAR = 99
 """What an S2's distance reads where nothing is seen."""
@@ -76,14 +81,18 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         )
         label = label_of(name) if isinstance(port, str) else "EMULATED"
         self.link = Link(open_port(name) if isinstance(port, str) else port, name)
+        self._recorder = None if record is None else self._record_into(record)
         EXITS.hold()
         self._released = weakref.finalize(self, _let_go, self.link)  # also when the program ends
         try:
             found = self.link.greet()
             self._watchdog = None if watchdog_s is None else Watchdog(self.link, watchdog_s)
-        except BaseException:
+        except BaseException as error:
             self.link.close()
             self._released()
+            if self._recorder is not None:
+                self._recorder.begin({"port": name, "error": str(error)})
+                self._recorder.close()
             raise
         self.info = RobotInfo(*found, port=name, label=label)
         self.step_s = step_s
@@ -91,6 +100,30 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         self.label: Label = label
         self.n_sensors = 3 if self.info.fluke != "none" else 2
         self._n_steps = 0
+        if self._recorder is not None:
+            names = ("label", "step_s", "n_sensors", "reading_max")
+            set_up = {each: getattr(self, each) for each in names}
+            self._recorder.begin(
+                {"port": name, "robot": asdict(self.info), **set_up, "watchdog_s": watchdog_s}
+            )
+
+    def _record_into(self, path: Path | str) -> Recorder:
+        try:
+            recorder = Recorder(path, self.link.clock)
+        except RecordError:
+            self.link.close()
+            raise
+        self.link.tell = lambda exchange: recorder.wire(*exchange)
+        return recorder
+
+    def _noted(self, name: str, work: Callable[[], T]) -> T:
+        """Do it; what goes wrong is recorded."""
+        try:
+            return work()
+        except RobotError as error:
+            if self._recorder is not None:
+                self._recorder.fault(name, error)
+            raise
 
     @property
     def clock(self) -> Clock:
@@ -102,12 +135,21 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: motors stopped, steps counted from 0; somebody has put the robot where it starts."""
         self.need_robot("reset")
-        self.stop()
+        if self._recorder is not None:
+            self._recorder.call("reset")
+        self._noted("reset", super().stop)
         self._n_steps = 0
         self.link.where = ""
 
     def observe(self) -> Observation:
         """Read the sensors that look ahead, and whether the robot is blocked."""
+        if self._recorder is None:
+            return self._observe()
+        seen = self._noted("observe", self._observe)
+        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw)
+        return seen
+
+    def _observe(self) -> Observation:
         if self.info.fluke != "none":
             raw = self.obstacle()
             scale = self.reading_max
@@ -128,10 +170,21 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         move, turn = check_command(command)
         self._n_steps += 1
         self.link.where = f"step {self._n_steps}"
-        self.motors(_within(move - turn), _within(move + turn))
+        left, right = _within(move - turn), _within(move + turn)
+        if self._recorder is None:
+            self.motors(left, right)
+        else:
+            self._recorder.call("drive", move=move, turn=turn)
+            self._noted("drive", lambda: self.motors(left, right))
         if self._watchdog is not None:
             self._watchdog.excuse(self.step_s)
         self.link.clock.sleep(self.step_s)
+
+    def stop(self) -> None:
+        """Stop the motors; safe to call at any moment, and twice."""
+        if self._recorder is not None and self.link.is_open:
+            self._recorder.call("stop")
+        super().stop()
 
     def close(self) -> None:
         """Stop the motors and let go of the port; safe to call twice.
@@ -142,12 +195,15 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         if not self.link.is_open:
             return
         try:
-            self.stop()
+            super().stop()
         finally:
             if self._watchdog is not None:
                 self._watchdog.end()
             self.link.close()
             self._released()
+            if self._recorder is not None:
+                self._recorder.call("close")
+                self._recorder.close()
 
     def __enter__(self) -> Self:
         return self

@@ -1,0 +1,146 @@
+"""`realitygap emulate`: a robot for real client programs."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from realitygap.errors import RobotError
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from realitygap.emulator import Emulator, Server
+
+
+def emulate(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="scribbler: a Parallax Scribbler.")],
+    model: Annotated[str, typer.Option(help="s1, or s2 for an S2 or S3.")] = "s2",
+    fluke: Annotated[
+        str | None, typer.Option(help="none, 1 or 2: the board with the camera. [default: that of the model]")
+    ] = None,
+    arena: Annotated[
+        str, typer.Option(metavar="FILE", help="Where it stands: paper, or a TOML file.")
+    ] = "paper",
+    link: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Also make a link to the pseudo-terminal here.")
+    ] = None,
+    tcp: Annotated[
+        int | None,
+        typer.Option(metavar="PORT", min=0, max=65535, help="A TCP port of this machine instead; 0 for any."),
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.001, max=1000, help="Its seconds in one of real time.")] = 1.0,
+    timing: Annotated[
+        str, typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time.")
+    ] = "on",
+    faults: Annotated[
+        str,
+        typer.Option(metavar="LIST", help="What goes wrong, as in drop=0.001,delay=0.05,hangup=60,sag=0.2."),
+    ] = "",
+    witness: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PORT", min=0, max=65535, help="Serve pose, path and cells on this TCP port; 0 for any."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of sensor noise and faults.")] = 0,
+    state: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Keep name, password, data and settings in this file.")
+    ] = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            "--exec",
+            metavar="COMMAND",
+            help="Run this program with its port in {port} and REALITYGAP_PORT, and end with it. For Myro 2.9.9.",
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Print the port and nothing else.")] = False,
+) -> None:
+    """Pose as a Scribbler, with a simulated robot behind it, until Ctrl-C.
+
+    The name of the port comes first: a pseudo-terminal for `--port` of other commands and for other programs, or a
+    TCP port. In a terminal a live view follows: arena, robot, path, lights and the last command.
+
+    Example: realitygap emulate scribbler --model s2 --fluke 2
+
+    Example: realitygap emulate scribbler --tcp 7001 --witness 7002 --faults drop=0.001,hangup=60
+
+    Example: realitygap emulate scribbler --model s1 --fluke 1 --exec "python2 program.py {port}"
+
+    In Python: realitygap.emulator.serve_pty(realitygap.emulator.Emulator("s2", "2"))
+    """
+    if robot != "scribbler":
+        raise RobotError(f"Unknown robot {robot!r}. Known: scribbler.")
+    if link is not None and tcp is not None:
+        raise RobotError(
+            "--link goes with a pseudo-terminal, and --tcp asks for a TCP port. Give one of them."
+        )
+    from realitygap.emulator._port import make_emulator
+
+    options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
+    if fluke is not None:
+        options["fluke"] = fluke
+    if state is not None:
+        options["state"] = str(state)
+    emulator = make_emulator(model, options)
+    _serve(emulator, link, tcp, speed=speed, witness=witness, command=command, quiet=quiet)
+
+
+def _serve(
+    emulator: Emulator,
+    link: Path | None,
+    tcp: int | None,
+    *,
+    speed: float,
+    witness: int | None,
+    command: str | None,
+    quiet: bool,
+) -> None:
+    from realitygap.emulator._serve import PtyChannel, Server, TcpChannel
+    from realitygap.emulator._view import LiveView
+
+    channel = PtyChannel(link) if tcp is None else TcpChannel(tcp)
+    with ExitStack() as stack:
+        view = None
+        if sys.stdout.isatty() and not quiet and command is None:
+            view = LiveView(f"{emulator.model}, Fluke {emulator.fluke_model}: {channel.name}")
+        server = Server(emulator, channel, speed=speed, witness=witness, watch=view.show if view else None)
+        stack.enter_context(server)
+        typer.echo(server.name)
+        if server.witness_address and not quiet:
+            typer.echo(f"witness {server.witness_address}")
+        sys.stdout.flush()
+        if command is not None:
+            stack.callback(sys.stdout.flush)
+            raise typer.Exit(_run(server, command))
+        if view:
+            stack.enter_context(view)
+        _until_told(server)
+
+
+def _run(server: Server, command: str) -> int:
+    """Serve while a client program runs; its status."""
+    from realitygap.emulator._client import run_client
+
+    server.start()
+    return run_client(command, server.name)
+
+
+def _until_told(server: Server) -> None:
+    """Serve until Ctrl-C or SIGTERM."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        server.stop()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        server.run()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

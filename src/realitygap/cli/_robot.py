@@ -1,0 +1,298 @@
+"""`realitygap robot`: a Scribbler on its port, from the terminal."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import RobotError
+
+if TYPE_CHECKING:
+    from realitygap.robots.scribbler import Scribbler
+
+robot = typer.Typer(
+    name="robot",
+    help="Talk to a Scribbler on a serial or Bluetooth port, or to an emulated one.",
+    epilog="Example: realitygap robot info /dev/rfcomm0",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Port = Annotated[
+    str,
+    typer.Argument(
+        metavar="PORT",
+        help="/dev/rfcomm0, /dev/ttyUSB0, COM3, socket://HOST:PORT or emulator://s2?fluke=2; `realitygap robot list` "
+        "names those that are there.",
+    ),
+]
+Record = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Keep all that is said in a new file, to be shown later.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
+
+
+@contextmanager
+def _opened(port: str, record: Path | None) -> Iterator[Scribbler]:
+    """The robot on a port, stopped and let go of in the end."""
+    from realitygap.robots.scribbler import Scribbler
+
+    if port.removeprefix("scribbler:").startswith("emulator:"):
+        import realitygap.emulator  # noqa: F401  # its ports are known from then on
+    try:
+        with Scribbler(port, record=record) as opened:
+            yield opened
+    except ValueError as error:
+        raise RobotError(str(error)) from error
+
+
+@robot.command("list")
+def list_ports(as_json: Json = False) -> None:
+    """Name the serial ports of this machine, and what they seem to be.
+
+    Example: realitygap robot list
+
+    In Python: realitygap.robots.scribbler.find_ports()
+    """
+    from realitygap.robots.scribbler import find_ports
+
+    found = find_ports()
+    if as_json:
+        typer.echo(json.dumps([guess._asdict() for guess in found], indent=2))
+    elif found:
+        _print_table(("port", "seems to be", "the system says"), found)
+    else:
+        typer.echo("No serial port is there. Pair the robot, or plug it in; docs/how-to/robot.md says how.")
+
+
+@robot.command("info")
+def info(port: Port, as_json: Json = False, record: Record = None) -> None:
+    """Say who answers on a port: robot, Fluke, their firmware, and whether it is real or emulated.
+
+    Example: realitygap robot info /dev/rfcomm0
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").info
+    """
+    with _opened(port, record) as opened:
+        found = vars(opened.info) | {"name": opened.name if opened.info.model else None}
+        if opened.info.fluke != "none":
+            found["ahead"] = opened.forwardness
+    _print(found, as_json)
+
+
+@robot.command("sense")
+def sense(port: Port, as_json: Json = False, record: Record = None) -> None:
+    """Read every sensor of the robot and its Fluke once, camera apart.
+
+    Example: realitygap robot sense /dev/rfcomm0
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").sensors()
+    """
+    with _opened(port, record) as opened:
+        seen: dict[str, Any] = {}
+        if opened.info.model is not None:
+            seen |= opened.sensors()._asdict()
+        if opened.info.model == "s2":
+            seen |= {"distance": opened.distance(), "encoders": opened.encoders()}
+        if opened.info.fluke != "none":
+            seen |= {"obstacle": opened.obstacle(), "bright": opened.bright(), "battery_v": opened.battery()}
+    _print(seen, as_json)
+
+
+@robot.command("drive")
+def drive(
+    port: Port,
+    move: Annotated[float, typer.Argument(metavar="MOVE", help="-1 (back) to 1 (ahead), of full speed.")],
+    turn: Annotated[float, typer.Argument(metavar="TURN", help="-1 (right) to 1 (left).")] = 0.0,
+    seconds: Annotated[float, typer.Option(min=0.0, metavar="S", help="How long.")] = 0.5,
+    record: Record = None,
+) -> None:
+    """Drive for a while, then stop. Ctrl-C stops at once.
+
+    Example: realitygap robot drive /dev/rfcomm0 0.5 0.2 --seconds 2
+
+    Example: realitygap robot drive /dev/rfcomm0 -- -0.5
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0", step_s=2).drive(Command(0.5, 0.2))
+    """
+    from realitygap.robots import Command
+
+    with _opened(port, record) as opened:
+        opened.step_s = seconds
+        opened.drive(Command(move, turn))
+        opened.stop()
+        faults = opened.faults
+    if faults.recoveries:
+        typer.echo(
+            f"The link was disturbed {faults.recoveries} times; the robot stood still meanwhile.", err=True
+        )
+
+
+@robot.command("stop")
+def stop(port: Port) -> None:
+    """Stop the motors, whatever the robot is doing.
+
+    Example: realitygap robot stop /dev/rfcomm0
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").stop()
+    """
+    with _opened(port, None) as opened:
+        opened.stop()
+    typer.echo("The motors are off.")
+
+
+@robot.command("battery")
+def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
+    """Read the voltage of the battery; about 9 V when full, low below 6.15 V.
+
+    Example: realitygap robot battery /dev/rfcomm0
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").battery()
+    """
+    with _opened(port, record) as opened:
+        volts = opened.battery()
+    typer.echo(json.dumps({"battery_v": round(volts, 3)}) if as_json else f"{volts:.2f} V")
+
+
+@robot.command("picture")
+def picture(
+    port: Port,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.png", help="Where to.")] = Path(
+        "picture.png"
+    ),
+    kind: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND", help="jpeg, jpeg-fast, gray, grayjpeg-fast, grayraw, color (raw) or blob."
+        ),
+    ] = "jpeg",
+    record: Record = None,
+) -> None:
+    """Take a picture with the Fluke's camera and write it as PNG.
+
+    Example: realitygap robot picture /dev/rfcomm0 -o picture.png
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").picture()
+    """
+    if out.suffix.lower() != ".png":
+        raise RobotError(f"{out} does not end in .png: pictures are written as PNG.")
+    with _opened(port, record) as opened:
+        pixels = opened.picture(kind)  # type: ignore[arg-type]  # checked there
+    from PIL import Image
+
+    Image.fromarray(pixels).save(out, "PNG")
+    typer.echo(f"Written: {out} ({pixels.shape[1]} x {pixels.shape[0]})")
+
+
+@robot.command("beep")
+def beep(
+    port: Port,
+    seconds: Annotated[float, typer.Option(metavar="S", help="How long, at most 8.191.")] = 0.5,
+    hz: Annotated[float, typer.Option(metavar="HZ", help="How high, at most 10000.")] = 880.0,
+    hz2: Annotated[float | None, typer.Option(metavar="HZ", help="A second tone with it.")] = None,
+    record: Record = None,
+) -> None:
+    """Play a tone.
+
+    Example: realitygap robot beep /dev/rfcomm0 --hz 440
+
+    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").beep(0.5, 440)
+    """
+    with _opened(port, record) as opened:
+        opened.beep(seconds, hz, hz2)
+
+
+@robot.command("show-recording")
+def show_recording(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What --record kept.")],
+    wire: Annotated[
+        bool, typer.Option("--wire", help="Every command with its bytes, not only the calls.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Show what was recorded with a robot: a row for each call, or for each command with --wire.
+
+    Example: realitygap robot show-recording session.jsonl --wire
+
+    In Python: realitygap.robots.read_recording("session.jsonl").table()
+    """
+    from realitygap.robots import read_recording
+
+    recording = read_recording(file)
+    lines = [line for line in recording.lines if wire or line["kind"] != "wire"]
+    if as_json:
+        typer.echo(json.dumps({"header": recording.header, "lines": lines}, indent=2))
+        return
+    header = recording.header
+    who = header.get("robot", {})
+    typer.echo(
+        f"{header.get('label', 'no robot')} on {header['port']}, {who.get('model')} with Fluke {who.get('fluke')}, "
+        f"{header['started']}"
+    )
+    _print_table(("t [s]", "kind", "name", "what"), [_row(line) for line in lines])
+    if not recording.is_whole:
+        typer.echo("The last line is cut off, as after a crash, and left out.")
+
+
+@robot.command("export-recording")
+def export_recording(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What --record kept.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.mcap", help="Where to.")],
+) -> None:
+    """Write a recording as MCAP, for viewers of robotics data. Needs the extra: pip install 'realitygap[export]'.
+
+    Example: realitygap robot export-recording session.jsonl -o session.mcap
+
+    In Python: realitygap.robots.export_mcap("session.jsonl", "session.mcap")
+    """
+    from realitygap.robots import export_mcap
+
+    typer.echo(f"Written: {out} ({export_mcap(file, out)} messages)")
+
+
+def _row(line: Any) -> tuple[str, str, str, str]:
+    """One line of a recording for people."""
+    values = line.get("values", {})
+    what = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
+    if line["kind"] == "wire":
+        what = f"{line['sent']} > {_shortened(line['answered'])}"
+    if line.get("outcome", "ok") != "ok":
+        what = f"{what} {line['outcome']}".strip()
+    return f"{line['t']:.3f}", line["kind"], line["name"], what
+
+
+def _shortened(text: str, most: int = 60) -> str:
+    return text if len(text) <= most else f"{text[:most]}... ({len(text) // 2} bytes)"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3f}"
+    return " ".join(map(_value, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _print(found: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(found, indent=2))
+        return
+    shown = {name: "-" if value in (None, "") else _value(value) for name, value in found.items()}
+    _print_table(None, [(name.replace("_", " "), value) for name, value in shown.items()])
+
+
+def _print_table(heads: tuple[str, ...] | None, rows: Any) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD if heads else None, show_header=heads is not None)
+    for head in heads or rows[0]:
+        table.add_column(head, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(str(cell)) for cell in row))
+    Console().print(table)

@@ -1,0 +1,88 @@
+"""Running a client program against a pseudo-terminal, which refuses the modem lines that some clients set.
+
+Myro 2.9.9 sets DTR when it opens a port. A pseudo-terminal has no such line, the call fails (ENOTTY), and Myro waits
+for the port for ever. Python looks for a module `sitecustomize` when it starts; the one written here, for the child
+program only, lets pyserial go on after that failure. It is written for Python 2 and 3.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from realitygap.errors import RobotError
+
+PORT_VARIABLE = "REALITYGAP_PORT"
+
+PATCH = """\
+# Written by `realitygap emulate --exec`: a pseudo-terminal has no modem lines, and pyserial may go on without them.
+import errno
+import os
+import sys
+
+
+def _forgive(kind, name):
+    method = getattr(kind, name, None)
+    if method is None:
+        return
+
+    def forgiving(self, *args, **kwargs):
+        try:
+            return method(self, *args, **kwargs)
+        except (IOError, OSError) as error:
+            if error.errno not in (errno.ENOTTY, errno.EINVAL):
+                raise
+
+    setattr(kind, name, forgiving)
+
+
+try:
+    import serial
+
+    for _name in ("setDTR", "setRTS", "_update_dtr_state", "_update_rts_state"):
+        _forgive(serial.Serial, _name)
+except ImportError:
+    pass
+
+# whoever else has a sitecustomize gets it as before
+_here = os.path.dirname(os.path.abspath(__file__))
+sys.path[:] = [_place for _place in sys.path if os.path.abspath(_place) != _here]
+sys.modules.pop("sitecustomize", None)
+try:
+    import sitecustomize
+except ImportError:
+    pass
+"""
+
+
+@contextlib.contextmanager
+def client_environment(port: str) -> Iterator[dict[str, str]]:
+    """The environment of a client program: the port's name in REALITYGAP_PORT, and the patch for pyserial."""
+    with tempfile.TemporaryDirectory(prefix="realitygap-client-") as folder:
+        (Path(folder) / "sitecustomize.py").write_text(PATCH, encoding="utf-8")
+        others = os.environ.get("PYTHONPATH")
+        paths = os.pathsep.join([folder, others] if others else [folder])
+        yield {**os.environ, "PYTHONPATH": paths, PORT_VARIABLE: port}
+
+
+def run_client(command: str, port: str) -> int:
+    """Run a client program in a shell until it ends, and return its status.
+
+    Args:
+        command: What to run; {port} in it becomes the port's name.
+        port: What the client opens.
+
+    Raises:
+        RobotError: It cannot be started.
+    """
+    with client_environment(port) as environment:
+        try:
+            return subprocess.run(
+                command.replace("{port}", port), shell=True, env=environment, check=False
+            ).returncode
+        except OSError as error:
+            raise RobotError(f"{command!r} cannot be started ({error.strerror}).") from error

@@ -1,0 +1,123 @@
+"""A live view in the terminal: arena, robot, path, lights and the last command."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realitygap.robots.scribbler._opcodes import Op
+
+from ._emulator import Emulator
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+WIDTH = 72  # characters of the picture
+ASPECT = 2.0  # a character is twice as high as wide
+ARROWS = "→↗↑↖←↙↓↘"
+NAMES = {int(op): op.name for op in Op}
+DOTS = 4000  # points of the path that are drawn
+
+
+class LiveView:
+    """Shows an emulator while it is served; its `show` is what a server calls.
+
+    Args:
+        title: What to say above the picture.
+    """
+
+    def __init__(self, title: str) -> None:
+        from rich.live import Live
+
+        self._title = title
+        self._live = Live(auto_refresh=False, transient=True)
+
+    def show(self, emulator: Emulator) -> None:
+        """Draw it anew."""
+        self._live.update(self._panel(emulator), refresh=True)
+
+    def _panel(self, emulator: Emulator) -> RenderableType:
+        from rich.panel import Panel
+        from rich.text import Text
+
+        text = "\n".join([*picture(emulator), "", *status(emulator)])
+        return Panel(Text(text, no_wrap=True), title=self._title, expand=False)
+
+    def __enter__(self) -> LiveView:
+        self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.stop()
+
+
+def picture(emulator: Emulator, width: int = WIDTH) -> list[str]:
+    """The arena from above as lines of characters: walls #, the pen's path ., the robot as an arrow."""
+    arena = emulator.scene.arena
+    path = emulator.path()
+    walls = np.array(arena.walls, dtype=float).reshape(-1, 4)
+    grid = arena.grid
+    far_x, far_y = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
+    xs = np.concatenate([walls[:, 0], walls[:, 2], [grid.x, far_x]])
+    ys = np.concatenate([walls[:, 1], walls[:, 3], [grid.y, far_y]])
+    left, low = float(xs.min()), float(ys.min())
+    scale = (width - 1) / max(float(np.ptp(xs)), 1e-6)  # characters in a meter
+    height = max(1, min(40, round(float(np.ptp(ys)) * scale / ASPECT))) + 1
+    canvas = np.full((height, width), " ")
+
+    def put(x: np.ndarray, y: np.ndarray, mark: str) -> None:
+        column = np.rint((x - left) * scale).astype(int)
+        row = height - 1 - np.rint((y - low) * scale / ASPECT).astype(int)
+        seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        canvas[row[seen], column[seen]] = mark
+
+    put(path[-DOTS:, 1], path[-DOTS:, 2], "·")
+    share = np.linspace(0, 1, 4 * width)[:, None]
+    put(
+        (walls[:, 0] + share * (walls[:, 2] - walls[:, 0])).ravel(),
+        (walls[:, 1] + share * (walls[:, 3] - walls[:, 1])).ravel(),
+        "#",
+    )
+    pose = emulator.pose
+    arrow = ARROWS[round(pose.heading / (math.pi / 4)) % 8]
+    put(np.array([pose.x]), np.array([pose.y]), arrow)
+    return ["".join(line).rstrip() for line in canvas]
+
+
+def status(emulator: Emulator) -> list[str]:
+    """What it is doing, in a few lines."""
+    pose = emulator.pose
+    left, right = emulator.wheel_speeds()
+    lights = emulator.robot.leds(emulator.now_ns)
+    leds = "".join("●" if light else "○" for light in lights)
+    volts = emulator.battery.volts(emulator.table.motors.load)
+    lines = [
+        f"x {pose.x:6.3f} m   y {pose.y:6.3f} m   heading {math.degrees(pose.heading) % 360:5.1f}°"
+        f"   wheels {left:+.3f} {right:+.3f} m/s{'   stalled' if emulator.table.stalled else ''}",
+        f"LEDs {leds}   battery {volts:.2f} V   {len(emulator.cells())} cells   {emulator.now:.1f} s",
+        f"last command {describe(emulator.robot.last_command)}",
+    ]
+    fluke = emulator.fluke
+    if fluke is not None:
+        ahead = "Fluke" if emulator.fluke_ahead else "Scribbler"
+        front = "on" if fluke.front_led else "off"
+        lines.insert(
+            2, f"{ahead} ahead   front LED {front}   back LED {fluke.back_led}   IR power {fluke.ir_power}"
+        )
+    if emulator.robot.tone is not None:
+        lines.append(f"♪ {emulator.robot.tone[0]} Hz")
+    if not emulator.is_connected:
+        lines.append("the link is away")
+    return lines
+
+
+def describe(packet: bytes) -> str:
+    """A command in words: its name and its bytes."""
+    if not packet:
+        return "none"
+    return f"{NAMES.get(packet[0], 'unknown')} {' '.join(map(str, packet))}"

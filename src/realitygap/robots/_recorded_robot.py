@@ -1,0 +1,132 @@
+"""A recording, opened as the robot that it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from realitygap.errors import RecordError, RobotError
+from realitygap.world import Pose
+
+from ._contract import Command, Label, Observation, check_command
+from ._recording import Recording, read_recording
+
+NAME = "recording:"
+
+
+class RecordedClock:
+    """Time that passes as it did."""
+
+    def __init__(self) -> None:
+        self._now = 0.0
+
+    def now(self) -> float:
+        """The time since the recording began [s]."""
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass [s]; nobody has to wait for it."""
+        self._now += seconds
+
+
+class RecordedRobot:
+    """Answers what a robot answered, as long as it is asked what it was asked.
+
+    `reset` goes to the next recorded one. `stop` may come at any moment, as on every robot.
+
+    Args:
+        recording: A file, with or without `recording:` before it, or what `read_recording` gave.
+
+    Raises:
+        RecordError: The file cannot be read, or is not of a robot that was used.
+    """
+
+    def __init__(self, recording: Recording | Path | str) -> None:
+        if not isinstance(recording, Recording):
+            recording = read_recording(str(recording).removeprefix(NAME))
+        header = recording.header
+        missing = [name for name in ("label", "step_s", "n_sensors") if header.get(name) is None]
+        if missing:
+            raise RecordError(
+                f"{recording.path} names no {', '.join(missing)}: no robot answered as it was recorded."
+            )
+        self.recording = recording
+        self.label: Label = header["label"]
+        self.step_s = float(header["step_s"])
+        self.n_sensors = int(header["n_sensors"])
+        self.clock = RecordedClock()
+        self._lines = [line for line in recording.lines if line["kind"] != "wire" and line["name"] != "stop"]
+        self._next = 0
+        self._n_steps = 0
+        self._is_open = True
+
+    def _take(self, name: str) -> Mapping[str, Any]:
+        """What was recorded at this point, which must be such a call."""
+        if not self._is_open:
+            raise RobotError(f"{self.recording.path} is closed: open the recording anew.")
+        is_over = self._next == len(self._lines)
+        line: Mapping[str, Any] = {"name": "end"} if is_over else self._lines[self._next]
+        if line["name"] != name:
+            said = "ends" if line["name"] in ("end", "close") else f"goes on with '{line['name']}'"
+            raise RobotError(
+                f"After step {self._n_steps}, {self.recording.path} {said}, not with '{name}': a recorded robot can "
+                "only do again what it did."
+            )
+        self._next += 1
+        if line["kind"] == "call" and self._next < len(self._lines):
+            after = self._lines[self._next]
+            if after["kind"] == "fault" and after["name"] == name:
+                line = after
+                self._next += 1
+        if line["kind"] == "fault":
+            raise RobotError(f"As recorded: {line['outcome']}")
+        values: Mapping[str, Any] = line.get("values", {})
+        self.clock.sleep(max(float(line["t"]) - self.clock.now(), 0.0))
+        return values
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Go to the beginning of the next recorded trial."""
+        while self._next < len(self._lines) and self._lines[self._next]["name"] != "reset":
+            self._next += 1
+        self._take("reset")
+        self._n_steps = 0
+
+    def observe(self) -> Observation:
+        """What the robot saw at this point."""
+        seen = self._take("observe")
+        return Observation(tuple(seen["readings"]), seen["stalled"], tuple(seen["raw"]))
+
+    def drive(self, command: Command) -> None:
+        """Nothing, if the robot was told just that.
+
+        Raises:
+            RobotError: It was told something else.
+        """
+        command = check_command(command)
+        at = self._next
+        told = self._take("drive")
+        if (told["move"], told["turn"]) != command:
+            self._next = at
+            raise RobotError(
+                f"In step {self._n_steps + 1}, {self.recording.path} drove {told['move']}, {told['turn']}, not "
+                f"{command.move}, {command.turn}: a recorded robot can only do again what it did."
+            )
+        self._n_steps += 1
+        self.clock.sleep(self.step_s)
+
+    def stop(self) -> None:
+        """Nothing: it does not move."""
+
+    def close(self) -> None:
+        """Let go of it; safe to call twice."""
+        self._is_open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

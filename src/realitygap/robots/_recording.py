@@ -1,0 +1,208 @@
+"""A session with a robot in a file: what it was told, what it answered, and when.
+
+A line of JSON each, the first of which says what was recorded and in which units. A line is written in one go, so
+whatever happens the file holds all that was said up to the last line.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from realitygap._version import __version__
+from realitygap.errors import RecordError, RecordVersionError
+
+from ._clock import Clock
+
+FORMAT = "realitygap robot recording"
+FORMAT_VERSION = 1
+UNITS = {
+    "t": "s since the recording began, by the robot's clock",
+    "took_s": "s from sending a command until its answer was complete",
+    "move, turn": "-1 to 1",
+    "readings": "0 (nothing seen) to 1 (as near as can be told)",
+    "raw": "as the robot sends it",
+    "sent, answered": "bytes in hexadecimal, answers with their echo",
+}
+KINDS = {
+    "call": "what the program asked of the robot, and what it saw",
+    "wire": "bytes that went over the wire for it",
+    "fault": "what went wrong with a call",
+}
+COLUMNS = pl.Schema(
+    {
+        "t": pl.Float64,
+        "kind": pl.String,
+        "name": pl.String,
+        "values": pl.String,
+        "sent": pl.String,
+        "answered": pl.String,
+        "took_s": pl.Float64,
+        "outcome": pl.String,
+    }
+)
+
+
+class Recorder:
+    """Writes a recording as it happens.
+
+    Args:
+        path: A new file.
+        clock: The robot's.
+
+    Raises:
+        RecordError: It is there already, or cannot be written.
+    """
+
+    def __init__(self, path: Path | str, clock: Clock) -> None:
+        self.path = Path(path)
+        self._clock = clock
+        self._began_s = clock.now()
+        self._started = datetime.now(UTC).isoformat(timespec="milliseconds")
+        self._early: list[dict[str, Any]] | None = []  # until it is known who is there
+        self._is_broken = False
+        try:
+            self._file = self.path.open("xb", buffering=0)
+        except FileExistsError as error:
+            raise RecordError(
+                f"{path} is there already; a recording never overwrites one. Name another file."
+            ) from error
+        except OSError as error:
+            raise RecordError(
+                f"Could not write {path}: {error.strerror or error}. Name another file."
+            ) from error
+
+    def begin(self, set_up: Mapping[str, Any]) -> None:
+        """Write the first line: what is recorded, of whom; what came before follows."""
+        self._write(
+            {
+                "format": FORMAT,
+                "version": FORMAT_VERSION,
+                "started": self._started,
+                **set_up,
+                "software": {"realitygap": __version__, "python": platform.python_version()},
+                "system": platform.platform(),
+                "units": UNITS,
+            }
+        )
+        early, self._early = self._early or [], None
+        for line in early:
+            self._write(line)
+
+    def wire(
+        self, time_s: float, took_s: float, name: str, sent: bytes, answered: bytes, outcome: str
+    ) -> None:
+        """Keep one command and its answer."""
+        self._add(
+            time_s,
+            "wire",
+            name,
+            {"sent": sent.hex(), "answered": answered.hex(), "took_s": round(took_s, 6), "outcome": outcome},
+        )
+
+    def call(self, name: str, **values: Any) -> None:
+        """Keep what the program asked, or what it saw."""
+        self._add(self._clock.now(), "call", name, {"values": values} if values else {})
+
+    def fault(self, name: str, error: BaseException) -> None:
+        """Keep what went wrong with a call."""
+        self._add(self._clock.now(), "fault", name, {"outcome": str(error)})
+
+    def _add(self, time_s: float, kind: str, name: str, more: Mapping[str, Any]) -> None:
+        line = {"t": round(time_s - self._began_s, 6), "kind": kind, "name": name, **more}
+        if self._early is not None:
+            self._early.append(line)
+        else:
+            self._write(line)
+
+    def _write(self, line: Mapping[str, Any]) -> None:
+        """Write a line; the first one that fails is said, and no more are tried, so that the robot can be stopped."""
+        if self._is_broken:
+            return
+        data = json.dumps(line, separators=(",", ":")).encode() + b"\n"
+        try:
+            n_written = self._file.write(data)
+        except OSError as error:
+            self._is_broken = True
+            raise RecordError(
+                f"Could not write {self.path}: {error.strerror or error}. What was recorded before is safe."
+            ) from error
+        if n_written != len(data):
+            self._is_broken = True
+            raise RecordError(f"Could not write {self.path}: it is full. What was recorded before is safe.")
+
+    def close(self) -> None:
+        """Nothing more will be said."""
+        self._is_broken = True
+        self._file.close()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded session.
+
+    Attributes:
+        path: Its file.
+        header: What was recorded, of whom, and with what.
+        lines: What was said, in order: `t` [s], `kind`, `name`, and what belongs to it.
+        is_whole: Whether the last line is complete; the one after a crash may not be, and is left out.
+    """
+
+    path: Path
+    header: Mapping[str, Any]
+    lines: tuple[Mapping[str, Any], ...]
+    is_whole: bool
+
+    def table(self) -> pl.DataFrame:
+        """A row a line, with the columns of `COLUMNS`; what a line has not is null."""
+        rows = [
+            {**line, "values": json.dumps(line["values"]) if "values" in line else None}
+            for line in self.lines
+        ]
+        return pl.DataFrame(rows, schema=COLUMNS)
+
+
+def read_recording(path: Path | str) -> Recording:
+    """Read a recording.
+
+    Raises:
+        RecordError: There is none, or it is damaged before its last line.
+        RecordVersionError: It was written by another version.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RecordError(f"Could not read {path}: {error.strerror or error}.") from error
+    whole, newline, rest = data.rpartition(b"\n")
+    lines = (
+        [_line(path, number, text) for number, text in enumerate(whole.split(b"\n"), 1)] if newline else []
+    )
+    if not lines or lines[0].get("format") != FORMAT:
+        raise RecordError(f"{path} is no recording of a robot: its first line does not say '{FORMAT}'.")
+    if lines[0].get("version") != FORMAT_VERSION:
+        raise RecordVersionError(
+            f"{path} has version {lines[0].get('version')} of the format, expected {FORMAT_VERSION}. Read it with the "
+            f"release of realitygap that wrote it ({lines[0].get('software')})."
+        )
+    for number, line in enumerate(lines[1:], 2):
+        if not {"t", "kind", "name"} <= line.keys() or line["kind"] not in KINDS:
+            raise RecordError(f"{path} is damaged: line {number} has no time, kind or name.")
+    return Recording(path, lines[0], tuple(lines[1:]), not rest)
+
+
+def _line(path: Path, number: int, text: bytes) -> dict[str, Any]:
+    try:
+        line = json.loads(text)
+    except ValueError as error:
+        raise RecordError(f"{path} is damaged: line {number} is no JSON ({error}).") from error
+    if not isinstance(line, dict):
+        raise RecordError(f"{path} is damaged: line {number} is no object.")
+    return line

@@ -240,6 +240,13 @@ class Emulator:
         if self.model == "s2" and self.fluke is None:
             self.robot.reset(self._now)
 
+    def overload(self) -> None:
+        """Somebody holds the wheels: too much current stops an S2 until it is reset; it answers nothing."""
+        motors = self.table.motors
+        self.table.advance_to(self._now)
+        if isinstance(motors, S2Motors):
+            motors.trip()
+
     # -- what an observer sees --
 
     @property

@@ -35,7 +35,7 @@ class SimulatedRobot(Protocol):
         """Move on for a short time with the wheels at `left` and `right` [m/s].
 
         Returns:
-            How far each wheel rolled [m]; nothing where it was blocked.
+            How far each wheel turned [m]; the wheels of a blocked robot slip.
         """
         ...
 
@@ -50,7 +50,7 @@ class SimulatedRobot(Protocol):
 
 
 class BoxOnWheels:
-    """A box with two wheels between straight walls: a blocked robot stays where it is, as in Jyro.
+    """A box with two wheels between straight walls: a blocked robot stays where it is, as in Jyro, and its wheels slip.
 
     Args:
         arena: The walls, and the start.
@@ -83,8 +83,8 @@ class BoxOnWheels:
         pose = Pose(x + chord * math.cos(middle), y + chord * math.sin(middle), heading + turn)
         if self._is_blocked(pose, abs(chord)):
             self.stalled = True
-            return 0.0, 0.0
-        self.pose, self.stalled = pose, False
+        else:
+            self.pose, self.stalled = pose, False
         return rolled_left, rolled_right
 
     def _is_blocked(self, pose: Pose, moved: float) -> bool:

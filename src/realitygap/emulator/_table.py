@@ -63,12 +63,12 @@ class Table:
 
     def _step(self) -> None:
         left, right = self.motors.speeds()
-        rolled = self.robot.advance(left, right, STEP_S)
+        turned = self.robot.advance(left, right, STEP_S)
         self.battery.drain(self.motors.load, STEP_NS)
         self.time += STEP_NS
-        self.motors.rolled(self.time, *rolled)
-        self.wheels = (rolled[0] / STEP_S, rolled[1] / STEP_S)
-        if rolled[0] or rolled[1]:
+        self.motors.turned(self.time, *turned, slipping=self.robot.stalled)
+        self.wheels = (turned[0] / STEP_S, turned[1] / STEP_S)
+        if not self.robot.stalled:
             self._note()
 
     @property

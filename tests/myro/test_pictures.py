@@ -153,7 +153,8 @@ def test_color_spaces_agree_with_their_inverses():
     assert myro.hls2rgb(*myro.rgb2hls(0.1, 0.2, 0.3)) == pytest.approx((0.1, 0.2, 0.3))
     assert myro.yiq2rgb(*myro.rgb2yiq(0.1, 0.2, 0.3)) == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
     assert myro.rgb2yuv(255, 255, 255) == [255, 128, 128]
-    assert np.abs(np.array(myro.yuv2rgb(*myro.rgb2yuv(200, 100, 50))) - (200, 100, 50)).max() < 20  # Myro's formulas are rough
+    there_and_back = myro.yuv2rgb(*myro.rgb2yuv(200, 100, 50))
+    assert np.abs(np.array(there_and_back) - (200, 100, 50)).max() < 20  # Myro's formulas are rough
     assert myro.color_rgb(255, 128, 0) == "#ff8000"
     assert myro.rgb_color("#ff8000") == (255, 128, 0)
 

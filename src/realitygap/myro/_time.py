@@ -9,7 +9,7 @@ from types import CodeType, FrameType
 from . import _current
 from ._mistakes import number
 
-_Site = tuple[CodeType, int]  # one call in a program
+_Site = tuple[CodeType, int]  # a line of a program
 _timers: dict[_Site, tuple[FrameType, float, float]] = {}  # frame, start [s], duration [s]
 
 
@@ -48,8 +48,7 @@ def timer(seconds: float = 0) -> Iterator[float]:
 def timeRemaining(seconds: float = 0) -> bool:
     """For loops: `while timeRemaining(5):` runs for 5 seconds.
 
-    Each place in a program has a timer of its own, which begins when the place is reached first and anew after it
-    ended.
+    Each line of a program has a timer of its own, which begins when the line is reached first and anew after it ended.
 
     Args:
         seconds: How long; 0 for ever.
@@ -64,7 +63,7 @@ def timeRemaining(seconds: float = 0) -> bool:
     if not duration:
         return True
     caller = sys._getframe(1)
-    site = (caller.f_code, caller.f_lasti)
+    site = (caller.f_code, caller.f_lineno)  # Python compiles the test of a loop twice, on one line
     now = _current.now()
     frame, start, before = _timers.get(site, (None, now, duration))
     if frame is not caller or before != duration:

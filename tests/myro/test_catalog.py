@@ -1,6 +1,8 @@
 """Every name of Myro is done or left out with a reason."""
 
+import importlib.util
 import inspect
+from pathlib import Path
 
 import pytest
 
@@ -39,8 +41,8 @@ def test_every_name_of_myro_is_done_or_left_out():
 
 
 def test_what_is_listed_beyond_myro_is_known():
-    # makeRobot is of Calico's Myro 3
-    assert set(names()) - set(MYRO) == {"makeRobot"}
+    # these are of Calico's Myro 3
+    assert set(names()) - set(MYRO) == {"makeRobot", "penUp", "penDown", "joystick", "getKeyPressed"}
 
 
 def test_no_name_is_listed_twice():
@@ -75,6 +77,17 @@ def test_functions_have_the_arguments_of_the_methods_without_the_robot():
         str(inspect.signature(myro.forward))
         == "(speed: 'float' = 1, seconds: 'float | None' = None) -> 'None'"
     )
+
+
+def test_the_page_of_reference_has_every_name():
+    path = Path(__file__).parents[2] / "docs" / "reference_pages.py"
+    spec = importlib.util.spec_from_file_location("reference_pages_of_myro", path)
+    pages = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pages)
+    page = pages.myro_functions()
+    for name in names():
+        assert f"`{name}`" in page or f"`{name}(" in page, name
+    assert "| `forward(speed=1, seconds=None)` | Drive straight ahead. |" in page
 
 
 def test_other_names_are_missing_as_usual():

@@ -181,6 +181,16 @@ def test_color_spaces_agree_with_their_inverses():
         (lambda picture: makePicture("http://example.org/a.jpg"), "address on the web"),
         (lambda picture: savePicture(picture, "a.nonsense"), "Names of pictures end in"),
         (lambda picture: savePicture([], "a.gif"), "the list is empty"),
+        (lambda picture: savePicture(7, "a.gif"), "savePicture: the picture is 7"),
+        (
+            lambda picture: getWidth("a.jpg"),
+            "getWidth: the picture is 'a.jpg', expected one made by takePicture",
+        ),
+        (lambda picture: list(getPixels(None)), "getPixels: the picture is None"),
+        (lambda picture: getX(picture), "getX: the pixel is <Picture instance"),
+        (lambda picture: getRed(picture), "getRed was given <Picture instance"),
+        (lambda picture: setRed((1, 2, 3), 5), "setRed was given .1, 2, 3., expected a pixel"),
+        (lambda picture: copyPicture("a.jpg"), "copyPicture: the picture is 'a.jpg'"),
     ],
 )
 def test_mistakes_with_pictures_are_said_plainly(picture, act, message):

@@ -425,6 +425,10 @@ __all__ = [  # noqa: RUF022  # by subject
     # what is left out, and says so
     "joyStick",
     "Joystick",
+    "joystick",
+    "getKeyPressed",
+    "penUp",
+    "penDown",
     "calibrate",
     "Calibrate",
     "Entry",

@@ -1,5 +1,7 @@
 """Every name that `from myro import *` gave a program in Myro 2.9.9: done here, or left out and why.
 
+A few names of Calico's Myro 3, which courses used after it, are here too: makeRobot, penUp, joystick.
+
 Source: myro/__init__.py, graphics.py, media.py, speech.py, chat.py and system.py of Myro 2.9.9.
 """
 
@@ -78,6 +80,10 @@ _FIRMWARE = (
     "It replaces the firmware of robot or Fluke, or Myro itself, from addresses that are gone; a mistake there can "
     "leave a robot useless. Update realitygap with pip, and a robot with its maker's tools."
 )
+_PEN = (
+    "No robot can lift its pen: on a real one a person puts it in, and that of a simulated one always draws. Leave the "
+    "line out."
+)
 _OTHER_ROBOT = (
     "It is another robot, for which there is no driver here. Use Scribbler(port) or SimScribbler()."
 )
@@ -86,6 +92,10 @@ _INSIDE = "It is a part of Myro's inside that programs of a course do not call."
 LEFT_OUT: dict[str, str] = {
     "joyStick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
     "Joystick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
+    "joystick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
+    "getKeyPressed": _WINDOW.format(instead="Ask with ask() what to do next."),
+    "penUp": _PEN,
+    "penDown": _PEN,
     "calibrate": _WINDOW.format(instead="Correct the motors with robot.setFudge(f1, f2, f3, f4)."),
     "Calibrate": _WINDOW.format(instead="Correct the motors with robot.setFudge(f1, f2, f3, f4)."),
     "Entry": _WINDOW.format(instead="Ask with ask() what a reader should enter."),

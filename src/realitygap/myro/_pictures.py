@@ -293,7 +293,7 @@ def loadPicture(filename: str) -> Picture:
 
 def copyPicture(picture: Picture) -> Picture:
     """A copy, which can be changed while the picture stays."""
-    return Picture(picture)
+    return Picture(_a_picture("copyPicture", picture))
 
 
 def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> None:
@@ -306,7 +306,8 @@ def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> No
     Raises:
         MyroError: The file cannot be written.
     """
-    pictures = [picture] if isinstance(picture, Picture) else [_as_picture(item) for item in picture]
+    several = picture if isinstance(picture, Sequence) and not isinstance(picture, str) else [picture]
+    pictures = [_as_picture(item) for item in several]
     if not pictures:
         raise MyroError("savePicture: the list is empty, expected pictures.")
     images = [_flat(item.image, filename) for item in pictures]
@@ -325,8 +326,8 @@ def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> No
 writePictureTo = savePicture
 
 
-def _as_picture(item: Picture | str) -> Picture:
-    return item if isinstance(item, Picture) else Picture(item)
+def _as_picture(item: object) -> Picture:
+    return Picture(item) if isinstance(item, str) else _a_picture("savePicture", item)
 
 
 def _flat(image: Image.Image, filename: str) -> Image.Image:
@@ -337,14 +338,44 @@ def _flat(image: Image.Image, filename: str) -> Image.Image:
     )
 
 
+def _a_picture(function: str, value: object) -> Picture:
+    """The picture that a function was given.
+
+    Raises:
+        MyroError: It was given something else.
+    """
+    if isinstance(value, Picture):
+        return value
+    raise MyroError(
+        f"{function}: the picture is {value!r}, expected one made by takePicture() or makePicture(...)."
+    )
+
+
+def _a_pixel(function: str, value: object) -> Pixel:
+    if isinstance(value, Pixel):
+        return value
+    raise MyroError(
+        f"{function}: the pixel is {value!r}, expected one of getPixel(picture, x, y) or getPixels(picture)."
+    )
+
+
+def _colored(function: str, value: object) -> Pixel | Color:
+    """The pixel or color that a function was given."""
+    if isinstance(value, (Pixel, Color)):
+        return value
+    raise MyroError(
+        f"{function} was given {value!r}, expected a pixel of getPixel(picture, x, y), or a color of makeColor(...)."
+    )
+
+
 def getWidth(picture: Picture) -> int:
     """How many columns of pixels a picture has."""
-    return picture.width
+    return _a_picture("getWidth", picture).width
 
 
 def getHeight(picture: Picture) -> int:
     """How many rows of pixels a picture has."""
-    return picture.height
+    return _a_picture("getHeight", picture).height
 
 
 def getPixel(picture: Picture, x: int, y: int) -> Pixel:
@@ -353,120 +384,120 @@ def getPixel(picture: Picture, x: int, y: int) -> Pixel:
     Raises:
         MyroError: There is none.
     """
-    return picture.getPixel(x, y)
+    return _a_picture("getPixel", picture).getPixel(x, y)
 
 
 def getPixels(picture: Picture) -> Iterator[Pixel]:
     """Each pixel of a picture in turn, for loops: `for pixel in getPixels(picture):`."""
-    return picture.getPixels()
+    return _a_picture("getPixels", picture).getPixels()
 
 
 def setPixel(picture: Picture, x: int, y: int, color: Any) -> None:
     """Color the pixel in column x and row y."""
-    picture.setColor(x, y, color)
+    _a_picture("setPixel", picture).setColor(x, y, color)
 
 
 def getX(pixel: Pixel) -> int:
     """The column of a pixel, from 0 at the left."""
-    return pixel.x
+    return _a_pixel("getX", pixel).x
 
 
 def getY(pixel: Pixel) -> int:
     """The row of a pixel, from 0 at the top."""
-    return pixel.y
+    return _a_pixel("getY", pixel).y
 
 
 def getRed(pixel: Pixel | Color) -> int:
     """How red a pixel or a color is, 0 to 255."""
-    return pixel.getRGB()[0]
+    return _colored("getRed", pixel).getRGB()[0]
 
 
 def getGreen(pixel: Pixel | Color) -> int:
     """How green a pixel or a color is, 0 to 255."""
-    return pixel.getRGB()[1]
+    return _colored("getGreen", pixel).getRGB()[1]
 
 
 def getBlue(pixel: Pixel | Color) -> int:
     """How blue a pixel or a color is, 0 to 255."""
-    return pixel.getRGB()[2]
+    return _colored("getBlue", pixel).getRGB()[2]
 
 
 def getGray(pixel: Pixel | Color) -> int:
     """How bright a pixel or a color is, 0 to 255: the mean of red, green and blue, rounded down."""
-    return sum(pixel.getRGB()) // 3
+    return sum(_colored("getGray", pixel).getRGB()) // 3
 
 
 def getAlpha(pixel: Pixel | Color) -> int:
     """How opaque a pixel or a color is, 0 to 255."""
-    return pixel.getAlpha()
+    return _colored("getAlpha", pixel).getAlpha()
 
 
 def getColor(pixel: Pixel | Color) -> Color:
     """The color of a pixel."""
-    return pixel.getColor()
+    return _colored("getColor", pixel).getColor()
 
 
 def getRGB(pixel_or_color: Pixel | Color) -> tuple[int, int, int]:
     """Red, green and blue of a pixel or a color, each 0 to 255."""
-    return pixel_or_color.getRGB()
+    return _colored("getRGB", pixel_or_color).getRGB()
 
 
 def getRGBA(pixel_or_color: Pixel | Color) -> tuple[int, int, int, int]:
     """Red, green, blue and alpha of a pixel or a color, each 0 to 255."""
-    return pixel_or_color.getRGBA()
+    return _colored("getRGBA", pixel_or_color).getRGBA()
 
 
 def setRed(pixel: Pixel | Color, value: float) -> None:
     """Set how red a pixel is; limited to 0..255."""
-    _, green, blue = pixel.getRGB()
+    _, green, blue = _colored("setRed", pixel).getRGB()
     pixel.setRGB((value, green, blue))
 
 
 def setGreen(pixel: Pixel | Color, value: float) -> None:
     """Set how green a pixel is; limited to 0..255."""
-    red, _, blue = pixel.getRGB()
+    red, _, blue = _colored("setGreen", pixel).getRGB()
     pixel.setRGB((red, value, blue))
 
 
 def setBlue(pixel: Pixel | Color, value: float) -> None:
     """Set how blue a pixel is; limited to 0..255."""
-    red, green, _ = pixel.getRGB()
+    red, green, _ = _colored("setBlue", pixel).getRGB()
     pixel.setRGB((red, green, value))
 
 
 def setGray(pixel: Pixel | Color, value: float) -> None:
     """Make a pixel gray; limited to 0..255."""
-    pixel.setRGB((value, value, value))
+    _colored("setGray", pixel).setRGB((value, value, value))
 
 
 def setAlpha(pixel: Pixel | Color, value: float) -> None:
     """Set how opaque a pixel or a color is; limited to 0..255."""
-    pixel.setAlpha(value)
+    _colored("setAlpha", pixel).setAlpha(value)
 
 
 def setColor(pixel: Pixel | Color, color: Any) -> None:
     """Give a pixel a color."""
-    pixel.setColor(color)
+    _colored("setColor", pixel).setColor(color)
 
 
 def setRGB(pixel_or_color: Pixel | Color, rgb: Sequence[float]) -> None:
     """Set red, green and blue of a pixel or a color: `setRGB(pixel, (255, 128, 0))`."""
-    pixel_or_color.setRGB(rgb)
+    _colored("setRGB", pixel_or_color).setRGB(rgb)
 
 
 def setRGBA(pixel_or_color: Pixel | Color, rgba: Sequence[float]) -> None:
     """Set red, green, blue and alpha of a pixel or a color."""
-    pixel_or_color.setRGBA(rgba)
+    _colored("setRGBA", pixel_or_color).setRGBA(rgba)
 
 
 def makeLighter(color: Pixel | Color) -> None:
     """Move each part of a pixel or a color 35 % of the way towards white."""
-    color.makeLighter()
+    _colored("makeLighter", color).makeLighter()
 
 
 def makeDarker(color: Pixel | Color) -> None:
     """Leave 65 % of each part of a pixel or a color."""
-    color.makeDarker()
+    _colored("makeDarker", color).makeDarker()
 
 
 class Array:

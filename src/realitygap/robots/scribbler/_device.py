@@ -24,7 +24,8 @@ class RobotInfo:
     Attributes:
         model: "s1", "s2" (also an S3), or None: a Fluke without a robot.
         fluke: "none", "1" or "2".
-        robot_version, fluke_version: Of the firmware, as it says; empty where there is none.
+        robot_version: Of the firmware, as it says; empty where there is no robot.
+        fluke_version: Of the Fluke's, likewise.
         port: Its name.
         label: What figures say of it.
     """

@@ -51,11 +51,12 @@ except ImportError:
 # whoever else has a sitecustomize gets it as before
 _here = os.path.dirname(os.path.abspath(__file__))
 sys.path[:] = [_place for _place in sys.path if os.path.abspath(_place) != _here]
-sys.modules.pop("sitecustomize", None)
+_this = sys.modules.pop("sitecustomize", None)
 try:
     import sitecustomize
 except ImportError:
-    pass
+    if _this is not None:
+        sys.modules["sitecustomize"] = _this
 """
 
 

@@ -240,6 +240,13 @@ class Emulator:
         if self.model == "s2" and self.fluke is None:
             self.robot.reset(self._now)
 
+    def overload(self) -> None:
+        """Somebody holds the wheels: too much current stops an S2 until it is reset; it answers nothing."""
+        motors = self.table.motors
+        self.table.advance_to(self._now)
+        if isinstance(motors, S2Motors):
+            motors.trip()
+
     # -- what an observer sees --
 
     @property
@@ -277,8 +284,9 @@ class Emulator:
     def wheel_speeds(self) -> tuple[float, float]:
         """How fast the wheels turn, left and right as seen by the end that is ahead [m/s]."""
         self.table.advance_to(self._now)
-        left, right = self.table.wheels if self.table.motors.turning else (0.0, 0.0)
-        return (-right, -left) if self.fluke_ahead else (left, right)
+        motors = self.table.motors
+        left, right = motors.speeds() if motors.turning else (0.0, 0.0)
+        return (0.0 - right, 0.0 - left) if self.fluke_ahead else (left, right)
 
     def path(self) -> NDArray[np.float64]:
         """(t, 4) time [s], x [m], y [m] and heading [rad] of the pen since it was placed, up to now."""

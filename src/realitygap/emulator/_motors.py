@@ -27,9 +27,6 @@ STEP_SPEED = COUNT / 0.020  # one step of speed: a count in 20 ms [m/s]
 PATH_SPEED = 7  # until a client chooses another; Myro's default
 TOP_STEP = 15
 STATISTICS_NS = 100 * MILLISECOND
-STRAIN_STEPS = (
-    100  # steps of the simulation for which blocked wheels may pull at full current before the S2 gives up
-)
 
 
 class Motors(Protocol):
@@ -52,8 +49,8 @@ class Motors(Protocol):
         """Left and right for the next step of the simulation [m/s]."""
         ...
 
-    def rolled(self, now: int, left: float, right: float) -> None:
-        """Learn how far the wheels rolled in it [m]."""
+    def turned(self, now: int, left: float, right: float, *, slipping: bool) -> None:
+        """Learn how far the wheels turned in it [m], and whether in vain."""
         ...
 
     @property
@@ -67,7 +64,10 @@ class S1Motors:
 
     Args:
         trim: The first four bytes of its data: for fast ahead, slow ahead, slow back and fast back, 127 for none.
-            Above 127 the right wheel is slowed, below it the left one, by a tenth of a command a unit.
+            Ahead, above 127 the left wheel is slowed by (trim - 127) / 127 of full speed, below 127 the right one;
+            back, it is the other way round.
+
+    Source: scribbler_server.bs2 and the comment on it in Myro's robots/scribbler.py.
     """
 
     def __init__(self, trim: bytearray) -> None:
@@ -77,19 +77,16 @@ class S1Motors:
     def drive(self, right: int, left: int) -> None:
         """Take the two bytes of SET_MOTORS."""
         self._bytes = (left, right)
-        speeds = [max(-1.0, min(1.0, (byte - 100) / 100)) for byte in (left, right)]
-        self._speeds = self._trimmed(speeds[0], speeds[1])
+        speeds = (self._trimmed(left, side=1), self._trimmed(right, side=-1))
+        self._speeds = (speeds[0] * S1_TOP_SPEED, speeds[1] * S1_TOP_SPEED)
 
-    def _trimmed(self, left: float, right: float) -> tuple[float, float]:
-        fast = max(abs(left), abs(right)) > 0.5
-        ahead = left + right >= 0
-        trim = self._trim[(0 if fast else 1) if ahead else (3 if fast else 2)] - 127
-        slower = abs(trim) / 1000
-        if trim > 0:
-            right = math.copysign(max(0.0, abs(right) - slower), right)
-        elif trim < 0:
-            left = math.copysign(max(0.0, abs(left) - slower), left)
-        return left * S1_TOP_SPEED, right * S1_TOP_SPEED
+    def _trimmed(self, byte: int, side: int) -> float:
+        """Speed of a wheel, -1 to 1; side is 1 for the left one."""
+        speed = max(-1.0, min(1.0, (byte - 100) / 100))
+        ahead, fast = speed > 0, abs(speed) > 0.5
+        trim = self._trim[(0 if fast else 1) if ahead else (3 if fast else 2)]
+        slower = (trim - 127) / 127 * (side if ahead else -side)
+        return math.copysign(max(0.0, abs(speed) - max(0.0, slower)), speed)
 
     def stop(self) -> None:
         """Stop at once."""
@@ -105,7 +102,7 @@ class S1Motors:
         """Left and right [m/s]."""
         return self._speeds
 
-    def rolled(self, now: int, left: float, right: float) -> None:
+    def turned(self, now: int, left: float, right: float, *, slipping: bool) -> None:
         """Nothing is counted."""
 
     @property
@@ -136,8 +133,7 @@ class S2Motors:
     def __init__(self) -> None:
         self.encoders = [0.0, 0.0]  # [counts]
         self.tripped = False  # too much current: nothing moves until a reset
-        self._strained = 0
-        self._recent: deque[tuple[int, float, float]] = deque()
+        self._recent: deque[tuple[int, float, float, bool]] = deque()
         self._idler_ns = 0
         self._shares = (0.0, 0.0)
         self._step = self._target = self._phase = 0
@@ -216,25 +212,22 @@ class S2Motors:
         speed = counts * COUNT / STEP_S
         return self._shares[0] * speed, self._shares[1] * speed
 
-    def rolled(self, now: int, left: float, right: float) -> None:
-        """Count, and choose the next step of speed."""
+    def turned(self, now: int, left: float, right: float, *, slipping: bool) -> None:
+        """Count, and choose the next step of speed; the idler stands still while the wheels slip."""
         counts = (left / COUNT, right / COUNT)
         self.encoders[0] += counts[0]
         self.encoders[1] += counts[1]
-        self._recent.append((now, *counts))
+        self._recent.append((now, *counts, slipping))
         while self._recent[0][0] <= now - STATISTICS_NS:
             self._recent.popleft()
-        if left or right:
+        if not slipping:
             self._idler_ns = now
-        self._strain(blocked=not (left or right))
         self._go_on(max(abs(counts[0]), abs(counts[1])))
 
-    def _strain(self, *, blocked: bool) -> None:
-        """Blocked wheels pull too much current at the path speed only; the firmware allows less than that."""
-        self._strained = self._strained + 1 if blocked and self._step == TOP_STEP else 0
-        if self._strained > STRAIN_STEPS:
-            self.stop()
-            self.tripped = True
+    def trip(self) -> None:
+        """The current is too high: nothing moves until a reset."""
+        self.stop()
+        self.tripped = True
 
     def _go_on(self, counts: float) -> None:
         if self._left is not None:
@@ -269,7 +262,7 @@ class S2Motors:
         """
         fresh = [entry for entry in self._recent if entry[0] > now - STATISTICS_NS]
         left, right = (sum(entry[wheel] for entry in fresh) for wheel in (1, 2))
-        idler = min(63, int(abs(left + right) / 4))
+        idler = min(63, int(abs(sum(entry[1] + entry[2] for entry in fresh if not entry[3])) / 4))
         since = min(255, (now - self._idler_ns) // nanoseconds(0.1))
         wheels = (max(-128, min(127, int(counts))) & 0xFF for counts in (left, right))
         moving = 3 if self.turning else 0

@@ -327,7 +327,8 @@ def info_line(answer: bytes) -> InfoLine:
 
 
 _PLAIN_INFO = re.compile(
-    rb"[Pp \0]*((fluke|dongle):[\d.]+(, ?|\n$))?((robot-version|api):[\d.]+,robot:scribbler[23]?,mode:serial\n)?$",
+    rb"[Pp \0]*((fluke|dongle):\d\.\d+\.\d+(, ?|\n$))?"
+    rb"((robot-version|api):\d\.\d+\.\d+,robot:scribbler[23]?,mode:serial\n)?$",
     re.IGNORECASE,
 )
 

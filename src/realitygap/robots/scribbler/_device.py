@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -36,6 +37,10 @@ class RobotInfo:
     fluke_version: str
     port: str
     label: Label
+
+    def has_fluke(self, *version: int) -> bool:
+        """Whether there is a Fluke with at least this firmware."""
+        return self.fluke != "none" and numbers(self.fluke_version) >= version
 
     def __str__(self) -> str:
         robot = {"s1": "S1", "s2": "S2", None: "no robot"}[self.model]
@@ -102,6 +107,11 @@ class Device:
     def need_fluke_2(self, what: str) -> None:
         """Raise `RobotError` where there is no Fluke 2."""
         self._need(what, self.info.fluke == "2", "a Fluke 2")
+
+
+def numbers(version: str) -> tuple[int, ...]:
+    """A version to be compared with others."""
+    return tuple(int(each) for each in re.findall(r"\d+", version))
 
 
 def limited(name: str, value: float, low: float, high: float) -> float:

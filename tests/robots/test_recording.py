@@ -134,7 +134,7 @@ def test_a_robot_that_nobody_reached_leaves_a_recording_of_the_attempts(tmp_path
         Scribbler(port, record=tmp_path / "one.jsonl")
     recording = read_recording(tmp_path / "one.jsonl")
     assert "No Scribbler answers" in recording.header["error"]
-    assert len([line for line in recording.lines if line["name"] == "info"]) == 4
+    assert len([line for line in recording.lines if line["name"] == "info"]) == 3
     with pytest.raises(RecordError, match="names no label, step_s, n_sensors: no robot answered"):
         RecordedRobot(recording)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -112,16 +113,17 @@ def _serve(
             view = LiveView(f"{emulator.model}, Fluke {emulator.fluke_model}: {channel.name}")
         server = Server(emulator, channel, speed=speed, witness=witness, watch=view.show if view else None)
         stack.enter_context(server)
+        if command is None:
+            stack.enter_context(_ended_by_signals(server))
         typer.echo(server.name)
         if server.witness_address and not quiet:
             typer.echo(f"witness {server.witness_address}")
         sys.stdout.flush()
         if command is not None:
-            stack.callback(sys.stdout.flush)
             raise typer.Exit(_run(server, command))
         if view:
             stack.enter_context(view)
-        _until_told(server)
+        server.run()
 
 
 def _run(server: Server, command: str) -> int:
@@ -132,15 +134,16 @@ def _run(server: Server, command: str) -> int:
     return run_client(command, server.name)
 
 
-def _until_told(server: Server) -> None:
-    """Serve until Ctrl-C or SIGTERM."""
+@contextmanager
+def _ended_by_signals(server: Server) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end a server as if it had come to its end."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         server.stop()
 
     before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        server.run()
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -284,8 +284,9 @@ class Emulator:
     def wheel_speeds(self) -> tuple[float, float]:
         """How fast the wheels turn, left and right as seen by the end that is ahead [m/s]."""
         self.table.advance_to(self._now)
-        left, right = self.table.wheels if self.table.motors.turning else (0.0, 0.0)
-        return (-right, -left) if self.fluke_ahead else (left, right)
+        motors = self.table.motors
+        left, right = motors.speeds() if motors.turning else (0.0, 0.0)
+        return (0.0 - right, 0.0 - left) if self.fluke_ahead else (left, right)
 
     def path(self) -> NDArray[np.float64]:
         """(t, 4) time [s], x [m], y [m] and heading [rad] of the pen since it was placed, up to now."""

@@ -71,10 +71,13 @@ class BoxOnWheels:
         self.pose = Pose(*map(float, pose))
         self.stalled = False
         self._free = 0.0  # how far the origin can go before the outline may touch a wall [m]
+        self._refused: tuple[float, float] | None = None  # how the wheels turned when it was blocked here
 
     def advance(self, left: float, right: float, seconds: float) -> tuple[float, float]:
         """Move on along the circle that the wheels' speeds make."""
         rolled_left, rolled_right = left * seconds, right * seconds
+        if self._refused == (rolled_left, rolled_right):
+            return self._refused
         far = (rolled_left + rolled_right) / 2
         turn = (rolled_right - rolled_left) / self.spacing
         x, y, heading = self.pose
@@ -82,9 +85,9 @@ class BoxOnWheels:
         chord = far * (math.sin(turn / 2) / (turn / 2)) if abs(turn) > 1e-9 else far
         pose = Pose(x + chord * math.cos(middle), y + chord * math.sin(middle), heading + turn)
         if self._is_blocked(pose, abs(chord)):
-            self.stalled = True
+            self.stalled, self._refused = True, (rolled_left, rolled_right)
         else:
-            self.pose, self.stalled = pose, False
+            self.pose, self.stalled, self._refused = pose, False, None
         return rolled_left, rolled_right
 
     def _is_blocked(self, pose: Pose, moved: float) -> bool:

@@ -30,7 +30,6 @@ class Table:
     def __init__(self, robot: SimulatedRobot, motors: Motors, battery: Battery, arena: Arena) -> None:
         self.robot, self.motors, self.battery, self.arena = robot, motors, battery, arena
         self.time = 0  # up to where it has been computed [ns]
-        self.wheels = (0.0, 0.0)  # how fast they turned in the last step [m/s]
         self._begin_path()
 
     def place(self, pose: Pose, now: int) -> None:
@@ -38,7 +37,6 @@ class Table:
         self.motors.stop()
         self.robot.place(pose)
         self.time = now
-        self.wheels = (0.0, 0.0)
         self._begin_path()
 
     def advance_to(self, now: int) -> None:
@@ -59,7 +57,6 @@ class Table:
         whole = (now - self.time) // STEP_NS * STEP_NS
         self.battery.drain(0.0, whole)
         self.time += whole
-        self.wheels = (0.0, 0.0)
 
     def _step(self) -> None:
         left, right = self.motors.speeds()
@@ -67,7 +64,6 @@ class Table:
         self.battery.drain(self.motors.load, STEP_NS)
         self.time += STEP_NS
         self.motors.turned(self.time, *turned, slipping=self.robot.stalled)
-        self.wheels = (turned[0] / STEP_S, turned[1] / STEP_S)
         if not self.robot.stalled:
             self._note()
 

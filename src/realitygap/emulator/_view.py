@@ -15,7 +15,8 @@ from ._emulator import Emulator
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-WIDTH = 72  # characters of the picture
+WIDTH, HEIGHT = 72, 30  # characters of the picture at most
+FRAME_WIDTH, FRAME_HEIGHT = 4, 9  # of the terminal's characters that the picture must leave free
 ASPECT = 2.0  # a character is twice as high as wide
 ARROWS = "→↗↑↖←↙↓↘"
 NAMES = {int(op): op.name for op in Op}
@@ -43,7 +44,9 @@ class LiveView:
         from rich.panel import Panel
         from rich.text import Text
 
-        text = "\n".join([*picture(emulator), "", *status(emulator)])
+        size = self._live.console.size
+        room = (min(WIDTH, size.width - FRAME_WIDTH), min(HEIGHT, size.height - FRAME_HEIGHT))
+        text = "\n".join([*picture(emulator, *room), "", *status(emulator)])
         return Panel(Text(text, no_wrap=True), title=self._title, expand=False)
 
     def __enter__(self) -> LiveView:
@@ -56,8 +59,9 @@ class LiveView:
         self._live.stop()
 
 
-def picture(emulator: Emulator, width: int = WIDTH) -> list[str]:
-    """The arena from above as lines of characters: walls #, the pen's path ., the robot as an arrow."""
+def picture(emulator: Emulator, width: int = WIDTH, height: int = HEIGHT) -> list[str]:
+    """The arena from above in at most so many characters: walls #, the pen's path ·, the robot as an arrow."""
+    width, height = max(10, width), max(5, height)
     arena = emulator.scene.arena
     path = emulator.path()
     walls = np.array(arena.walls, dtype=float).reshape(-1, 4)
@@ -66,8 +70,9 @@ def picture(emulator: Emulator, width: int = WIDTH) -> list[str]:
     xs = np.concatenate([walls[:, 0], walls[:, 2], [grid.x, far_x]])
     ys = np.concatenate([walls[:, 1], walls[:, 3], [grid.y, far_y]])
     left, low = float(xs.min()), float(ys.min())
-    scale = (width - 1) / max(float(np.ptp(xs)), 1e-6)  # characters in a meter
-    height = max(1, min(40, round(float(np.ptp(ys)) * scale / ASPECT))) + 1
+    wide, deep = max(float(np.ptp(xs)), 1e-6), max(float(np.ptp(ys)), 1e-6)
+    scale = min((width - 1) / wide, ASPECT * (height - 1) / deep)  # characters in a meter
+    width, height = round(wide * scale) + 1, round(deep * scale / ASPECT) + 1
     canvas = np.full((height, width), " ")
 
     def put(x: np.ndarray, y: np.ndarray, mark: str) -> None:
@@ -77,7 +82,7 @@ def picture(emulator: Emulator, width: int = WIDTH) -> list[str]:
         canvas[row[seen], column[seen]] = mark
 
     put(path[-DOTS:, 1], path[-DOTS:, 2], "·")
-    share = np.linspace(0, 1, 4 * width)[:, None]
+    share = np.linspace(0, 1, 4 * (width + height))[:, None]
     put(
         (walls[:, 0] + share * (walls[:, 2] - walls[:, 0])).ravel(),
         (walls[:, 1] + share * (walls[:, 3] - walls[:, 1])).ravel(),

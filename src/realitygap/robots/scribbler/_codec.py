@@ -77,7 +77,8 @@ class MotorStats(NamedTuple):
     """How an S2 moves.
 
     Attributes:
-        left, right: Encoder counts of the last 0.1 s, -128 to 127.
+        left: Encoder counts of the last 0.1 s, -128 to 127.
+        right: Likewise.
         idler_age_s: Since when the idler wheel has not moved [s].
         idler_speed: 0 to 63.
         moving: Whether a motor turns.
@@ -96,8 +97,8 @@ class Blob(NamedTuple):
     """The patch of the color asked for: how many pixels, and their middle in columns and rows of the picture."""
 
     n_pixels: int
-    x: int
-    y: int
+    column: int
+    row: int
 
 
 def packet(op: Op, arguments: bytes = b"") -> bytes:
@@ -263,7 +264,7 @@ def motor_stats(answer: bytes) -> MotorStats:
 
 
 def blob(answer: bytes) -> Blob:
-    """Count, x and y from four bytes."""
+    """Count, column and row from four bytes."""
     return Blob(*struct.unpack(">HBB", answer))
 
 
@@ -289,7 +290,8 @@ class InfoLine(NamedTuple):
     Attributes:
         model: "s1", "s2" (also an S3), or None where no robot answers.
         fluke: "none", "1" or "2".
-        robot_version, fluke_version: As they came; empty where there is none.
+        robot_version: As it came; empty where there is no robot.
+        fluke_version: As it came; empty where there is no Fluke.
     """
 
     model: str | None
@@ -325,7 +327,8 @@ def info_line(answer: bytes) -> InfoLine:
 
 
 _PLAIN_INFO = re.compile(
-    rb"[Pp \0]*((fluke|dongle):[\d.]+(, ?|\n$))?((robot-version|api):[\d.]+,robot:scribbler[23]?,mode:serial\n)?$",
+    rb"[Pp \0]*((fluke|dongle):\d\.\d+\.\d+(, ?|\n$))?"
+    rb"((robot-version|api):\d\.\d+\.\d+,robot:scribbler[23]?,mode:serial\n)?$",
     re.IGNORECASE,
 )
 

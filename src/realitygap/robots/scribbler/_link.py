@@ -49,7 +49,9 @@ RECOVERIES = 3
 REOPENINGS = 8
 """How often a port that hung up is opened again, once a second."""
 GREETINGS = 4
-"""How often a robot is asked who it is; one that was reset as its port was opened is back at the third."""
+"""How often a robot is asked who it is."""
+SILENT_GREETINGS = 3
+"""How often if nothing at all comes: one that was reset as its port was opened is back by then."""
 STRANGER_PROBES = 8
 """Enough to release a Fluke, and less than a packet for a robot that has none."""
 LONGEST_LINE = 512
@@ -107,7 +109,8 @@ class Exchange(NamedTuple):
         time_s: When it was sent, by the port's clock [s].
         took_s: Until its answer was complete, or given up [s].
         name: Of the command.
-        sent, answered: The bytes.
+        sent: Its bytes.
+        answered: The bytes that came.
         outcome: "ok", or what went wrong.
     """
 
@@ -533,12 +536,12 @@ class Link:
                 try:
                     if greeting:
                         self._await_silence(FORGET_S)
+                    if greeting == 1:
                         self._release_counter(STRANGER_PROBES)
-                        self._await_silence(FORGET_S)
                     answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
                     if info == seen or codec.is_plain_info(answer):
                         return info
-                    seen, fault = info, _Fault(f"{answer!r} is not a plain answer", ProtocolError)
+                    seen, fault = info, _Fault(f"{answer[:60]!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
                     raise _HangUp(f"The port hung up ({error})", RobotError) from error
             except _HangUp as happened:
@@ -547,9 +550,11 @@ class Link:
                     self._reopen(happened)
             except _Fault as happened:
                 fault = happened
+                if greeting == SILENT_GREETINGS - 1 and not fault.got:
+                    break
         took = self.clock.now() - since
         raise fault.kind(
-            f"No Scribbler answers on {self.name}, asked {GREETINGS} times within {took:.0f} s. {fault}. "
+            f"No Scribbler answers on {self.name}, asked {greeting + 1} times within {took:.0f} s. {fault}. "
             "Is the robot on, paired, and not in use by another program?"
         ) from fault
 

@@ -1,0 +1,139 @@
+"""`realitygap emulate` as a user meets it."""
+
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import serial
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.emulator import connect_witness
+from realitygap.errors import RobotError
+
+COMMAND = [sys.executable, "-m", "realitygap", "emulate", "scribbler"]
+MOTORS = bytes((109, 150, 150)) + bytes(6)
+
+
+def start(*options):
+    process = subprocess.Popen(
+        [*COMMAND, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    return process, process.stdout.readline().strip()
+
+
+def end(process, number=signal.SIGTERM):
+    process.send_signal(number)
+    assert process.wait(20) == 0
+    assert process.stderr.read() == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_port_is_printed_first_and_linked_until_it_is_told_to_end(tmp_path, number):
+    link = tmp_path / "robot"
+    process, name = start("--model", "s1", "--fluke", "none", "--link", str(link), "--quiet")
+    assert str(link.readlink()) == name
+    with serial.Serial(name, timeout=10.0) as port:
+        port.write(MOTORS)
+        assert port.read(20)[:9] == MOTORS
+    end(process, number)
+    assert not link.is_symlink()
+
+
+def test_on_a_tcp_port_with_a_witness_and_a_state_that_stays(tmp_path):
+    state = tmp_path / "robot.json"
+    for expected in (b"Scribby ", b"Rosie   "):
+        options = ("--tcp", "0", "--witness", "0", "--state", str(state), "--timing", "off", "--speed", "5")
+        process, name = start(*options)
+        address = process.stdout.readline().split()[1]
+        with serial.serial_for_url(name, timeout=10.0) as port, connect_witness(address) as witness:
+            port.write(bytes((78,)) + bytes(8))
+            assert port.read(17)[9:] == expected
+            port.write(bytes((110, *b"Rosie   ")))
+            port.read(20)
+            port.write(MOTORS)
+            port.read(20)
+            assert witness.motors() != (0.0, 0.0)
+        end(process)
+
+
+CLIENT = """
+import os, sys, serial
+assert sys.argv[1] == os.environ["REALITYGAP_PORT"]
+port = serial.Serial(sys.argv[1], timeout=10)
+port.setDTR(0)  # a pseudo-terminal refuses this; Myro 2.9.9 does it, and would wait for ever
+port.write(bytes((65,)) + bytes(8))
+sys.exit(7 if len(port.read(20)) == 20 else 1)
+"""
+
+
+def test_a_client_that_sets_dtr_runs_with_exec_and_its_status_comes_back(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(CLIENT)
+    command = f"{sys.executable} {program} {{port}}"
+    done = subprocess.run(
+        [*COMMAND, "--exec", command], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (7, "")
+
+
+def test_without_exec_a_pseudo_terminal_refuses_dtr():
+    process, name = start("--quiet")
+    with serial.Serial(name) as port, pytest.raises(OSError, match="Inappropriate ioctl"):
+        port.setDTR(0)
+    end(process)
+
+
+def test_another_sitecustomize_is_still_found(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.found_it = True\n")
+    command = f'{sys.executable} -c "import sys; sys.exit(not sys.found_it)"'
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(
+        [*COMMAND, "--exec", command], env=environment, capture_output=True, timeout=60, check=False
+    )
+    assert done.returncode == 0
+
+
+def test_in_a_terminal_there_is_a_live_view():
+    master, slave = pty.openpty()
+    process = subprocess.Popen([*COMMAND, "--tcp", "0"], stdout=slave, stderr=slave, stdin=slave)
+    os.close(slave)
+    seen, until = b"", time.monotonic() + 20
+    while b"last command" not in seen and time.monotonic() < until:
+        if select.select([master], [], [], 0.5)[0]:
+            seen += os.read(master, 65536)
+    process.send_signal(signal.SIGINT)
+    while process.poll() is None:
+        if select.select([master], [], [], 0.2)[0]:
+            try:
+                os.read(master, 65536)
+            except OSError:
+                break
+    assert process.wait(20) == 0
+    os.close(master)
+    text = seen.decode()
+    for part in ("socket://127.0.0.1:", "LEDs", "battery", "heading", "#####"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["robbie"], "Unknown robot 'robbie'"),
+        (["scribbler", "--model", "s9"], "s1 or s2"),
+        (["scribbler", "--fluke", "3"], "none, 1, 2"),
+        (["scribbler", "--arena", "nowhere.toml"], "No arena"),
+        (["scribbler", "--faults", "drip=1"], "Did you mean 'drop'"),
+        (["scribbler", "--timing", "fast"], "on or off"),
+        (["scribbler", "--tcp", "0", "--link", "x"], "Give one of them"),
+    ],
+)
+def test_a_wrong_option_gets_one_clear_message(options, says):
+    result = CliRunner().invoke(app, ["emulate", *options])
+    assert isinstance(result.exception, RobotError)
+    assert says in str(result.exception)

@@ -1,0 +1,111 @@
+"""Whole programs on a pseudo-terminal: however one ends, the wheels stand still afterwards."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from realitygap.emulator import Emulator, Server, serve_pty
+from realitygap.errors import RobotError
+from realitygap.robots.scribbler import Scribbler, label_of
+
+DRIVE = """
+import sys, time
+from realitygap.robots.scribbler import Scribbler
+robot = Scribbler(sys.argv[1])
+robot.motors(1, 1)
+print("driving", flush=True)
+"""
+IN_A_BLOCK = """
+import sys, time
+from realitygap.robots.scribbler import Scribbler
+with Scribbler(sys.argv[1]) as robot:
+    robot.motors(1, 1)
+    print("driving", flush=True)
+    while True:
+        robot.observe()
+"""
+WAYS_OUT = {
+    "the program ends without closing": (DRIVE, None, 0),
+    "an exception that nobody catches": (DRIVE + "1 / 0", None, 1),
+    "sys.exit": (DRIVE + "sys.exit(3)", None, 3),
+    "Ctrl-C": (DRIVE + "time.sleep(60)", signal.SIGINT, -signal.SIGINT),
+    "Ctrl-C in a block": (IN_A_BLOCK, signal.SIGINT, -signal.SIGINT),
+    "SIGTERM": (DRIVE + "time.sleep(60)", signal.SIGTERM, 128 + signal.SIGTERM),
+    "SIGTERM in a block": (IN_A_BLOCK, signal.SIGTERM, 128 + signal.SIGTERM),
+    "a closed terminal": (DRIVE + "time.sleep(60)", signal.SIGHUP, 128 + signal.SIGHUP),
+    "the robot is thrown away": (DRIVE + "del robot; print('gone'); time.sleep(60)", signal.SIGKILL, -9),
+}
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    with serve_pty(Emulator("s2", "1"), speed=20.0) as server:
+        yield server
+
+
+@pytest.mark.parametrize("way", WAYS_OUT)
+def test_the_wheels_stand_still_after(way, server):
+    program, number, status = WAYS_OUT[way]
+    with subprocess.Popen(
+        [sys.executable, "-c", program, server.name],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "driving\n"
+        if number == signal.SIGKILL:
+            assert process.stdout.readline() or True
+            time.sleep(0.3)
+        elif number is not None:
+            assert server.witness.motors() != (0.0, 0.0)
+        if number is not None:
+            process.send_signal(number)
+        assert process.wait(30) == status
+    assert server.witness.motors() == (0.0, 0.0)
+
+
+def test_a_pseudo_terminal_and_a_loopback_are_emulated_and_a_device_is_real(tmp_path, server):
+    assert label_of(server.name) == "EMULATED"
+    (tmp_path / "robot").symlink_to(server.name)
+    assert label_of(str(tmp_path / "robot")) == "EMULATED"
+    assert label_of("socket://127.0.0.1:7000") == "EMULATED"
+    assert label_of("socket://localhost:7000") == "EMULATED"
+    assert label_of("rfc2217://[::1]:7000") == "EMULATED"
+    assert label_of("emulator://s2?fluke=2") == "EMULATED"
+    assert label_of("/dev/ttyS0") == "REAL"
+    assert label_of("/dev/rfcomm0") == "REAL"
+    assert label_of("COM3") == "REAL"
+    assert label_of("socket://192.0.2.1:7000") == "REAL"
+
+
+def test_the_driver_works_through_a_link_to_a_pseudo_terminal_with_the_platform_s_name(tmp_path, server):
+    (tmp_path / "robot").symlink_to(server.name)
+    with Scribbler(f"scribbler:{tmp_path / 'robot'}") as robot:
+        assert robot.label == "EMULATED"
+        assert robot.info.fluke == "1"
+        assert len(robot.observe().readings) == 3
+
+
+def test_two_programs_on_one_port_are_told_apart_by_an_error(server):
+    with Scribbler(server.name), pytest.raises(RobotError, match="Another program holds it; close that one"):
+        Scribbler(server.name)
+
+
+@pytest.mark.parametrize(
+    ("port", "message"),
+    [
+        ("/dev/no-such-port", r"cannot be opened: .*No such file.*`realitygap robot list` names the ports"),
+        ("socket://127.0.0.1:1", r"cannot be opened: .*refused.*Is the address right"),
+        ("nonsense://x", r"nonsense://x cannot be opened: .*nonsense"),
+        ("", r" cannot be opened"),
+    ],
+)
+def test_a_port_that_cannot_be_opened_is_one_message_with_advice(port, message):
+    with pytest.raises(RobotError, match=message):
+        Scribbler(port)

@@ -587,6 +587,21 @@ def test_infrared_messages(robot):
         myro.sendIRMessage("né")
 
 
+def test_messages_go_to_the_sides_that_were_chosen(full, monkeypatch):
+    chosen = {}
+    monkeypatch.setattr(full._driver, "set_ir_emitters", lambda **sides: chosen.update(sides))
+    myro.setCommunicateAll(False)
+    assert chosen == {"left": False, "center": False, "right": False}
+    for side in ("left", "center", "right"):
+        getattr(myro, f"setCommunicate{side.title()}")()
+        assert chosen[side]
+        assert sum(chosen.values()) == 1
+        getattr(myro, f"setCommunicate{side.title()}")(False)
+        assert not any(chosen.values())
+    myro.setCommunicateAll()
+    assert all(chosen.values())
+
+
 def test_what_only_a_fluke_2_has(robot, capsys):
     acts = (lambda: myro.servo(0, 100), lambda: myro.getFlukeLog(), lambda: myro.enablePanNetworking())
     for act in acts:

@@ -44,7 +44,17 @@ def test_the_same_seed_gives_the_same_run_and_another_one_another():
         return simulation.pose(), lights
 
     assert run(5) == run(5)
-    assert run(5) != run(6)
+    assert run(5)[0] != run(6)[0]
+    assert run(5)[1] != run(6)[1]
+
+
+def test_another_seed_is_other_noise_at_the_same_place():
+    def lights(seed):
+        open_sim(seed=seed, start="center")
+        return [myro.getLight() for _ in range(3)]
+
+    assert lights(5) == lights(5)
+    assert lights(5) != lights(6)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -166,6 +176,12 @@ def test_a_notebook_shows_a_robot_without_a_clock_of_its_own_whenever_the_progra
     assert "visited" in screen[-1]
     time.sleep(0.05)
     assert len(screen) == last
+
+
+def test_a_robot_that_stands_is_not_drawn_again(screen):
+    open_sim(speed=20, start="center")
+    time.sleep(0.5)
+    assert len(screen) == 1
 
 
 def test_the_view_can_be_switched_off(screen):

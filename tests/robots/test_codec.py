@@ -78,8 +78,8 @@ def test_the_info_lines_of_all_set_ups_are_plain_and_any_letter_less_is_not(setu
     assert found.fluke == (setup[-1] if "fluke" in setup else "none")
     for at in range(len(line) - 1):
         less = line[:at] + line[at + 1 :]
-        if codec.is_plain_info(less):  # a blank, or the 2 of Scribbler2, which cannot be noticed
-            assert codec.info_line(less)[:2] == found[:2] or line[at - 8 : at + 1] == b"Scribbler2"[1:], less
+        if codec.is_plain_info(less):  # one of several blanks
+            assert codec.info_line(less) == found, less
 
 
 def test_what_older_boards_call_themselves_is_understood():

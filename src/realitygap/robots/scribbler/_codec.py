@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from realitygap.errors import ProtocolError
 
-from ._opcodes import FLUKE_2_COMMANDS, FLUKE_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
+from ._opcodes import FLUKE_2_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
 
 ANSWER_S = 2.0
 """How long an answer may take to begin [s]: an S1 in the dark takes 0.4 s; the rest is for Bluetooth."""
@@ -326,21 +326,19 @@ def info_line(answer: bytes) -> InfoLine:
     return InfoLine(model, fluke, values.get("robot-version", values.get("api", "")), fluke_version)
 
 
+_FLUKE_INFO = rb"((fluke|dongle):\d\.\d+\.\d+"
+_ROBOT_INFO = rb"(robot-version|api):\d\.\d+\.\d+,robot:scribbler"
 _PLAIN_INFO = re.compile(
-    rb"[Pp \0]*((fluke|dongle):\d\.\d+\.\d+(, ?|\n$))?"
-    rb"((robot-version|api):\d\.\d+\.\d+,robot:scribbler[23]?,mode:serial\n)?$",
+    rb"P +" + _FLUKE_INFO + rb", ?)?" + _ROBOT_INFO + rb",mode:serial\n"  # an S1 sends the command back first
+    rb"|" + _FLUKE_INFO + rb",)?" + _ROBOT_INFO + rb"[23],mode:serial\n"
+    rb"|" + _FLUKE_INFO + rb"\n)",
     re.IGNORECASE,
 )
 
 
 def is_plain_info(answer: bytes) -> bool:
     """Whether an info line is letter by letter as the firmware known to us writes it."""
-    return _PLAIN_INFO.match(answer) is not None
-
-
-def fluke_arguments(op: Op, fluke: str) -> int:
-    """How many bytes follow an opcode on this Fluke."""
-    return (FLUKE_2_COMMANDS if fluke == "2" else FLUKE_COMMANDS)[op].arguments
+    return _PLAIN_INFO.fullmatch(answer) is not None
 
 
 def late_sensor_block(answer: bytes) -> SensorBlock | None:

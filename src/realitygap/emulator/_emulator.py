@@ -247,6 +247,11 @@ class Emulator:
         if isinstance(motors, S2Motors):
             motors.trip()
 
+    @property
+    def is_overloaded(self) -> bool:
+        """Whether too much current has stopped it."""
+        return isinstance(self.table.motors, S2Motors) and self.table.motors.tripped
+
     # -- what an observer sees --
 
     @property
@@ -277,7 +282,7 @@ class Emulator:
         if not all(map(math.isfinite, (x, y, heading))):
             raise ValueError(f"pose is {tuple(pose)!r}, expected three finite numbers.")
         self.table.advance_to(self._now)
-        self.robot.reckoning.forget()
+        self.robot.drop_motions()
         self.table.place(Pose(x, y, heading - self._turn), self._now)
         self.senses.restart(seed)
 

@@ -17,6 +17,7 @@ from ._robot import robot
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
+from ._trials import trials
 
 app = typer.Typer(
     name="realitygap",
@@ -57,3 +58,4 @@ app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
+app.command("trials")(trials)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from realitygap.errors import StudyError
 
 from ._browser import show_page
+from ._operator import Answers, choose_operator
 from ._results import written_report
 
 if TYPE_CHECKING:
@@ -24,7 +26,8 @@ NARROWEST = 78
 
 def run(
     study: Annotated[
-        str, typer.Argument(metavar="STUDY", help="paper, paper-choices, or a study file (.toml).")
+        str,
+        typer.Argument(metavar="STUDY", help="paper, paper-choices, paper-robot, or a study file (.toml)."),
     ],
     replicates: Annotated[
         int | None, typer.Option(min=1, help="Runs of each condition, in place of the study's.")
@@ -50,40 +53,82 @@ def run(
             "slurm:20 asks for 20 jobs.",
         ),
     ] = None,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PORT",
+            help="Of the robot that drives the conditions on the platform scribbler: /dev/rfcomm0, COM3, "
+            "socket://HOST:PORT, or an emulated one in this program, emulator://s2?speed=off.",
+        ),
+    ] = None,
+    witness: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Of an emulator in another program: it places its robot and sees what it drew.",
+        ),
+    ] = None,
+    in_flight: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VERDICT",
+            help="What becomes of a trial that was cut off: void or driven. [default: asks]",
+        ),
+    ] = None,
+    score: Annotated[
+        str, typer.Option(metavar="WHEN", help="When to ask for cells: after each trial or sheet, or later.")
+    ] = "sheet",
+    no_wait: Annotated[
+        bool, typer.Option("--no-wait", help="Drive each trial without waiting for Enter.")
+    ] = False,
+    despite_preflight: Annotated[
+        bool, typer.Option("--despite-preflight", help="Drive whatever the pre-flight finds.")
+    ] = False,
+    who: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Who counts cells. [default: your account's name]")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
     ] = False,
 ) -> None:
-    """Carry out a simulated study, or what is missing of it, and print a summary.
+    """Carry out a study, or what is missing of it, and print a summary.
 
     Interrupt it at any moment: the same command goes on where it stopped. More replicates or new conditions
     extend what is there. The results do not depend on threads, clusters, chunks or interruptions.
 
+    With --port, a robot drives the conditions on the platform scribbler: you are led through its trials, and nothing
+    that was scored is lost. Without it they are left as they are.
+
     Example: realitygap run paper --replicates 1000
+
+    Example: realitygap run paper-robot --port /dev/rfcomm0
+
+    Example: realitygap run paper-robot --port "emulator://s2?fluke=2&speed=off"
 
     In Python: realitygap.run_study("paper", replicates=1000)
     """
-    from realitygap.study import run_study
+    from realitygap.study import load_study, run_study
 
     if threads is not None and cluster is not None:
         raise StudyError(
             "--threads and --cluster exclude each other. How many threads a worker of a cluster has is said where it "
             "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
+    if witness is not None and port is None:
+        raise StudyError("--witness goes with --port: it is the witness of the robot there.")
+    resolved = load_study(study, seed=seed, replicates=replicates)
     try:
         with RunsBar(quiet=as_json) as bar:
             result = run_study(
-                study,
-                out,
-                seed=seed,
-                replicates=replicates,
-                threads=threads,
-                chunk=chunk,
-                fresh=fresh,
-                cluster=cluster,
-                tell=bar.show,
+                resolved, out, threads=threads, chunk=chunk, fresh=fresh, cluster=cluster, tell=bar.show
             )
+        if port is not None:
+            path = result.folder.path
+            answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
+            operator = choose_operator(port, witness, answers, path)
+            driven = run_study(resolved, path, port=port, operator=operator)
+            result = dataclasses.replace(result, physical=driven.physical)
     except KeyboardInterrupt:
         typer.echo(
             "Interrupted. What was published is safe; the same command goes on where it stopped.", err=True
@@ -167,7 +212,7 @@ class RunsBar:
             return
         if not self._progress.live.is_started:
             if not self._console.is_terminal:
-                self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
+                self._console.print("Compiling or loading the kernels (the first time takes some 15 s) ...")
             self._progress.start()
         if progress.waiting_for and not self._console.is_terminal:
             self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
@@ -192,6 +237,12 @@ class RunsBar:
 def _print_result(result: StudyResult, *, as_json: bool) -> None:
     from realitygap.report import summarize
 
+    there = result.n_runs or (result.physical is not None and result.physical.n_complete)
+    if not there:  # nothing to summarize yet
+        if as_json:
+            typer.echo(json.dumps({"folder": str(result.folder.path), **_physical_json(result)}, indent=2))
+        _print_physical(result, to_stderr=as_json)
+        return
     summary = summarize(result.folder)
     if as_json:
         found = {
@@ -199,9 +250,11 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
             "runs": result.n_runs,
             "computed": result.n_computed,
             "seconds": result.seconds,
+            **_physical_json(result),
             "conditions": summary.to_dicts(),
         }
         typer.echo(json.dumps(found, indent=2))
+        _print_physical(result, to_stderr=True)
         return
     from rich.console import Console
 
@@ -219,7 +272,28 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
             f"{result.n_computed} of {result.n_runs} runs computed in {result.seconds:.1f} s "
             f"({result.n_computed / result.seconds:,.0f} runs/s)."
         )
-    else:
+    elif result.n_runs:
         typer.echo(f"All {result.n_runs} runs were there already.")
+    _print_physical(result)
     typer.echo(f"Results: {path}   in Python: polars.scan_parquet({f'{path}/trials/*.parquet'!r})")
     typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")
+
+
+def _physical_json(result: StudyResult) -> dict[str, Any]:
+    return {} if result.physical is None else {"physical": dataclasses.asdict(result.physical)}
+
+
+def _print_physical(result: StudyResult, *, to_stderr: bool = False) -> None:
+    """How far the runs on a robot are, and what is to be done next."""
+    physical = result.physical
+    if physical is None:
+        return
+    left = physical.n_runs - physical.n_complete
+    driven = f" {physical.n_driven} trials were driven just now." if physical.n_driven else ""
+    typer.echo(
+        f"{physical.n_complete} of {physical.n_runs} runs on a robot are complete.{driven}", err=to_stderr
+    )
+    if physical.waiting:
+        typer.echo(physical.waiting, err=to_stderr)
+    elif left:
+        typer.echo("The same command with --port PORT drives what is left.", err=to_stderr)

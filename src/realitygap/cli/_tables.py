@@ -40,7 +40,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
                 _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
             )
             interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
-            cells.append(f"{median} {interval}\n{q25} to {q75}")
+            cells.append("not seen" if median == "-" and row["n"] else f"{median} {interval}\n{q25} to {q75}")
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))
         table.add_row(*(Text(cell) for cell in cells))

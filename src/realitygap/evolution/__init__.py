@@ -1,6 +1,6 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
-from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record
+from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
 from ._novelty import (
     NearestArchive,
@@ -30,6 +30,7 @@ __all__ = [
     "decode_all",
     "euclidean",
     "genome_from_record",
+    "genome_record",
     "largest_cell_distance",
     "network_picture",
     "random_key",

@@ -132,9 +132,7 @@ class Network:
             RecordError: The values are not a network's.
             RecordVersionError: Another version wrote them.
         """
-        return cls._from(
-            _json.checked(dict(values), _json.NetworkForm, "network", "The mapping"), "The mapping"
-        )
+        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
         """The network as JSON with a version; numbers come back bit for bit."""
@@ -251,9 +249,7 @@ class Genome:
             RecordError: The values are not a genome's.
             RecordVersionError: Another version wrote them.
         """
-        return cls._from(
-            _json.checked(dict(values), _json.GenomeForm, "genome", "The mapping"), "The mapping"
-        )
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
         """The genome as JSON with a version; numbers come back bit for bit."""
@@ -376,6 +372,20 @@ def genome_from_record(
     biases = record["biases"]
     genomes.bias[0, : len(biases)] = biases
     return Genome(genomes, 0, rules, bias_value)
+
+
+def genome_record(genome: Genome) -> dict[str, list[Any]]:
+    """What a row of results has of a genome; `genome_from_record` reads it."""
+    nodes = [node for node in genome.nodes if node.kind in ("output", "hidden")]
+    genes = genome.connections
+    return {
+        "hidden": [node.id for node in nodes if node.kind == "hidden"],
+        "biases": [node.bias for node in nodes] if genome.rules.node_bias else [],
+        **{
+            name: [getattr(gene, name) for gene in genes]
+            for name in ("innovation", "source", "target", "weight", "enabled")
+        },
+    }
 
 
 def _check_genome(form: _json.GenomeForm, where: str) -> None:

@@ -1,9 +1,9 @@
-"""Result files of simulated studies: the only code that reads or writes them.
+"""Result files of studies: the only code that reads or writes them.
 
 A `ResultsFolder` holds `study.json`, the study as resolved; `trials/CONDITION.FIRST-LAST.parquet`, one file
 per chunk of replicates, written beside, synced and renamed into place; and `log.jsonl`, times and hosts,
-outside the digest. This package handles plain dicts, arrays and polars frames. It knows nothing of genomes or
-studies.
+outside the digest. A `Ledger` beside them, `ledger.sqlite`, has the trials that a robot drove. This package handles
+plain dicts, arrays and polars frames. It knows nothing of genomes or studies.
 """
 
 from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
@@ -12,6 +12,20 @@ from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_ta
 from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
+from realitygap.records._ledger import (
+    Generation,
+    Individual,
+    Ledger,
+    Score,
+    ScoreRole,
+    Step,
+    Trial,
+    TrialState,
+    Turn,
+)
+from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
+from realitygap.records._ledger_rows import complete_runs, ledger_frame
+from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
@@ -33,6 +47,21 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "derived_table",
     "DerivedFrame",
     "list_column",
+    # the ledger of physical trials
+    "Ledger",
+    "Generation",
+    "Individual",
+    "Turn",
+    "Trial",
+    "TrialState",
+    "Step",
+    "Score",
+    "ScoreRole",
+    "complete_runs",
+    "ledger_frame",
+    "LEDGER_NAME",
+    "LEDGER_FORMAT",
+    "ledger_tables",
     # other files, written whole
     "write_checkpoint",
     "read_checkpoint",

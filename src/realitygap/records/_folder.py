@@ -1,4 +1,4 @@
-"""A folder with the results of one simulated study."""
+"""A folder with the results of one study."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import polars as pl
 
-from realitygap.errors import RecordError, RecordVersionError, did_you_mean
+from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
 from realitygap.records._chunk import (
     MAX_REPLICATE,
     Chunk,
@@ -27,9 +27,11 @@ from realitygap.records._chunk import (
 from realitygap.records._columns import SCHEMA
 from realitygap.records._derived import DERIVED, DerivedFrame
 from realitygap.records._description import DESCRIPTION_NAME, Description
-from realitygap.records._digest import RowsDigest, study_digest
+from realitygap.records._digest import RowsDigest, row_streams, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
 from realitygap.records._inbox import Delivery, is_inbox, make_inbox, remove_inbox
+from realitygap.records._ledger import Ledger
+from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import (
     LEDGER_NAME,
     TRIALS_NAME,
@@ -48,7 +50,9 @@ from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 
 class ResultsFolder:
-    """The results of one simulated study: `study.json`, `trials/*.parquet` and `log.jsonl`.
+    """The results of one study: `study.json`, `trials/*.parquet`, `log.jsonl`, and with a robot `ledger.sqlite`.
+
+    The rows of conditions that a robot drove come out of the ledger, those of complete runs, beside the others'.
 
     Make one with `create` or `open`. Any number of processes may read while one writes; whatever is read was
     published as a whole. Writing takes the lock by itself; `locked` keeps others out for longer.
@@ -152,6 +156,7 @@ class ResultsFolder:
             return None
         n_runs = replicates * len(self.conditions)
         n_there = sum(max(0, min(name.last + 1, replicates) - name.first) for name in self._names())
+        n_there += sum(run < replicates for runs in self._complete_runs().values() for run in runs)
         if n_there >= n_runs:
             return None
         return (
@@ -300,10 +305,15 @@ class ResultsFolder:
             RecordError: as `chunks`.
         """
         self._warn_of_version()
-        paths = [chunk.path for chunk in self.chunks()]
-        if not paths:
-            return pl.LazyFrame(schema=SCHEMA)
-        return pl.scan_parquet(paths, glob=False, hive_partitioning=False)
+        parts: list[pl.LazyFrame] = []
+        physical = self._complete_runs()
+        for is_physical, group in itertools.groupby(self.conditions, key=lambda name: name in physical):
+            names = list(group)
+            if is_physical:
+                parts += [frame.lazy() for name in names for frame in self._driven(name)]
+            elif paths := [chunk.path for name in names for chunk in self.chunks(name)]:
+                parts.append(pl.scan_parquet(paths, glob=False, hive_partitioning=False))
+        return pl.concat(parts) if parts else pl.LazyFrame(schema=SCHEMA)
 
     def frames(
         self, condition: str | None = None, columns: Sequence[str] | None = None
@@ -316,11 +326,12 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
         self._warn_of_version()
-        return self._frames(self._names(condition), columns)
+        return self._all_frames(condition, columns)
 
     def read(
         self,
@@ -337,21 +348,18 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
         self._warn_of_version()
-        names = self._names(condition)
         if replicates is None:
-            parts = list(self._frames(names, columns))
+            parts = list(self._all_frames(condition, columns))
         else:
-            # what is beyond any chunk may be beyond polars' numbers, too
-            possible = {number for number in replicates if 0 <= number <= MAX_REPLICATE}
-            wanted = pl.Series(sorted(possible), dtype=pl.Int64)
-            names = [name for name in names if wanted.is_between(name.first, name.last).any()]
+            wanted = _wanted(replicates)
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
-            parts = [frame.filter(chosen) for frame in self._frames(names, needed)]
+            parts = [frame.filter(chosen) for frame in self._all_frames(condition, needed, wanted)]
         frame = pl.concat(parts) if parts else pl.DataFrame(schema=SCHEMA)
         return frame if columns is None else frame.select(columns)
 
@@ -368,6 +376,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition, or nothing of that name to derive.
         """
         parts = list(self.derived_frames(what, condition, replicates))
@@ -381,8 +390,8 @@ class ResultsFolder:
             raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
         self._check_selection(condition, None)
         self._warn_of_version()
-        wanted = None if replicates is None else pl.Series(sorted(set(replicates)), dtype=pl.Int64)
-        return self._derived(what, self._names(condition), wanted)
+        wanted = None if replicates is None else _wanted(replicates)
+        return self._derived(what, condition, wanted)
 
     def write_derived(
         self,
@@ -395,13 +404,13 @@ class ResultsFolder:
 
         Args:
             what, condition, replicates: As of `derive`.
-            path: The file; not in a folder of results.
+            path: The file; none of a study's own.
 
         Returns:
             How many rows it has.
 
         Raises:
-            RecordError: as `chunks`, or the file lies in a folder of results or cannot be written.
+            RecordError: as `chunks`, or the file is one of a study's own or cannot be written.
             ValueError: as `derive`.
         """
         path = Path(path)
@@ -426,6 +435,7 @@ class ResultsFolder:
             chunks.append(digest_rows(self._trials / str(name), digest))
         self._check_together(chunks)
         hashes = {chunk.condition: chunk.condition_hash for chunk in chunks}
+        hashes |= self._digest_driven(rows)
         return study_digest(
             self.results_version, {name: (hashes[name], rows[name].hexdigest()) for name in hashes}
         )
@@ -603,13 +613,61 @@ class ResultsFolder:
             before = [chunk]
             yield frame
 
-    def _derived(
-        self, what: DerivedFrame, names: Iterable[ChunkName], replicates: pl.Series | None
+    def _all_frames(
+        self, condition: str | None, columns: Sequence[str] | None, replicates: pl.Series | None = None
     ) -> Iterator[pl.DataFrame]:
-        derived = DERIVED[what]
+        """Rows in key order, of chunks and of the ledger; of chunks only those with some of the replicates."""
+        names = self._names(condition)
         if replicates is not None:
             names = [name for name in names if replicates.is_between(name.first, name.last).any()]
-        for frame in self._frames(names, derived.needs):
+        chunks = {
+            key: list(group) for key, group in itertools.groupby(names, key=lambda name: name.condition)
+        }
+        physical = self._complete_runs()
+        for name in self.conditions if condition is None else [condition]:
+            if name in physical:
+                yield from (
+                    frame if columns is None else frame.select(columns) for frame in self._driven(name)
+                )
+            else:
+                yield from self._frames(chunks.get(name, []), columns)
+
+    def _digest_driven(self, rows: dict[str, RowsDigest]) -> dict[str, str]:
+        """Add the rows of the ledger to those digested; the hashes of their conditions."""
+        if not (self._path / LEDGER_NAME).exists():
+            return {}
+        hashes: dict[str, str] = {}
+        with self._ledger() as ledger:
+            for name, about in ledger.conditions().items():
+                frame = ledger_frame(ledger, name)
+                if frame.height:
+                    rows[name] = RowsDigest()
+                    rows[name].update(row_streams(frame), frame.height)
+                    hashes[name] = about["hash"]
+        return hashes
+
+    def _driven(self, condition: str) -> Iterator[pl.DataFrame]:
+        """The rows of the complete runs that a robot drove; nothing where there are none."""
+        with self._ledger() as ledger:
+            frame = ledger_frame(ledger, condition)
+        if frame.height:
+            yield frame
+
+    def _complete_runs(self) -> dict[str, list[int]]:
+        """The complete runs of each condition in the ledger; nothing where there is no ledger."""
+        if not (self._path / LEDGER_NAME).exists():
+            return {}
+        with self._ledger() as ledger:
+            return {name: complete_runs(ledger, name) for name in ledger.conditions()}
+
+    def _ledger(self) -> Ledger:
+        return Ledger.open(self._path / LEDGER_NAME, writable=False)
+
+    def _derived(
+        self, what: DerivedFrame, condition: str | None, replicates: pl.Series | None
+    ) -> Iterator[pl.DataFrame]:
+        derived = DERIVED[what]
+        for frame in self._all_frames(condition, derived.needs, replicates):
             if replicates is not None:
                 frame = frame.filter(pl.col("replicate").cast(pl.Int64).is_in(replicates.implode()))
             yield derived.frame(frame)
@@ -674,3 +732,9 @@ class ResultsFolder:
             sync_folder(self._path)
         self._checked.clear()
         self._published = None
+
+
+def _wanted(replicates: Iterable[int]) -> pl.Series:
+    """The replicates that there may be, ascending; what is beyond any chunk may be beyond polars' numbers, too."""
+    numbers = {whole_number("replicate", number) for number in replicates}
+    return pl.Series(sorted(number for number in numbers if 0 <= number <= MAX_REPLICATE), dtype=pl.Int64)

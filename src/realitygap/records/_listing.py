@@ -49,7 +49,7 @@ def is_temporary(name: str) -> bool:
     """Whether a file is one that a writer of this package renames or removes before it ends."""
     match = _TEMPORARY.fullmatch(name)
     return match is not None and (
-        match["target"] == DESCRIPTION_NAME or ChunkName.parse(match["target"]) is not None
+        match["target"] in (DESCRIPTION_NAME, LEDGER_NAME) or ChunkName.parse(match["target"]) is not None
     )
 
 

@@ -5,6 +5,7 @@ Only records are read; nothing here runs a study. Trials that are drawn are reco
 SVG with the caption that says what was drawn.
 """
 
+from realitygap.report._agreement import Agreement, measure_agreement
 from realitygap.report._arena_figure import draw_arena_and_robot
 from realitygap.report._audit import (
     Audit,
@@ -73,6 +74,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Champions",
     "measure_variety",
     "Variety",
+    "measure_agreement",
+    "Agreement",
     # small tables of anyone's
     "audit_results",
     "audit_notes",

@@ -31,7 +31,7 @@ def draw_arena_and_robot(
         ValueError: there is no such condition.
     """
     tally = read_tally(folder)
-    (drawing,) = draw_tally_arena(tally, condition or tally.runs["condition"][0], widths=[width])
+    (drawing,) = draw_tally_arena(tally, tally.name_of(condition), widths=[width])
     return drawing
 
 
@@ -46,8 +46,8 @@ def draw_tally_arena(
     """
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
-    robot = resolved.jyro.picture()
-    picture = arena_picture(resolved.arena.arena(), resolved.jyro.body, resolved.jyro.sensors)
+    robot = resolved.tried_on.picture()
+    picture = arena_picture(resolved.arena.arena(), resolved.tried_on.body, resolved.tried_on.sensors)
     alt = f"{picture.description} {robot.description}"
     caption = _caption(tally, resolved, described)
     drawings = []
@@ -73,12 +73,14 @@ def _caption(tally: Tally, condition: Condition, described: Mapping[str, Any]) -
     start = condition.arena.pose()
     same = len({str(settings_of(each).get("arena")) for each in tally.conditions}) == 1
     whose = "All conditions have this arena." if same else f"Shown is condition {condition.name}."
-    jyro = condition.jyro
+    platform = condition.tried_on
+    simulated = "" if condition.is_physical else " as simulated"
+    outline = "the box that holds the robot’s" if condition.is_physical else "Jyro’s"
     return (
-        f"The arena, with its reachable cells outlined, and the robot as simulated, both to scale. Trials begin at "
+        f"The arena, with its reachable cells outlined, and the robot{simulated}, both to scale. Trials begin at "
         f"({start.x:.4f}, {start.y:.4f}) m with the robot facing as the arrow does; the gray outline is what can "
-        f"collide, the dashed lines are how far its {len(jyro.sensors.mounts)} sensors see. {whose} The outline is "
-        "Jyro’s; the paper does not state the start and where the sensors are mounted. "
+        f"collide, the dashed lines are how far its {len(platform.sensors.mounts)} sensors see. {whose} The outline is "
+        f"{outline}; the paper does not state the start and where the sensors are mounted. "
         f"{label_of(described)}: a drawing of the settings; n and interval do not apply."
     )
 

@@ -97,6 +97,8 @@ def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
     name, label = described["name"], label_of(described)
     try:
         condition = Condition.from_settings(name, dict(settings_of(described)))
+        if condition.is_physical:
+            raise RecordError("a robot drove it, and no program drives its champions again")
         rows = _champion_rows(tally, name)
         reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
     except RecordVersionError:

@@ -32,6 +32,7 @@ from realitygap.report._path_figure import (
     draw_path,
     draw_path_legend,
     no_such_run,
+    say_origin,
     trace_paths,
     typical_replicate,
 )
@@ -85,7 +86,7 @@ def draw_individuals(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_individuals(tally, name, replicate, widths=[width])
     return drawing
 
@@ -113,7 +114,7 @@ def draw_tally_individuals(
     n_generations, population = int(rows["generation"].n_unique()), int(rows["individual"].n_unique())
     shown = np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS)).round().astype(int).tolist()
     rows = rows.filter(pl.col("generation").is_in(shown), pl.col("individual") < _MOST_PATHS)
-    paths, problem = trace_paths(resolved, rows, column)
+    paths, problem = trace_paths(tally, resolved, rows, column)
     panels = [list(group) for _, group in itertools.groupby(paths, key=lambda path: path.generation)]
     caption = _individuals_caption(
         tally,
@@ -132,7 +133,7 @@ def draw_tally_individuals(
         )
         + "."
     )
-    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):
@@ -161,7 +162,7 @@ def draw_better_individuals(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_better(tally, name, replicate, widths=[width])
     return drawing
 
@@ -192,12 +193,12 @@ def draw_tally_better(
         .unique("cells", keep="first", maintain_order=True)
         .head(_N_BETTER)
     )
-    paths, problem = trace_paths(resolved, best, column)
+    paths, problem = trace_paths(tally, resolved, best, column)
     caption = (
         f"Condition {condition}, run {replicate}: the {len(paths)} individuals of highest coverage among all "
         f"{n_individuals} of the run, best first, coverage counted {_counted(tally)}; of those that visit the same "
         f"cells in the same order only the first is shown. {label_of(described)}, n = 1 run, no interval. "
-        f"{_which(tally, condition, typical=typical)} {_origin(problem)}"
+        f"{_which(tally, condition, typical=typical)} {say_origin(described, paths, problem)}"
     )
     alt = (
         f"Paths of the {len(paths)} best individuals of run {replicate} of {condition}. Coverage: "
@@ -205,7 +206,7 @@ def draw_tally_better(
             f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
         )
     )
-    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):
@@ -298,13 +299,26 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
         zorder=7,
     )
     drawn = [path for path in paths if path.poses is not None]
-    for path in drawn:
+    for path in paths:
         if path.poses is not None:
             draw_line(
                 axes, path.poses[:, 0], path.poses[:, 1], zorder=5, **_pen(path.individual, small=small)
             )
+        else:
+            _dot_cells(axes, path, arena, small=small)
     if drawn:
         _number_ends(axes, drawn, arena, small=small)
+
+
+def _dot_cells(axes: Axes, path: TracedPath, arena: Arena, *, small: bool) -> None:
+    """A dot in each visited cell, every pen at a place of its own within it."""
+    grid, pen = arena.grid, path.individual % len(_PENS)
+    across, up = divmod(pen if pen < 4 else pen + 1, 3)  # eight places around the middle
+    cells = np.array(path.cells)
+    xs = grid.x + (cells % grid.columns + (across + 1) / 4) * grid.cell
+    ys = grid.y + (cells // grid.columns + (up + 1) / 4) * grid.cell
+    size = 1.6 if small else 2.6
+    draw_line(axes, xs, ys, marker="o", linestyle="", color=_PENS[pen][0], markersize=size, zorder=5)
 
 
 def _pen(individual: int, *, small: bool) -> dict[str, Any]:
@@ -441,6 +455,9 @@ def _individuals_caption(
     problem: str,
 ) -> str:
     name = described["name"]
+    origin = say_origin(described, [path for panel in panels for path in panel], problem)
+    if any(path.poses is None for panel in panels for path in panel) and not problem:
+        origin += " A dot in the color of its pen stands in each cell that an individual visits."
     n_generations, population = sizes
     n_drawn = max(len(panel) for panel in panels)
     who = (
@@ -456,7 +473,7 @@ def _individuals_caption(
     return (
         f"Condition {name}, run {replicate}: the paths of {who} of {when}, each with a pen of its own, its number at "
         f"its end; ends that coincide are fanned out. Coverage is counted {_counted(tally)}. "
-        f"{label_of(described)}, n = 1 run, no interval. {which} {_origin(problem)}"
+        f"{label_of(described)}, n = 1 run, no interval. {which} {origin}"
     )
 
 
@@ -471,9 +488,3 @@ def _which(tally: Tally, condition: str, *, typical: bool) -> str:
     if not typical:
         return "The run was chosen by number."
     return f"It is the typical run and not a picked one: its best coverage is the median of the {n:,} runs."
-
-
-def _origin(problem: str) -> str:
-    if problem:
-        return f"Some paths are missing: the trials could not be recomputed. {problem}"
-    return "The paths were recomputed from the records and visit the cells recorded."

@@ -29,6 +29,7 @@ from realitygap.report import _gallery
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
+from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
@@ -36,6 +37,7 @@ from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap.report._statistics_section import statistics_content
+from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize_tally
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.study import load_study, named_studies
@@ -51,6 +53,7 @@ _LABELS = {
 
 _PLATFORMS = {
     "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
+    "scribbler": "the paper’s robot, driven over its own protocol",
 }
 
 _MOST_GAPS = 12
@@ -182,6 +185,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         ),
         "replay": replay_content(tally),
         "command": _command(tally),
+        "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
         "columns": column_table(),
         "exported": None,
     }
@@ -245,6 +249,9 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
     banners = []
     if tally.folder.version_note is not None:
         banners.append(("Results of another version", tally.folder.version_note))
+    if tally.driven:
+        said = " ".join(describe_driven(name, driven) for name, driven in tally.driven.items())
+        banners.append(("Trials on a robot", said))
     missing = _missing_runs(tally)
     if missing:
         expected = len(tally.conditions) * _expected_replicates(tally)

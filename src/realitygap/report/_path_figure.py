@@ -25,6 +25,7 @@ from realitygap.report._drawing import (
     shorten,
     to_svg,
 )
+from realitygap.report._driven import driven_paths
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.world import Arena, Body, Pose
@@ -78,7 +79,7 @@ def draw_paths(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_paths(tally, name, replicate, widths=[width])
     return drawing
 
@@ -108,7 +109,7 @@ def draw_tally_paths(
         + ", ".join(f"generation {path.generation} {path.coverage:.3f}" for path in paths)
         + "."
     )
-    arena, body, label = resolved.arena.arena(), resolved.jyro.body, label_of(described)
+    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):
@@ -143,7 +144,7 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
     shown = np.unique(
         np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
     )
-    return trace_paths(condition, best[shown], column)
+    return trace_paths(tally, condition, best[shown], column)
 
 
 def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
@@ -155,8 +156,12 @@ def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
     return f"Condition {condition!r} has no run {replicate} in {tally.folder.path}: {has}."
 
 
-def trace_paths(condition: Condition, rows: pl.DataFrame, column: str) -> tuple[list[TracedPath], str]:
+def trace_paths(
+    tally: Tally, condition: Condition, rows: pl.DataFrame, column: str
+) -> tuple[list[TracedPath], str]:
     """The trials of these rows, and why some could not be recomputed (empty: they could)."""
+    if condition.is_physical:
+        return _driven_paths(tally, condition, rows, column), ""
     paths, problem = [], ""
     for row in rows.iter_rows(named=True):
         poses = stalled = None
@@ -170,6 +175,33 @@ def trace_paths(condition: Condition, rows: pl.DataFrame, column: str) -> tuple[
             TracedPath(row["generation"], row["individual"], row[column], tuple(row["cells"]), poses, stalled)
         )
     return paths, problem
+
+
+def _driven_paths(tally: Tally, condition: Condition, rows: pl.DataFrame, column: str) -> list[TracedPath]:
+    """Trials of a robot: with the line where an emulator's witness saw it, else with their cells alone."""
+    paths = []
+    for (replicate,), part in rows.group_by("replicate", maintain_order=True):
+        seen = driven_paths(tally.folder, condition.name, int(replicate))
+        for row in part.iter_rows(named=True):
+            poses = seen.get((row["generation"], row["individual"]))
+            stalled = None if poses is None else np.zeros(len(poses), np.bool_)
+            paths.append(
+                TracedPath(
+                    row["generation"], row["individual"], row[column], tuple(row["cells"]), poses, stalled
+                )
+            )
+    return paths
+
+
+def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], problem: str) -> str:
+    """Where the drawn lines come from, or why there are none."""
+    if settings_of(condition).get("platform") == "scribbler":
+        if all(path.poses is not None for path in paths):
+            return "The paths are what the emulator’s witness saw; where the robot was blocked is not marked."
+        return "Only the cells were entered, which are shaded; the lines themselves are on paper."
+    if problem:
+        return f"Some paths are missing: the trials could not be recomputed. {problem}"
+    return "The paths were recomputed from the records and visit the cells recorded."
 
 
 # --- drawing ------------------------------------------------------------------------------------------------
@@ -427,9 +459,6 @@ def _caption(
         f"Condition {name}, run {replicate}: the individual of highest coverage in {which}, coverage counted "
         f"{counted}. {label_of(condition)}, n = 1 run, no interval.",
         why if len(bests) > 1 else "It is the only run.",
+        say_origin(condition, paths, problem),
     ]
-    if problem:
-        parts.append(f"Some paths are missing: the trials could not be recomputed. {problem}")
-    else:
-        parts.append("The paths were recomputed from the records and visit the cells recorded.")
     return " ".join(parts)

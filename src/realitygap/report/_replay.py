@@ -113,6 +113,9 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
     rows = tally.folder.read(name, [replicate])
     try:
         condition = Condition.from_settings(name, dict(settings_of(described)))
+        if condition.is_physical:
+            note = "its trials were driven by a robot, and cannot be computed again to be played."
+            return _Run(name, replicate, None, 0, rows.height, note)
         chosen = _choose(rows, room // (condition.jyro.steps + 1), f"coverage_{tally.measure}")
         trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
     except (RealityGapError, ValueError):

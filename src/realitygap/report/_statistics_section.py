@@ -116,8 +116,13 @@ def _selection_sentences(
         if parts:
             noise = settings_of(group[0]).get("noise")
             level = f"{100 * noise:g} % noise" if isinstance(noise, int | float) else "this noise"
-            found.append(f"At {level}: {'; '.join(parts)}.")
+            where = f"On the robot ({label_of(group[0])})" if _is_driven(group[0]) else f"At {level}"
+            found.append(f"{where}: {'; '.join(parts)}.")
     return found
+
+
+def _is_driven(condition: Mapping[str, Any]) -> bool:
+    return settings_of(condition).get("platform") == "scribbler"
 
 
 def _apart(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from realitygap.records import ResultsFolder
@@ -67,6 +68,8 @@ def summarize_tally(tally: Tally) -> pl.DataFrame:
 
 def _describe(tally: Tally, condition: str, measure: Measure) -> dict[str, float | None]:
     values = tally.run_bests(condition, measure)
+    if np.isnan(values).any():  # of a robot nobody saw where its steps end
+        return dict.fromkeys(_STATISTICS)
     middle = quartiles(values)
     interval = median_interval(values)
     return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -14,6 +14,7 @@ import polars as pl
 
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.records import ResultsFolder
+from realitygap.report._driven import Driven, read_driven
 
 Measure = Literal["line", "ends"]
 """How cells are counted: those that the line driven crosses, or those in which steps end."""
@@ -38,11 +39,13 @@ class Tally:
         description: the study as resolved.
         best: one row per condition, replicate and generation, in key order: `trials`, how many individuals;
             `line` and `ends`, the highest coverage among them [0..1].
+        driven: what the ledger says of each condition that a robot drove.
     """
 
     folder: ResultsFolder
     description: Mapping[str, Any]
     best: pl.DataFrame
+    driven: Mapping[str, Driven] = field(default_factory=dict)
 
     @property
     def conditions(self) -> list[Mapping[str, Any]]:
@@ -59,6 +62,10 @@ class Tally:
         if name not in names:
             raise ValueError(f"Unknown condition {name!r}. {did_you_mean(name, names)}")
         return self.conditions[names.index(name)]
+
+    def name_of(self, condition: str | None) -> str:
+        """The name of a condition; that of the first with runs when none is given."""
+        return str(self.runs["condition"][0]) if condition is None else condition
 
     @cached_property
     def runs(self) -> pl.DataFrame:
@@ -114,15 +121,28 @@ def read_tally(folder: ResultsFolder | str | Path) -> Tally:
         for frame in folder.frames(columns=_COLUMNS)
     ]
     best = pl.concat(parts) if parts else pl.DataFrame(schema=_BEST)
+    driven = read_driven(folder)
     if best.is_empty():
+        begun = (
+            " No run on a robot is complete; `realitygap trials list` shows how far they are."
+            if driven
+            else ""
+        )
         raise RecordError(
-            f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first."
+            f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.{begun}"
         )
     description = folder.description
     description["conditions"] = [
-        each if isinstance(each, dict) else {"name": each} for each in description["conditions"]
+        _labeled(each if isinstance(each, dict) else {"name": each}, driven)
+        for each in description["conditions"]
     ]
-    return Tally(folder, description, best)
+    return Tally(folder, description, best, driven)
+
+
+def _labeled(condition: dict[str, Any], driven: Mapping[str, Driven]) -> dict[str, Any]:
+    """With the label of the robot that drove it, which only the ledger knows."""
+    label = driven[condition["name"]].label if condition["name"] in driven else None
+    return condition if label is None else condition | {"label": label}
 
 
 def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:

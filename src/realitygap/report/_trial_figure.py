@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 
 from realitygap.drawing import Ink
+from realitygap.errors import whole_number
 from realitygap.records import ResultsFolder, write_whole
 from realitygap.report._drawing import (
     Drawing,
@@ -21,6 +22,7 @@ from realitygap.report._drawing import (
     shorten,
     to_svg,
 )
+from realitygap.report._driven import refuse_replay
 from realitygap.report._path_figure import (
     TracedPath,
     arena_extent,
@@ -98,8 +100,11 @@ def choose_trial(
     Raises:
         ValueError: there is none such; the message says which there are.
     """
-    name = condition or str(tally.runs["condition"][0])
+    name = tally.name_of(condition)
     described = tally.condition(name)
+    for what, number in (("generation", generation), ("individual", individual)):
+        if number is not None:
+            whole_number(what, number)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
     rows = tally.folder.read(name, [replicate])
     if rows.is_empty():
@@ -153,7 +158,7 @@ def draw_trial(
 
 def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
     """As `draw_trial`, of a trial chosen already; `name` is what the ids in the drawing begin with."""
-    trajectory = replay(trial.condition, trial.row)
+    trajectory = _replayed(trial)
     coverage = trial.row[trial.measure]
     counted = "along the line driven" if trial.measure == "coverage_line" else "at the ends of steps"
     n_steps, n_stalls = len(trajectory.commands), int(trajectory.stalled.sum())
@@ -182,7 +187,7 @@ def animate_trial(trial: ChosenTrial, path: str | Path) -> Path:
     Raises:
         RecordError: the trial comes out otherwise than recorded, or the file cannot be written.
     """
-    trajectory = replay(trial.condition, trial.row)
+    trajectory = _replayed(trial)
     stride = math.ceil(len(trajectory.commands) / _MOST_FRAMES)
     with house_style():
         frames = _frames(trial, trajectory, stride)
@@ -201,6 +206,12 @@ def animate_trial(trial: ChosenTrial, path: str | Path) -> Path:
     )
     write_whole(Path(path), buffer.getvalue())
     return Path(path)
+
+
+def _replayed(trial: ChosenTrial) -> Trajectory:
+    if trial.condition.is_physical:
+        raise refuse_replay(trial.condition.name)
+    return replay(trial.condition, trial.row)
 
 
 # --- drawing ------------------------------------------------------------------------------------------------
@@ -227,7 +238,7 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     figure = new_figure(_WIDTH, up + head + 0.42)
     field = place_axes(figure, 0.05, head, across, up)
     draw_arena(field, arena, x_range, y_range)
-    draw_path(field, _traced(trial, trajectory), arena, trial.condition.jyro.body)
+    draw_path(field, _traced(trial, trajectory), arena, trial.condition.tried_on.body)
     _head(field, trial)
     left, gap = across + 0.65, 0.24
     height = (up - 2 * gap) / 3
@@ -299,7 +310,7 @@ def _frames(trial: ChosenTrial, trajectory: Trajectory, stride: int) -> list[Any
     from PIL import Image
 
     arena = trial.condition.arena.arena()
-    body, sensors = trial.condition.jyro.body, trial.condition.jyro.sensors
+    body, sensors = trial.condition.tried_on.body, trial.condition.jyro.sensors
     x_range, y_range = arena_extent(arena)
     width, head = 8.0, 0.3
     up = (width - 0.1) * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])

@@ -7,6 +7,7 @@ from ._jyro import STEP_S, JyroPlatform
 from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
+from ._scribbler_platform import ScribblerPlatform
 
 __all__ = [
     "STEP_S",
@@ -19,6 +20,7 @@ __all__ = [
     "Recorder",
     "Recording",
     "Robot",
+    "ScribblerPlatform",
     "SystemClock",
     "check_command",
     "export_mcap",

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.evolution import NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
-from realitygap.robots import JyroPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask
-from realitygap.world import ArenaSettings, is_inside
+from realitygap.world import ArenaSettings, check_start
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -25,15 +25,14 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 MOST_TRIALS = 5_000_000
 
 Selection = Literal["coverage", "novelty", "random"]
+Platform = Literal["jyro", "scribbler"]
 
 
-class Condition(BaseModel):
+class Condition(Settings):
     """One cell of a study's design.
 
     Its runs are a function of these values and the number of the replicate alone.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: str = Field(
         pattern=NAME_PATTERN, max_length=80, description="Letters, digits, dot, dash and underscore."
@@ -43,13 +42,16 @@ class Condition(BaseModel):
         description="What decides who has children: coverage (the paper's objective NEAT), novelty, or nothing: "
         "random tries as many unrelated networks, the control that the paper lacks.",
     )
-    platform: Literal["jyro"] = Field("jyro", description="What the networks are tried on.")
+    platform: Platform = Field(
+        "jyro",
+        description="What the networks are tried on: jyro, the paper's simulation, or scribbler, the robot.",
+    )
     noise: float = Field(
         0.1,
         ge=0,
         le=10,
         description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8).",
+        "(section 2.3: 0.1, 0.5, 0.8). On a robot 0: its readings are noisy by themselves.",
     )
     seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
     pair: bool = Field(
@@ -62,19 +64,32 @@ class Condition(BaseModel):
     neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
     novelty: NoveltySettings = NoveltySettings()
     jyro: JyroPlatform = JyroPlatform()
+    scribbler: ScribblerPlatform = ScribblerPlatform()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _a_robot_adds_its_own_noise(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("platform") == "scribbler":
+            return {"noise": 0.0, **values}
+        return values
+
+    @model_validator(mode="after")
+    def _an_operator_can_score_it(self) -> Self:
+        if self.is_physical and self.noise != 0:
+            raise ValueError(
+                f"noise is {self.noise:g}, expected none with platform 'scribbler': a robot's readings are noisy by "
+                "themselves. Leave it out."
+            )
+        if self.is_physical and self.task.cells != "line":
+            raise ValueError(
+                "task.cells is 'ends', expected 'line' with platform 'scribbler': on paper stands the line that was "
+                "driven, and not where steps end."
+            )
+        return self
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        pose, arena = self.arena.pose(), self.arena.arena()
-        sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-        for forward, left in self.jyro.body.corners:
-            x = pose.x + forward * cosine - left * sine
-            y = pose.y + forward * sine + left * cosine
-            if not is_inside(arena, x, y):
-                raise ValueError(
-                    f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
-                    f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
-                )
+        check_start(self.arena.arena(), self.tried_on.body)
         return self
 
     @model_validator(mode="after")
@@ -89,8 +104,18 @@ class Condition(BaseModel):
 
     @property
     def label(self) -> str:
-        """What every figure of this condition says: SIM."""
-        return self.jyro.label
+        """What every figure of this condition says, SIM; of a robot the ledger knows whether EMULATED or REAL."""
+        return self.tried_on.label
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether its trials are driven by a robot, and scored into a ledger."""
+        return self.platform == "scribbler"
+
+    @property
+    def tried_on(self) -> JyroPlatform | ScribblerPlatform:
+        """The settings of its platform."""
+        return self.scribbler if self.platform == "scribbler" else self.jyro
 
     @property
     def key(self) -> int:
@@ -110,7 +135,8 @@ class Condition(BaseModel):
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
-        return self.model_dump(mode="json", exclude={"name"})
+        unused = {"jyro", "scribbler"} - {self.platform}
+        return self.model_dump(mode="json", exclude={"name", *unused})
 
     def hash(self) -> str:
         """A hash of `settings` and, where random numbers depend on it, the name."""
@@ -131,16 +157,14 @@ class Condition(BaseModel):
         try:
             condition = cls.model_validate({"name": name, **settings})
         except ValidationError as error:
-            mistakes = [
-                f"{'.'.join(str(part) for part in each['loc'])}: {each['msg']}" for each in error.errors()
-            ]
+            lines = [f"{place}: {text}" for place, text in mistakes(error, cls, settings)]
         else:
-            mistakes = [f"{place} is missing" for place in _missing(settings, condition.settings())]
-        if mistakes:
-            more = f" and {len(mistakes) - 3} more" if len(mistakes) > 3 else ""
+            lines = [f"{place} is missing." for place in _missing(settings, condition.settings())]
+        if lines:
+            more = f" and {len(lines) - 3} more" if len(lines) > 3 else ""
             raise RecordVersionError(
                 f"This realitygap ({__version__}) cannot read the settings of condition {name!r} "
-                f"({'; '.join(mistakes[:3])}{more}). Use the version that ran the study."
+                f"({' '.join(lines[:3])}{more}). Use the version that ran the study."
             )
         return condition
 

@@ -91,6 +91,11 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
         ValueError: No run, or one beyond replicate 4,294,967,295, where random numbers would repeat.
         OutgrownError: A genome grew beyond `MOST_GENES` or `MOST_HIDDEN`.
     """
+    if condition.is_physical:
+        raise ValueError(
+            f"Condition {condition.name!r} is tried on a robot, expected one with platform 'jyro'. Drive it: "
+            "realitygap run STUDY --port PORT."
+        )
     first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
     n_runs = whole_number("n_runs", n_runs, 1, MAX_REPLICATES - first_replicate)
     arena = condition.arena.arena()

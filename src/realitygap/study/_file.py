@@ -13,16 +13,16 @@ from pydantic import BaseModel, ValidationError
 
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import JyroPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.runs import Condition
 from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings
 
 from ._problems import Problems
-from ._study import ConditionNotes, ReportSection, Study, StudySection, same_file
+from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
-PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform}
+PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform, "scribbler": ScribblerPlatform}
 SECTIONS: dict[str, type[BaseModel]] = {
     "arena": ArenaSettings,
     "task": CoverageTask,
@@ -112,7 +112,7 @@ def _plain(number: Any) -> Any:
 
 
 def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) -> Study | None:
-    known = {"study", "report", "platform", "condition", "arena", "task", "neat", "novelty"}
+    known = {"study", "report", "trials", "platform", "condition", "arena", "task", "neat", "novelty"}
     for key in data:
         if key not in known:
             problems.add(key, f"unknown section. {did_you_mean(key, known)}")
@@ -123,6 +123,7 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     is_table = isinstance(data.get("study"), dict)
     about = problems.check(StudySection, about_values, "study") if is_table else None
     report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")
+    trials = problems.check(TrialsSection, problems.table("trials", data.get("trials", {})), "trials")
     base = {
         section: problems.table(section, data.get(section, {}))
         for section in SECTIONS
@@ -166,9 +167,9 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
             problems.add(
                 place, f"there is no condition {note.baseline!r}. {did_you_mean(note.baseline, names)}"
             )
-    if problems.lines or about is None or report is None:
+    if problems.lines or about is None or report is None or trials is None:
         return None
-    return Study(about=about, report=report, conditions=tuple(conditions), notes=tuple(notes))
+    return Study(about=about, report=report, trials=trials, conditions=tuple(conditions), notes=tuple(notes))
 
 
 def _place(section: str) -> str:
@@ -205,7 +206,12 @@ def _condition(
     note_values = {key: values[key] for key in ConditionNotes.model_fields if key in values}
     notes = problems.check(ConditionNotes, note_values, place)
     merged: dict[str, Any] = {}
+    platform = values.get("platform", "jyro")
     for section in SECTIONS:
+        if section in PLATFORMS and section in values and platform in PLATFORMS and section != platform:
+            problems.add(
+                f"{place}.{section}", f"of no meaning here: the condition's platform is {platform!r}."
+            )
         changed = problems.table(f"{place}.{section}", values.get(section, {}))
         if changed:
             _check_section(section, changed, f"{place}.{section}", problems)

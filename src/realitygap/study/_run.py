@@ -1,4 +1,4 @@
-"""Carrying out a study: chunks on threads or on a cluster, published as they are done."""
+"""Carrying out a study: chunks on threads or on a cluster, published as they are done; then what a robot drives."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import OutgrownError, StudyError, whole_number
-from realitygap.records import ResultsFolder
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
+from realitygap.trials import Operator
 
 from ._executors import ChunkTask, Executor, Threads, usable_processors
 from ._file import load_study
-from ._study import Study
+from ._physical import OpenRobot, PhysicalResult, PhysicalStudy, n_complete, physical_conditions
+from ._robot import connect_robot, default_operator
+from ._study import Study, same_file
 
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.
 CHUNK_STEPS = 7_000_000
@@ -50,15 +53,17 @@ class StudyResult:
 
     Attributes:
         folder: Its results.
-        n_runs: Runs in the study.
+        n_runs: Simulated runs in the study.
         n_computed: Runs computed in this sitting; the others were there.
         seconds: Computing took [s].
+        physical: How far the conditions are that a robot drives; None where the study has none.
     """
 
     folder: ResultsFolder
     n_runs: int
     n_computed: int
     seconds: float
+    physical: PhysicalResult | None = None
 
 
 def run_study(
@@ -72,8 +77,10 @@ def run_study(
     fresh: bool = False,
     cluster: str | None = None,
     tell: Callable[[Progress], None] | None = None,
+    port: str | None = None,
+    operator: Operator | None = None,
 ) -> StudyResult:
-    """Carry out a simulated study, or what is missing of it.
+    """Carry out a study, or what is missing of it; conditions on a robot only where its port is given.
 
     What is in the folder already is kept: an interrupted study goes on, more replicates and new conditions
     extend it. Interrupt it (Ctrl-C) at any moment; runs that were published are safe, and the results do not
@@ -92,13 +99,17 @@ def run_study(
             system, set up in the user's Dask configuration; `slurm:20` asks for 20 jobs. All workers must
             see `out` under the same path.
         tell: Called with the progress after each chunk.
+        port: Of the robot that drives the conditions on the platform `scribbler`, such as `/dev/rfcomm0`, `COM3`,
+            `socket://HOST:PORT`, or `emulator://s2?speed=off`, an emulated one in this program.
+        operator: Who places the robot and says what it drew; the emulator's witness when not given, which only an
+            emulated robot in this program has.
 
     Raises:
         StudyError: The study cannot be carried out as written, or the folder holds another one: the
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
-        RealityGapError: The cluster cannot be reached, or has other software.
-        TypeError: A count is not a whole number, or the study is none of these.
+        RealityGapError: The cluster or the robot cannot be reached, or the robot failed; what was scored is safe.
+        TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.
     """
     threads = None if threads is None else whole_number("threads", threads, 1)
@@ -107,13 +118,62 @@ def run_study(
         study = load_study(study, seed=seed, replicates=replicates)
     elif seed is not None or replicates is not None:
         raise ValueError("seed and replicates go with a study's name or path; this study has its own.")
+    if port is not None and not study.n_physical:
+        raise StudyError(
+            f"A port is given, and study {study.about.name!r} has no condition with platform 'scribbler'. Leave it out."
+        )
     path = Path(out) if out is not None else Path("results") / study.about.name
     with _executor(threads, cluster) as executor:
         folder = _open_folder(path, study, fresh=fresh)
         with folder.locked():
             _adopt(folder, study)
             progress = _carry_out(study, folder, executor, chunk, tell)
-    return StudyResult(folder, study.n_runs, progress.n_computed, progress.seconds)
+            physical = _drive(study, folder, port, operator) if study.n_physical else None
+    return StudyResult(folder, progress.n_runs, progress.n_computed, progress.seconds, physical)
+
+
+def _drive(
+    study: Study, folder: ResultsFolder, port: str | None, operator: Operator | None
+) -> PhysicalResult:
+    """Carry out what a robot drives, in a folder that is locked; without a port, say what is left."""
+    if port is None:
+        return _physical_result(study, folder, 0, "")
+    return drive_study(study, folder, operator or default_operator(port), connect_robot(port), port)
+
+
+def drive_study(
+    study: Study, folder: ResultsFolder, operator: Operator, open_robot: OpenRobot, port: str
+) -> PhysicalResult:
+    """Carry out the conditions of a study that a robot drives, or what is missing of them.
+
+    Args:
+        study: As resolved; the folder has its description.
+        folder: Of its results.
+        operator: Who places the robot and says what it drew.
+        open_robot: Called with the settings of a condition when a trial is to be driven.
+        port: What to call the robot's port in the ledger.
+
+    Raises:
+        RealityGapError: As `run_study`.
+    """
+    with folder.locked():
+        path = folder.path / LEDGER_NAME
+        with Ledger.open(path) if path.exists() else Ledger.create(path) as ledger:
+            physical = PhysicalStudy(study, ledger, operator, open_robot, port)
+            waiting = physical.carry_out()
+    return _physical_result(study, folder, physical.n_driven, waiting)
+
+
+def _physical_result(study: Study, folder: ResultsFolder, n_driven: int, waiting: str) -> PhysicalResult:
+    conditions = physical_conditions(study)
+    n_runs = len(conditions) * study.about.replicates
+    path = folder.path / LEDGER_NAME
+    if not path.exists():
+        return PhysicalResult(n_runs, 0, n_driven, waiting)
+    with Ledger.open(path, writable=False) as ledger:
+        return PhysicalResult(
+            n_runs, n_complete(ledger, conditions, study.about.replicates), n_driven, waiting
+        )
 
 
 @contextlib.contextmanager
@@ -127,6 +187,8 @@ def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
             "threads and cluster exclude each other: how many threads a worker of a cluster has is said where it is "
             "started (`dask worker --nthreads`, or `cores` in the settings of its jobs)."
         )
+    if not isinstance(cluster, str):
+        raise TypeError(f"cluster is {cluster!r}, expected a text, such as 'tcp://HOST:8786' or 'slurm:20'.")
     from ._cluster import Cluster
 
     with Cluster(cluster) as executor:
@@ -144,11 +206,13 @@ def _carry_out(
     missing = {
         condition.name: folder.missing(condition.name, study.about.replicates)
         for condition in study.conditions
+        if not condition.is_physical
     }
     n_missing = sum(len(gap) for gaps in missing.values() for gap in gaps)
     start = {"event": "start", "missing_runs": n_missing, **executor.facts(), "machine": machine_facts()}
     folder.append_log(start)
-    progress = _Counter(study.n_runs, study.n_runs - n_missing, tell)
+    n_runs = len(missing) * study.about.replicates
+    progress = _Counter(n_runs, n_runs - n_missing, tell)
     if n_missing:
         executor.prepare()
         progress.begin()
@@ -203,6 +267,12 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
+    for condition in new["conditions"]:
+        if (alike := same_file(condition["name"], there)) is not None:
+            differences.append(
+                f"condition {condition['name']!r} would share files with condition {alike!r} that is there; "
+                "give it another name"
+            )
     if there:
         # conditions that this study lacks may stay in a folder of its own, but not in that of another
         differences = [
@@ -246,7 +316,7 @@ class _Counter:
     """Counts runs and tells of them."""
 
     def __init__(self, n_runs: int, n_done: int, tell: Callable[[Progress], None] | None) -> None:
-        self._n_runs = n_runs
+        self.n_runs = n_runs
         self._n_before = n_done
         self._tell = tell
         self._since = time.perf_counter()
@@ -272,12 +342,14 @@ class _Counter:
     def _tell_now(self) -> None:
         if self._tell is not None:
             n_done = self._n_before + self.n_computed
-            self._tell(Progress(n_done, self._n_runs, self.n_computed, self.seconds, self._waiting_for))
+            self._tell(Progress(n_done, self.n_runs, self.n_computed, self.seconds, self._waiting_for))
 
 
 def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) -> Iterator[ChunkTask]:
     """The chunks to compute."""
     for condition in study.conditions:
+        if condition.is_physical:
+            continue
         size = chunk or _chunk_size(condition, study.about.replicates)
         for gap in missing[condition.name]:
             for first in range(gap.start, gap.stop, size):

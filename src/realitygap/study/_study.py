@@ -6,10 +6,11 @@ import unicodedata
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from realitygap._version import __version__
 from realitygap.runs import NAME_PATTERN, Condition
+from realitygap.settings import Settings
 
 
 def _printable(text: str) -> str:
@@ -21,10 +22,8 @@ def _printable(text: str) -> str:
 Line = Annotated[str, AfterValidator(_printable)]
 
 
-class StudySection(BaseModel):
+class StudySection(Settings):
     """What the whole study shares."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(
         pattern=NAME_PATTERN,
@@ -46,20 +45,37 @@ class StudySection(BaseModel):
     )
 
 
-class ReportSection(BaseModel):
+class ReportSection(Settings):
     """How the report shows it; changes no result."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     points: Literal["best-of-generation", "best-so-far"] = Field(
         "best-of-generation", description="What Figure 4 shows at each generation. The paper does not say."
     )
 
 
-class ConditionNotes(BaseModel):
-    """What is said of a condition beside its settings; changes no result."""
+class TrialsSection(Settings):
+    """How trials on a robot are led through; changes no simulated result."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    order: Literal["in-order", "shuffled"] = Field(
+        "in-order",
+        description="in-order: generation by generation, run by run, condition by condition. shuffled: the same "
+        "generation of all conditions together, their individuals mixed, so that a battery that drains or a floor that "
+        "wears meets all conditions alike.",
+    )
+    blind: bool = Field(
+        False,
+        description="Show trials under codes, so that nobody who counts cells knows of which condition they are.",
+    )
+    pens: list[Annotated[Line, Field(min_length=1, max_length=20)]] = Field(
+        ["black", "red", "blue", "green", "orange", "purple", "brown", "pink"],
+        min_length=1,
+        max_length=64,
+        description="Colors to draw with, one a trial; as many trials share a sheet of paper (section 2.1: eight).",
+    )
+
+
+class ConditionNotes(Settings):
+    """What is said of a condition beside its settings; changes no result."""
 
     published: list[Annotated[float, Field(ge=0, le=1)]] | None = Field(
         None, description="Published values of the best coverage of a run, shown beside ours."
@@ -74,13 +90,12 @@ def same_file(name: str, others: Iterable[str]) -> str | None:
     return next((other for other in others if other.casefold() == name.casefold()), None)
 
 
-class Study(BaseModel):
+class Study(Settings):
     """A study as resolved: nothing is left to a default."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     about: StudySection
     report: ReportSection
+    trials: TrialsSection = TrialsSection()
     conditions: tuple[Condition, ...]
     notes: tuple[ConditionNotes, ...]
 
@@ -114,6 +129,11 @@ class Study(BaseModel):
         """Runs in all."""
         return len(self.conditions) * self.about.replicates
 
+    @property
+    def n_physical(self) -> int:
+        """Conditions that a robot drives."""
+        return sum(condition.is_physical for condition in self.conditions)
+
     def description(self) -> dict[str, Any]:
         """The study as the folder of results keeps it (`study.json`)."""
         return {
@@ -125,6 +145,7 @@ class Study(BaseModel):
             "pair": self.about.pair,
             "replicates": self.about.replicates,
             "report": self.report.model_dump(mode="json"),
+            **({"trials": self.trials.model_dump(mode="json")} if self.n_physical else {}),
             "conditions": [
                 {
                     "name": condition.name,

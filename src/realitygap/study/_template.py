@@ -14,7 +14,7 @@ from realitygap.evolution import NAMED_SETTINGS
 from realitygap.runs import NAME_PATTERN, Condition
 
 from ._file import DEFAULT_NEAT, PLATFORMS, SECTIONS
-from ._study import ConditionNotes, ReportSection, StudySection
+from ._study import ConditionNotes, ReportSection, StudySection, TrialsSection
 
 WIDTH = 100
 _EXAMPLES = {
@@ -53,11 +53,13 @@ def study_template(name: str) -> str:
             written = {"settings": DEFAULT_NEAT}
             defaults = NAMED_SETTINGS[DEFAULT_NEAT]
         parts.append(_section(place, model, written, defaults))
+    parts.append(_section("trials", TrialsSection, {}))
     parts.append(_section("report", ReportSection, {}))
     parts.append(
         _comment(
             "One [[condition]] for each cell of the design. What differs from the sections above goes into "
-            "[condition.arena], [condition.task], [condition.neat], [condition.novelty] or [condition.jyro]."
+            "[condition.arena], [condition.task], [condition.neat], [condition.novelty], and [condition.jyro] or "
+            "[condition.scribbler], whichever its platform is."
         )
     )
     own = ["name", "selection", "platform", "noise"]

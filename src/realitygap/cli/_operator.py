@@ -1,0 +1,278 @@
+"""The operator of a physical study: a person at a terminal, or the options of a command."""
+
+from __future__ import annotations
+
+import getpass
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from realitygap.errors import StudyError
+
+from ._grid_editor import edit_cells
+from ._keys import read_line, single_keys
+
+if TYPE_CHECKING:
+    from realitygap.records import Score
+    from realitygap.robots import Command, Observation, Robot
+    from realitygap.trials import Card, DrivenTrial, Operator, Preflight, Verdict
+    from realitygap.world import Arena
+
+_ABORTING = ("space", "escape", "q")
+
+_WORDS = ("right", "up and right", "up", "up and left", "left", "down and left", "down", "down and right")
+_ARROWS = ">/^\\</v\\"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What was answered in advance.
+
+    Attributes:
+        who: Enters the scores; the account's name when None.
+        in_flight: What becomes of a trial that was cut off, `void` or `driven`; None asks.
+        score: When to ask what was drawn: `trial`, `sheet` or `later`.
+        wait: Whether to wait for Enter before each trial.
+        despite_preflight: Whether to drive whatever the pre-flight finds.
+
+    Raises:
+        StudyError: An answer is none of these.
+    """
+
+    who: str | None = None
+    in_flight: str | None = None
+    score: str = "sheet"
+    wait: bool = True
+    despite_preflight: bool = False
+
+    def __post_init__(self) -> None:
+        if self.in_flight not in (None, "void", "driven"):
+            raise StudyError(f"--in-flight is {self.in_flight!r}, expected void or driven.")
+        if self.score not in ("trial", "sheet", "later"):
+            raise StudyError(f"--score is {self.score!r}, expected trial, sheet or later.")
+
+    @property
+    def name(self) -> str:
+        """Of who enters the scores."""
+        return self.who or getpass.getuser()
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """What becomes of a trial that was cut off."""
+        return "void" if self.in_flight == "void" else "driven" if self.in_flight == "driven" else None
+
+
+def choose_operator(port: str, witness: str | None, answers: Answers, folder: Path) -> Operator:
+    """The witness of an emulator, in this program or in another, or else a person.
+
+    Args:
+        port: Of the robot.
+        witness: HOST:PORT of an emulator's witness.
+        answers: What was answered in advance.
+        folder: Of the results, in whose ledger notes are kept.
+    """
+    from realitygap.records import LEDGER_NAME, Ledger
+    from realitygap.study import is_in_this_program
+    from realitygap.trials import WitnessOperator
+
+    if is_in_this_program(port):
+        return WitnessOperator(in_flight=answers.verdict or "void")
+    if witness is not None:
+        from realitygap.emulator import connect_witness
+
+        return WitnessOperator(connect_witness(witness), in_flight=answers.verdict or "void")
+
+    def note(text: str, who: str, trial: int | None) -> None:
+        with Ledger.open(folder / LEDGER_NAME) as ledger:
+            ledger.note(text, who, trial)
+
+    return PersonOperator(answers, note)
+
+
+Note = Callable[[str, str, int | None], None]
+"""Keeps a note: text, who, and the trial it is about."""
+
+
+class PersonOperator:
+    """Somebody who places the robot, watches it and counts cells; asked in the terminal what no option has answered."""
+
+    def __init__(self, answers: Answers, note: Note) -> None:
+        self._answers = answers
+        self._note = note
+        self._is_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+        self._is_first = True
+
+    # the robot
+
+    def meet(self, robot: Robot) -> None:
+        """Say that the robot will turn."""
+        typer.echo(
+            f"The robot answers ({robot.label}). For the pre-flight it turns on the spot for a moment."
+        )
+        if self._answers.wait:
+            self._ask("Stand it free, then press Enter: ", "--no-wait drives without waiting")
+
+    def accept(self, preflight: Preflight) -> bool:
+        """Show what was found; ask where there is something against it."""
+        for name, value in preflight.facts.items():
+            typer.echo(f"  {name}: {value}")
+        if not preflight.problems:
+            typer.echo("Nothing speaks against driving.")
+            return True
+        for problem in preflight.problems:
+            typer.echo(f"  against driving: {problem}")
+        if self._answers.despite_preflight:
+            return True
+        if not self._is_terminal:
+            return False
+        return self._ask("Drive all the same? y or n: ", "").lower().startswith("y")
+
+    # a trial
+
+    def settle(self, card: Card, problem: str) -> Verdict:
+        """Ask whether a trial that was cut off counts."""
+        typer.echo(f"\nTrial {card.trial.trial}, {card.title}, was cut off: {problem}.")
+        if self._answers.verdict is not None:
+            return self._answers.verdict
+        while True:
+            answer = self._ask(
+                "v: void, drive it again; d: driven, count what it drew: ",
+                "--in-flight void or --in-flight driven",
+            ).lower()
+            if answer in ("v", "void", "d", "driven"):
+                return "void" if answer.startswith("v") else "driven"
+
+    def place(self, card: Card) -> None:
+        """Ask for the robot at its start, with the pen."""
+        typer.echo(f"\nTrial {card.trial.trial}: {card.title}. {card.n_left} left in this generation.")
+        typer.echo(f"Sheet {card.trial.sheet}, pen: {card.pen}.")
+        if self._is_first:
+            typer.echo(sketch(card.arena))
+            self._is_first = False
+        if not self._answers.wait:
+            return
+        while True:
+            answer = self._ask(
+                "Robot at the start, pen in: Enter drives; n TEXT adds a note: ",
+                "--no-wait drives without waiting",
+            )
+            if answer.startswith("n "):
+                self._note(answer[2:], self._answers.name, card.trial.trial)
+            elif not answer:
+                return
+
+    def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
+        """Show the step; whether a key that aborts was pressed."""
+        if not self._is_terminal:
+            return False
+        raw = " ".join(f"{value:5.0f}" for value in seen.raw)
+        stalled = "  stalled" if seen.stalled else "         "
+        told = f"move {command.move:+.2f} turn {command.turn:+.2f}"
+        text = f"step {step + 1:3}/{card.n_steps}  sees {raw}  {told}{stalled}"
+        typer.echo(f"\r{text}  space aborts", nl=step + 1 == card.n_steps)
+        with single_keys() as keys:
+            return keys.read(0.0) in _ABORTING
+
+    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+        """Ask now, where each trial is scored by itself."""
+        typer.echo("Done; the motors are stopped.")
+        if self._answers.score != "trial" or not self._is_terminal:
+            return None
+        return self._pick(card)
+
+    # a sheet
+
+    def enter(self, cards: Sequence[Card]) -> Mapping[int, Score]:
+        """Ask what was drawn on a sheet."""
+        if self._answers.score == "later" or not self._is_terminal:
+            return {}
+        typer.echo(f"\nSheet {cards[0].trial.sheet} is full. Which cells does each line cross?")
+        found = {}
+        for card in cards:
+            score = self._pick(card)
+            if score is not None:
+                found[card.trial.trial] = score
+        return found
+
+    def close(self, cards: Sequence[Card]) -> Sequence[int]:
+        """Show the scores; ask which are taken back before they breed the next generation."""
+        typer.echo("\nThe generation is scored:")
+        for card in cards:
+            n_cells = len(card.trial.cells or ())
+            typer.echo(f"  {card.trial.trial:4}  {card.pen:8} {card.title}: {n_cells} cells")
+        if not self._is_terminal:
+            return ()
+        numbers = {str(card.trial.trial): card.trial.trial for card in cards}
+        while True:
+            answer = self._ask(
+                "Enter closes it, then scores stay; a trial's number takes its score back; n TEXT adds a note: ",
+                "",
+            )
+            if answer.startswith("n "):
+                self._note(answer[2:], self._answers.name, None)
+            elif not answer:
+                return ()
+            elif answer in numbers:
+                return [numbers[answer]]
+            else:
+                typer.echo(f"There is no trial {answer} in this generation.")
+
+    # inside
+
+    def _pick(self, card: Card) -> Score | None:
+        from realitygap.records import Score
+
+        typer.echo(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
+        cells = pick_cells(card.arena)
+        return None if cells is None else Score(cells, self._answers.name)
+
+    def _ask(self, prompt: str, option: str) -> str:
+        """A line from the terminal.
+
+        Raises:
+            StudyError: There is no terminal.
+            KeyboardInterrupt: It is gone.
+        """
+        if not self._is_terminal:
+            answered = f" {option}." if option else ""
+            raise StudyError(f"There is no terminal in which to ask '{prompt.strip(': ')}'.{answered}")
+        return read_line(prompt)
+
+
+def pick_cells(arena: Arena, cells: Sequence[int] = ()) -> list[int] | None:
+    """Cells picked in the terminal; None for later."""
+    with single_keys() as keys:
+        return edit_cells(arena.grid, arena.start, keys.read, lambda text: typer.echo(text, nl=False), cells)
+
+
+def sketch(arena: Arena) -> str:
+    """The arena from above as text: walls, reachable cells, and the start as an arrow."""
+    grid, start = arena.grid, arena.start
+    left, bottom = min(wall[0] for wall in arena.walls), min(wall[1] for wall in arena.walls)
+    n_columns = round((max(wall[2] for wall in arena.walls) - left) / grid.cell)
+    n_rows = round((max(wall[3] for wall in arena.walls) - bottom) / grid.cell)
+    way = round(start.heading / (math.pi / 4)) % 8
+    lines = ["+" + "---" * n_columns + "+"]
+    for row in reversed(range(n_rows)):
+        text = ""
+        for column in range(n_columns):
+            x, y = left + column * grid.cell, bottom + row * grid.cell
+            holds_start = x <= start.x < x + grid.cell and y <= start.y < y + grid.cell
+            is_reachable = (
+                grid.x - 1e-9 <= x < grid.x + (grid.columns - 0.5) * grid.cell
+                and grid.y - 1e-9 <= y < grid.y + (grid.rows - 0.5) * grid.cell
+            )
+            text += f" {_ARROWS[way]} " if holds_start else " . " if is_reachable else "   "
+        lines.append(f"|{text}|")
+    lines.append(lines[0])
+    inch = 0.0254
+    lines.append(
+        f"Start ({_ARROWS[way]}): {(start.x - left) / inch:.1f} in from the left wall, {(start.y - bottom) / inch:.1f} "
+        f"in from the lower one, facing {_WORDS[way]}."
+    )
+    return "\n".join(lines)

@@ -1,0 +1,261 @@
+"""`realitygap trials`: what a robot drove, and what people say of it."""
+
+from __future__ import annotations
+
+import getpass
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import LedgerError, StudyError, did_you_mean
+
+if TYPE_CHECKING:
+    from realitygap.records import Ledger, ScoreRole, Trial
+
+_WHAT = ("list", "score", "undo", "void", "note", "agreement")
+
+
+def trials(
+    what: Annotated[str, typer.Argument(metavar="WHAT", help="list, score, undo, void, note or agreement.")],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of results with a ledger.")],
+    trial: Annotated[
+        str | None,
+        typer.Argument(metavar="TRIAL", help="A trial's number or code. [default: for score, all driven]"),
+    ] = None,
+    cells: Annotated[
+        str | None, typer.Option(metavar="LIST", help="To score: the cells crossed, such as 0,1,13.")
+    ] = None,
+    file: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="To score many: lines 'TRIAL: 0 1 13', a trial's number or code."),
+    ] = None,
+    who: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Who says so. [default: your account's name]")
+    ] = None,
+    second: Annotated[
+        bool, typer.Option("--second", help="To score: as a second person, for the agreement alone.")
+    ] = False,
+    correct: Annotated[
+        bool,
+        typer.Option(
+            "--correct", help="To score: a correction after the generation was closed, for reports alone."
+        ),
+    ] = False,
+    text: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="Of a note, or why a trial is void.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """List the trials that a robot drove, enter what they drew, take it back, declare one void, add a note.
+
+    Cells are numbered columns * row + column, 0 at the lower left of the reachable ones. Without --cells and --file
+    they are picked in the terminal. A score can be taken back until its generation is closed; later only --correct is
+    taken, which reports use and the evolution does not. With cells by two people, agreement is Cohen's kappa with its
+    interval.
+
+    Example: realitygap trials list results/paper-robot
+
+    Example: realitygap trials score results/paper-robot 12 --cells 13,14,15,27 --who anna
+
+    Example: realitygap trials score results/paper-robot --file sheet-2.txt --second --who ben
+
+    Example: realitygap trials void results/paper-robot 12 --text "the pen fell out"
+
+    Example: realitygap trials agreement results/paper-robot
+
+    In Python: realitygap.records.Ledger.open("results/paper-robot/ledger.sqlite").trials()
+    """
+    from realitygap.records import LEDGER_NAME, Ledger
+
+    if what not in _WHAT:
+        raise StudyError(f"Cannot {what!r} trials. {did_you_mean(what, _WHAT)}")
+    if cells is not None and file is not None:
+        raise StudyError("--cells and --file exclude each other: a file has the cells of many trials.")
+    name = who or getpass.getuser()
+    with Ledger.open(folder / LEDGER_NAME, writable=what not in ("list", "agreement")) as ledger:
+        if what == "list":
+            _list(ledger, as_json=as_json)
+        elif what == "agreement":
+            _agreement(folder, as_json=as_json)
+        elif what == "score":
+            role: ScoreRole = "second" if second else "correction" if correct else "score"
+            _score(ledger, folder, trial, cells, file, name, role)
+        elif what == "note":
+            ledger.note(_needed(text, "--text"), name, None if trial is None else _number(ledger, trial))
+            typer.echo("Noted.")
+        else:
+            number = _number(ledger, _needed(trial, "a trial"))
+            if what == "undo":
+                ledger.undo(number)
+                typer.echo(f"The score of trial {number} is taken back; enter it anew.")
+            else:
+                ledger.void(number, _needed(text, "--text"))
+                typer.echo(f"Trial {number} is void; it will be driven again.")
+
+
+def _needed(value: str | None, what: str) -> str:
+    if value is None:
+        raise StudyError(f"{what} is missing. See `realitygap trials --help` for an example.")
+    return value
+
+
+def _number(ledger: Ledger, text: str) -> int:
+    """A trial's number, from itself or its code."""
+    if text.isdecimal():
+        return ledger.trial(int(text)).trial
+    codes = {each.code: each.trial for each in ledger.trials()}
+    if text.upper() not in codes:
+        raise LedgerError(
+            f"{ledger.path} has no trial {text!r}. `realitygap trials list` shows numbers and codes."
+        )
+    return codes[text.upper()]
+
+
+def _score(
+    ledger: Ledger,
+    folder: Path,
+    trial: str | None,
+    cells: str | None,
+    file: Path | None,
+    who: str,
+    role: ScoreRole,
+) -> None:
+    from realitygap.records import Score
+
+    if file is not None:
+        given = _read_file(ledger, file)
+    elif cells is not None:
+        given = {_number(ledger, _needed(trial, "a trial")): _cells(cells, "--cells")}
+    else:
+        given = _pick(ledger, folder, trial, role)
+    for number, found in given.items():
+        ledger.score(number, Score(found, who), role)
+        typer.echo(f"Trial {number}: {len(set(found))} cells.")
+    if not given:
+        typer.echo("Nothing was entered.")
+
+
+def _cells(text: str, where: str) -> list[int]:
+    try:
+        return [int(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        raise StudyError(f"{where}: expected numbers of cells such as 0,1,13, came {text!r}.") from None
+
+
+def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
+    """The cells of each trial in a file, all of it read before anything is entered."""
+    try:
+        lines = path.read_text("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} cannot be read ({error}). Expected lines such as '12: 0 1 13'.") from error
+    found: dict[int, list[int]] = {}
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        trial, colon, text = line.partition(":")
+        if not colon:
+            raise StudyError(
+                f"{path}, line {number}: expected 'TRIAL: 0 1 13', came {line!r}. Nothing was entered."
+            )
+        which = _number(ledger, trial.strip())
+        if which in found:
+            raise StudyError(f"{path}, line {number}: trial {which} stands there twice. Nothing was entered.")
+        found[which] = _cells(text, f"{path}, line {number}")
+    return found
+
+
+def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> dict[int, list[int]]:
+    """Cells picked in the terminal, of one trial or of all that wait."""
+    import sys
+
+    from ._operator import pick_cells
+
+    if not sys.stdin.isatty():
+        raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
+    if trial is not None:
+        waiting = [ledger.trial(_number(ledger, trial))]
+    else:
+        seconded = {row["trial"] for row in ledger.scores() if row["role"] == role and row["undone"] is None}
+        states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
+        waiting = [each for each in ledger.trials(states=states) if each.trial not in seconded]
+    found: dict[int, list[int]] = {}
+    shows = _titles(folder)
+    for each in waiting:
+        typer.echo(
+            f"\nTrial {each.trial}, {each.code if shows.blind else each.name}, sheet {each.sheet}, {shows.pen(each)}"
+        )
+        cells = pick_cells(shows.arena(each), each.cells or () if role == "correction" else ())
+        if cells is None:
+            break
+        found[each.trial] = cells
+    return found
+
+
+class _titles:  # noqa: N801 - a few words on how trials of a folder are shown
+    """How the trials of a folder are shown."""
+
+    def __init__(self, folder: Path) -> None:
+        from realitygap.records import ResultsFolder
+
+        self._description = ResultsFolder.open(folder).description
+        settings = self._description.get("trials") or {}
+        self.blind = bool(settings.get("blind"))
+        self._pens = settings.get("pens") or []
+
+    def pen(self, trial: Trial) -> str:
+        return f"pen: {self._pens[trial.pen % len(self._pens)]}" if self._pens else f"pen {trial.pen}"
+
+    def arena(self, trial: Trial) -> Any:
+        from realitygap.runs import Condition
+
+        described = next(each for each in self._description["conditions"] if each["name"] == trial.condition)
+        return Condition.from_settings(trial.condition, described["settings"]).arena.arena()
+
+
+def _list(ledger: Ledger, *, as_json: bool) -> None:
+    found = ledger.trials()
+    if as_json:
+        rows = [
+            {**vars(each), "notes": [note["text"] for note in ledger.notes(each.trial)]} for each in found
+        ]
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for head in ("trial", "code", "sheet", "state", "cells", "what"):
+        table.add_column(head, no_wrap=head != "what")
+    hidden = _is_blind(ledger)
+    for each in found:
+        what = "" if hidden and not each.is_closed else each.name
+        said = [
+            each.reason or each.problem or "",
+            *(f"note: {note['text']}" for note in ledger.notes(each.trial)),
+        ]
+        more = "; ".join(part for part in (what, *said) if part)
+        table.add_row(
+            *(str(each.trial), each.code, str(each.sheet), each.state),
+            *("" if each.cells is None else str(len(each.cells)), more),
+        )
+    Console(width=max(78, Console().width), highlight=False).print(table)
+    states = [each.state for each in found]
+    counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
+    typer.echo(f"{len(found)} trials: {counts}." if found else "No trial is planned yet.")
+
+
+def _is_blind(ledger: Ledger) -> bool:
+    path = ledger.path.parent / "study.json"
+    return path.exists() and _titles(ledger.path.parent).blind
+
+
+def _agreement(folder: Path, *, as_json: bool) -> None:
+    from realitygap.report import measure_agreement
+
+    found = measure_agreement(folder)
+    if as_json:
+        typer.echo(json.dumps(vars(found), indent=2))
+        return
+    typer.echo(found.sentence)

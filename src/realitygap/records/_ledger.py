@@ -1,0 +1,680 @@
+"""A ledger of physical trials: what was planned, driven, scored and void, from which nothing is ever deleted."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from realitygap.errors import LedgerError
+from realitygap.records._ledger_file import connect, create_file, speaking
+from realitygap.records._version import RESULTS_VERSION
+
+TrialState = Literal["planned", "running", "driven", "scored", "void"]
+ScoreRole = Literal["score", "second", "correction"]
+
+
+@dataclass(frozen=True)
+class Individual:
+    """One of a generation, as it is planned.
+
+    Attributes:
+        individual: its number in the generation.
+        species: its species.
+        parents: individuals of the generation before.
+        nodes: of its genome.
+        genome: the fields of the records' genome, as lists.
+        key: of the random numbers.
+    """
+
+    individual: int
+    species: int
+    parents: Sequence[int]
+    nodes: int
+    genome: Mapping[str, Any]
+    key: int
+
+
+@dataclass(frozen=True)
+class Generation:
+    """A generation of a run, as it is planned."""
+
+    condition: str
+    replicate: int
+    generation: int
+    individuals: Sequence[Individual]
+
+
+@dataclass(frozen=True)
+class Turn:
+    """When and with which pen an individual is driven; `code` is what an operator knows it by when scoring is blind."""
+
+    condition: str
+    replicate: int
+    generation: int
+    individual: int
+    sheet: int
+    pen: int
+    code: str
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A trial as the ledger has it; `trial` is its number.
+
+    Attributes:
+        place: when its turn comes, ascending.
+        attempt: 0, and one more for each trial of the individual that was void.
+        cells: as entered and not undone; None before.
+        is_closed: whether its generation is closed, so that its score is frozen.
+    """
+
+    trial: int
+    condition: str
+    replicate: int
+    generation: int
+    individual: int
+    attempt: int
+    place: int
+    sheet: int
+    pen: int
+    code: str
+    state: TrialState
+    reason: str | None
+    end: str | None
+    problem: str | None
+    n_steps: int | None
+    stalls: int | None
+    cells: tuple[int, ...] | None
+    is_closed: bool
+
+    @property
+    def name(self) -> str:
+        """Which trial it is, in words."""
+        again = f" (attempt {self.attempt + 1})" if self.attempt else ""
+        run = f"{self.condition}, run {self.replicate}"
+        return f"{run}, generation {self.generation}, individual {self.individual}{again}"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One command of a trial.
+
+    Attributes:
+        time: since the trial began [s].
+        raw: (s,) the robot's readings as they came.
+        readings: (s,) the same, 0 to 1.
+        stalled: whether it was blocked.
+        move, turn: what the network answered, -1 to 1.
+    """
+
+    time: float
+    raw: tuple[float, ...]
+    readings: tuple[float, ...]
+    stalled: bool
+    move: float
+    turn: float
+
+
+@dataclass(frozen=True)
+class Score:
+    """Cells as somebody entered them, or as an emulator's witness saw them.
+
+    Attributes:
+        cells: crossed by the line, columns * row + column.
+        who: entered them.
+        n_ends: cells in which steps end; None where nobody saw it.
+        path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.
+    """
+
+    cells: Sequence[int]
+    who: str
+    n_ends: int | None = None
+    path: Sequence[Sequence[float]] | None = None
+
+
+_TRIALS = """
+SELECT trials.*, generations.closed IS NOT NULL AS is_closed, (
+    SELECT cells FROM scores WHERE trial = trials.id AND role = 'score' AND undone IS NULL ORDER BY id DESC LIMIT 1
+) AS cells
+FROM trials JOIN generations USING (condition, replicate, generation)
+"""
+
+
+class Ledger:
+    """The ledger of a study's physical trials.
+
+    Each method that writes is one transaction, and what it wrote survives a crash once it returns. Several
+    programs may have the ledger open at a time.
+
+    Raises:
+        LedgerError: from any method: the file is torn, foreign, locked or cannot be written, or does not allow what was
+            asked; what was written before is safe.
+    """
+
+    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
+        self.path = path
+        self._connection = connection
+        self._depth = 0
+
+    @classmethod
+    def create(cls, path: str | Path) -> Self:
+        """Begin a ledger where none is."""
+        create_file(Path(path))
+        return cls.open(path)
+
+    @classmethod
+    def open(cls, path: str | Path, *, writable: bool = True) -> Self:
+        """The ledger in a file."""
+        return cls(Path(path), connect(Path(path), writable=writable))
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # conditions and sittings
+
+    def add_condition(
+        self, name: str, condition_hash: str, settings: Mapping[str, Any], *, n_generations: int, n_cells: int
+    ) -> None:
+        """Take in a condition; nothing when it is there already.
+
+        Raises:
+            LedgerError: it is there with other settings, or its numbers are another version's.
+        """
+        with self._writing():
+            known = self._one("SELECT hash, results_version FROM conditions WHERE name = ?", name)
+            if known is None:
+                self._run(
+                    "INSERT INTO conditions VALUES (?, ?, ?, ?, ?, ?, NULL)",
+                    *(name, condition_hash, RESULTS_VERSION, _json(settings), n_generations, n_cells),
+                )
+            elif known["hash"] != condition_hash:
+                raise LedgerError(
+                    f"{self.path} holds trials of condition {name!r} with other settings. Give the condition another "
+                    "name, or name another folder."
+                )
+            elif known["results_version"] != RESULTS_VERSION:
+                raise LedgerError(
+                    f"The trials of condition {name!r} in {self.path} were planned by results version "
+                    f"{known['results_version']}; this realitygap breeds generations by version {RESULTS_VERSION}, "
+                    "which may differ. Use the version that began it."
+                )
+
+    def conditions(self) -> dict[str, dict[str, Any]]:
+        """Hash, label (None before the first sitting) and sizes of each condition, by name."""
+        return {row["name"]: dict(row) for row in self._all("SELECT * FROM conditions ORDER BY rowid")}
+
+    def begin_sitting(
+        self,
+        label: str,
+        port: str,
+        robot: Mapping[str, Any],
+        preflight: Mapping[str, Any],
+        names: Iterable[str],
+    ) -> int:
+        """Note which robot drives now, for these conditions.
+
+        Returns:
+            The sitting's number.
+
+        Raises:
+            LedgerError: a condition was driven by the other of an emulated and a real robot.
+        """
+        with self._writing():
+            for name in names:
+                known = self._one("SELECT label FROM conditions WHERE name = ?", name)
+                if known is not None and known["label"] not in (None, label):
+                    raise LedgerError(
+                        f"The trials of condition {name!r} in {self.path} are {known['label']}, and this robot's would "
+                        f"be {label}; the two are never mixed. Name another folder (--out DIR)."
+                    )
+                self._run("UPDATE conditions SET label = ? WHERE name = ? AND label IS NULL", label, name)
+            return self._run(
+                "INSERT INTO sittings (began, label, port, robot, preflight) VALUES (?, ?, ?, ?, ?)",
+                *(_now(), label, port, _json(robot), _json(preflight)),
+            )
+
+    def end_sitting(self, sitting: int) -> None:
+        """Note that the robot was let go."""
+        with self._writing():
+            self._run("UPDATE sittings SET ended = ? WHERE id = ?", _now(), sitting)
+
+    def sittings(self) -> list[dict[str, Any]]:
+        """All sittings, oldest first; `robot` and `preflight` as they were given."""
+        rows = self._all("SELECT * FROM sittings ORDER BY id")
+        return [
+            {**dict(row), "robot": json.loads(row["robot"]), "preflight": json.loads(row["preflight"])}
+            for row in rows
+        ]
+
+    # generations
+
+    def plan(self, generations: Sequence[Generation], turns: Sequence[Turn]) -> None:
+        """Plan generations, and trials of all their individuals in the order of `turns`."""
+        with self._writing():
+            for each in generations:
+                run = (each.condition, each.replicate, each.generation)
+                self._run("INSERT INTO generations VALUES (?, ?, ?, ?, NULL)", *run, _now())
+                for one in each.individuals:
+                    self._run(
+                        "INSERT INTO individuals VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, NULL, NULL, NULL, NULL)",
+                        *(*run, one.individual, one.species, _json(list(one.parents)), one.nodes),
+                        *(_json(one.genome), str(one.key)),
+                    )
+            for turn in turns:
+                trial = self._insert_trial(turn, attempt=0)
+                self._note_event(trial, "planned", {})
+
+    def generations(self, condition: str, replicate: int) -> list[tuple[int, bool]]:
+        """Number of each generation planned, and whether it is closed, in order."""
+        rows = self._all(
+            "SELECT generation, closed FROM generations WHERE condition = ? AND replicate = ? ORDER BY generation",
+            *(condition, replicate),
+        )
+        return [(row["generation"], row["closed"] is not None) for row in rows]
+
+    def individuals(self, condition: str, replicate: int, generation: int) -> list[dict[str, Any]]:
+        """The individuals of a generation in order; once it is closed with `fitness`, `novelty` and `cells`."""
+        rows = self._all(
+            "SELECT individuals.*, scores.cells FROM individuals LEFT JOIN scores ON scores.id = individuals.score "
+            "WHERE condition = ? AND replicate = ? AND generation = ? ORDER BY individual",
+            *(condition, replicate, generation),
+        )
+        found = []
+        for row in rows:
+            one = dict(row) | {name: json.loads(row[name]) for name in ("parents", "genome")}
+            found.append(one | {"cells": None if row["cells"] is None else json.loads(row["cells"])})
+        return found
+
+    def close_generation(
+        self,
+        condition: str,
+        replicate: int,
+        generation: int,
+        fitness: Sequence[float],
+        novelty: Sequence[float | None],
+    ) -> None:
+        """Freeze the scores of a generation, with what selection made of them.
+
+        Raises:
+            LedgerError: a trial of it is not scored, or it is closed.
+        """
+        run = (condition, replicate, generation)
+        with self._writing():
+            trials = [each for each in self.trials(*run) if each.state != "void"]
+            unscored = [each.individual for each in trials if each.state != "scored"]
+            if unscored or len(trials) != len(fitness):
+                raise LedgerError(
+                    f"Generation {generation} of {condition!r}, run {replicate}, cannot be closed: individuals "
+                    f"{unscored} are not scored."
+                )
+            changed = self._count(
+                "UPDATE generations SET closed = ? WHERE condition = ? AND replicate = ? AND generation = ? AND "
+                "closed IS NULL",
+                *(_now(), *run),
+            )
+            if not changed:
+                raise LedgerError(
+                    f"Generation {generation} of {condition!r}, run {replicate}, is closed already."
+                )
+            for trial in trials:
+                self._run(
+                    "UPDATE individuals SET fitness = ?, novelty = ?, trial = ?, score = (SELECT max(id) FROM scores "
+                    "WHERE trial = ? AND role = 'score' AND undone IS NULL) "
+                    "WHERE condition = ? AND replicate = ? AND generation = ? AND individual = ?",
+                    *(fitness[trial.individual], novelty[trial.individual], trial.trial, trial.trial),
+                    *(*run, trial.individual),
+                )
+
+    # trials
+
+    def trials(
+        self,
+        condition: str | None = None,
+        replicate: int | None = None,
+        generation: int | None = None,
+        *,
+        states: Iterable[TrialState] | None = None,
+    ) -> list[Trial]:
+        """Trials in the order of their turns; all of them, or those chosen."""
+        wanted = {"condition": condition, "replicate": replicate, "generation": generation}
+        given = {name: value for name, value in wanted.items() if value is not None}
+        clauses = [f"{name} = ?" for name in given]
+        values: list[Any] = list(given.values())
+        if states is not None:
+            chosen = list(states)
+            clauses.append(f"state IN ({', '.join('?' * len(chosen))})")
+            values += chosen
+        where = f"WHERE {' AND '.join(clauses)} " if clauses else ""
+        return [_trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
+
+    def trial(self, number: int) -> Trial:
+        """A trial by its number.
+
+        Raises:
+            LedgerError: there is none.
+        """
+        row = self._one(f"{_TRIALS}WHERE trials.id = ?", number)
+        if row is None:
+            (most,) = self._one("SELECT max(id) FROM trials") or (None,)
+            has = f"its trials are 1 to {most}" if most else "it has none yet"
+            raise LedgerError(f"{self.path} has no trial {number}: {has}.")
+        return _trial(row)
+
+    def start(self, number: int, sitting: int) -> None:
+        """A planned trial begins; call before its robot moves."""
+        with self._writing():
+            self._require(number, "planned")
+            self._run(
+                "UPDATE trials SET state = 'running', sitting = ?, started = ? WHERE id = ?",
+                *(sitting, _now(), number),
+            )
+            self._note_event(number, "running", {"sitting": sitting})
+
+    def finish(
+        self,
+        number: int,
+        end: str,
+        steps: Sequence[Step],
+        *,
+        stalls: int,
+        problem: str = "",
+        score: Score | None = None,
+    ) -> None:
+        """A running trial has ended, and counts; with a score it is scored at once."""
+        with self._writing():
+            self._keep_steps(number, end, steps, stalls=stalls, problem=problem)
+            self._drive(number, {"end": end})
+            if score is not None:
+                self._score(number, score, "score")
+
+    def interrupt(self, number: int, end: str, steps: Sequence[Step], *, stalls: int, problem: str) -> None:
+        """A running trial ended before its last step; whether it counts is still to be said, by `settle`."""
+        with self._writing():
+            self._keep_steps(number, end, steps, stalls=stalls, problem=problem)
+            self._note_event(number, "interrupted", {"end": end, "problem": problem})
+
+    def settle(self, number: int, verdict: Literal["void", "driven"], reason: str) -> None:
+        """Say what becomes of a running trial that was cut off: void, to be driven again, or driven."""
+        with self._writing():
+            self._require(number, "running")
+            if verdict == "void":
+                self._void(number, reason)
+            else:
+                self._drive(number, {"reason": reason})
+
+    def score(self, number: int, score: Score, role: ScoreRole = "score") -> None:
+        """Enter cells: what selection counts, what a second person counts, or a correction once that is frozen."""
+        with self._writing():
+            self._score(number, score, role)
+
+    def undo(self, number: int) -> None:
+        """Take back the score of a trial whose generation is not closed, so that it can be entered anew."""
+        with self._writing():
+            self._refuse_closed(self._require(number, "scored"))
+            self._run(
+                "UPDATE scores SET undone = ? WHERE trial = ? AND role = 'score' AND undone IS NULL",
+                _now(),
+                number,
+            )
+            self._run("UPDATE trials SET state = 'driven' WHERE id = ?", number)
+            self._note_event(number, "undone", {})
+
+    def void(self, number: int, reason: str) -> None:
+        """A trial that does not count; another attempt is planned in its place.
+
+        Raises:
+            LedgerError: its generation is closed, it is void already, or no reason is given.
+        """
+        with self._writing():
+            self._refuse_closed(self._require(number, "running", "driven", "scored"))
+            self._void(number, reason)
+
+    def note(self, text: str, who: str, number: int | None = None) -> None:
+        """A remark, of a trial or of the whole."""
+        if not text.strip():
+            raise LedgerError("A note without a word was not taken. Say something.")
+        with self._writing():
+            if number is not None:
+                self.trial(number)
+            self._run(
+                "INSERT INTO notes (trial, text, who, time) VALUES (?, ?, ?, ?)", number, text, who, _now()
+            )
+
+    # what is said of trials
+
+    def notes(self, number: int | None = None) -> list[dict[str, Any]]:
+        """Notes, oldest first; of one trial, or all."""
+        where, values = ("", ()) if number is None else ("WHERE trial = ? ", (number,))
+        return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
+
+    def steps(self, number: int) -> list[Step]:
+        """What a trial's robot saw and was told, step by step."""
+        rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
+        return [
+            Step(
+                row["time"],
+                tuple(json.loads(row["raw"])),
+                tuple(json.loads(row["readings"])),
+                bool(row["stalled"]),
+                row["move"],
+                row["turn"],
+            )
+            for row in rows
+        ]
+
+    def scores(self) -> list[dict[str, Any]]:
+        """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
+        rows = self._all("SELECT * FROM scores ORDER BY id")
+        return [
+            {**dict(row), "cells": json.loads(row["cells"]), "path": json.loads(row["path"] or "null")}
+            for row in rows
+        ]
+
+    def events(self) -> list[dict[str, Any]]:
+        """Everything that changed a trial, oldest first."""
+        return [
+            {**dict(row), "details": json.loads(row["details"])}
+            for row in self._all("SELECT * FROM events ORDER BY id")
+        ]
+
+    def used_codes(self) -> set[str]:
+        """Codes that stand for a trial."""
+        return {row["code"] for row in self._all("SELECT code FROM trials")}
+
+    def last_sheet(self) -> int:
+        """The highest number of a sheet of paper; 0 before the first."""
+        row = self._one("SELECT coalesce(max(sheet), 0) AS sheet FROM trials")
+        return 0 if row is None else int(row["sheet"])
+
+    # inside
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """One transaction, which is there as a whole or not at all."""
+        with speaking(self.path):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._commit()
+            except BaseException:
+                with contextlib.suppress(sqlite3.Error):
+                    if self._connection.in_transaction:
+                        self._connection.execute("ROLLBACK")
+                raise
+
+    def _commit(self) -> None:
+        self._connection.execute("COMMIT")
+
+    def _run(self, command: str, *values: Any) -> int:
+        """Carry out a command; the number of the row that it inserted."""
+        return int(self._connection.execute(command, values).lastrowid or 0)
+
+    def _count(self, command: str, *values: Any) -> int:
+        """Carry out a command; how many rows it changed."""
+        return self._connection.execute(command, values).rowcount
+
+    def _one(self, query: str, *values: Any) -> sqlite3.Row | None:
+        with speaking(self.path):
+            row: sqlite3.Row | None = self._connection.execute(query, values).fetchone()
+            return row
+
+    def _all(self, query: str, *values: Any) -> list[sqlite3.Row]:
+        with speaking(self.path):
+            return self._connection.execute(query, values).fetchall()
+
+    def _insert_trial(self, turn: Turn, attempt: int, place: int | None = None) -> int:
+        if place is None:
+            (most,) = self._one("SELECT coalesce(max(place), 0) FROM trials") or (0,)
+            place = most + 1
+        return self._run(
+            "INSERT INTO trials "
+            "(condition, replicate, generation, individual, attempt, place, sheet, pen, code, state) "
+            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'planned')",
+            *(turn.condition, turn.replicate, turn.generation, turn.individual, attempt, place),
+            *(turn.sheet, turn.pen, turn.code),
+        )
+
+    def _keep_steps(self, number: int, end: str, steps: Sequence[Step], *, stalls: int, problem: str) -> None:
+        self._require(number, "running")
+        self._connection.executemany(
+            "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            [
+                (
+                    number,
+                    k,
+                    step.time,
+                    _json(step.raw),
+                    _json(step.readings),
+                    step.stalled,
+                    step.move,
+                    step.turn,
+                )
+                for k, step in enumerate(steps)
+            ],
+        )
+        self._run(
+            "UPDATE trials SET end = ?, problem = ?, n_steps = ?, stalls = ? WHERE id = ?",
+            *(end, problem or None, len(steps), stalls, number),
+        )
+
+    def _drive(self, number: int, details: Mapping[str, Any]) -> None:
+        self._run(
+            "UPDATE trials SET state = 'driven', driven = ?, stalls = coalesce(stalls, 0) WHERE id = ?",
+            _now(),
+            number,
+        )
+        self._note_event(number, "driven", details)
+
+    def _score(self, number: int, score: Score, role: ScoreRole) -> None:
+        cells = self._checked(number, score.cells)
+        if role == "score":
+            self._refuse_closed(self._require(number, "driven"))
+            self._run("UPDATE trials SET state = 'scored' WHERE id = ?", number)
+        else:
+            trial = self._require(number, "driven", "scored")
+            if role == "correction" and not trial.is_closed:
+                raise LedgerError(
+                    f"The generation of trial {number} is not closed yet: take its score back (undo) and enter it anew."
+                )
+        self._run(
+            "INSERT INTO scores (trial, cells, n_ends, path, role, who, time) VALUES (?, ?, ?, ?, ?, ?, ?)",
+            *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
+            *(role, score.who, _now()),
+        )
+        self._note_event(
+            number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)}
+        )
+
+    def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
+        """Cells of a trial, each at most once, all within its grid, and at least the one it starts in."""
+        row = self._one(
+            "SELECT n_cells FROM conditions JOIN trials ON trials.condition = conditions.name WHERE trials.id = ?",
+            number,
+        )
+        if row is None:
+            self.trial(number)
+            return []
+        unique = list(dict.fromkeys(int(cell) for cell in cells))
+        outside = [cell for cell in unique if not 0 <= cell < row["n_cells"]]
+        if outside:
+            raise LedgerError(
+                f"Cell {outside[0]} is outside the grid: expected numbers from 0 to {row['n_cells'] - 1}. Nothing was "
+                "entered."
+            )
+        if not unique:
+            raise LedgerError(
+                "No cell was named: the line crosses at least the one it starts in. Nothing was entered."
+            )
+        return unique
+
+    def _void(self, number: int, reason: str) -> None:
+        if not reason.strip():
+            raise LedgerError(f"Why is trial {number} void? Give a reason.")
+        trial = self.trial(number)
+        self._run("UPDATE trials SET state = 'void', reason = ? WHERE id = ?", reason, number)
+        self._note_event(number, "void", {"reason": reason, "was": trial.state})
+        turn = Turn(
+            trial.condition, trial.replicate, trial.generation, trial.individual,
+            trial.sheet, trial.pen, f"{trial.code.split('-')[0]}-{trial.attempt + 2}",
+        )  # fmt: skip
+        again = self._insert_trial(turn, trial.attempt + 1, trial.place)
+        self._note_event(again, "planned", {"in_place_of": number})
+
+    def _require(self, number: int, *states: TrialState) -> Trial:
+        trial = self.trial(number)
+        if trial.state not in states:
+            raise LedgerError(
+                f"Trial {number} ({trial.name}) is {trial.state}; that can be done only while it is "
+                f"{' or '.join(states)}. Nothing was changed."
+            )
+        return trial
+
+    def _refuse_closed(self, trial: Trial) -> None:
+        if trial.is_closed:
+            raise LedgerError(
+                f"The generation of trial {trial.trial} ({trial.name}) is closed: its score bred the next one and "
+                "stays. Enter a correction, which reports use, or a note."
+            )
+
+    def _note_event(self, trial: int, what: str, details: Mapping[str, Any]) -> None:
+        self._run(
+            "INSERT INTO events (time, trial, what, details) VALUES (?, ?, ?, ?)",
+            _now(),
+            trial,
+            what,
+            _json(details),
+        )
+
+
+def _trial(row: sqlite3.Row) -> Trial:
+    cells = None if row["cells"] is None else tuple(json.loads(row["cells"]))
+    names = (
+        *("condition", "replicate", "generation", "individual", "attempt", "place", "sheet", "pen", "code"),
+        *("state", "reason", "end", "problem", "n_steps", "stalls"),
+    )
+    given = {name: row[name] for name in names}
+    return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,65 @@
+"""The rows of physical trials, with the columns of the records."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import polars as pl
+
+from realitygap.records._columns import SCHEMA
+from realitygap.records._ledger import Ledger
+
+_ROWS = """
+SELECT individuals.*, trials.stalls, n_cells, scores.n_ends, coalesce((
+    SELECT cells FROM scores WHERE trial = individuals.trial AND role = 'correction' AND undone IS NULL
+    ORDER BY id DESC LIMIT 1
+), scores.cells) AS cells
+FROM individuals
+    JOIN conditions ON conditions.name = individuals.condition
+    JOIN trials ON trials.id = individuals.trial
+    JOIN scores ON scores.id = individuals.score
+WHERE individuals.condition = ? AND individuals.replicate IN ({runs})
+ORDER BY individuals.replicate, individuals.generation, individuals.individual
+"""
+
+_COMPLETE = """
+SELECT replicate FROM generations JOIN conditions ON conditions.name = generations.condition
+WHERE condition = ? AND closed IS NOT NULL GROUP BY replicate HAVING count(*) = n_generations ORDER BY replicate
+"""
+
+
+def complete_runs(ledger: Ledger, condition: str) -> list[int]:
+    """Replicates all of whose generations are closed, in order."""
+    return [row["replicate"] for row in ledger._all(_COMPLETE, condition)]
+
+
+def ledger_frame(ledger: Ledger, condition: str) -> pl.DataFrame:
+    """One row an individual of the complete runs of a condition, with the columns of the records, in key order.
+
+    Cells and coverage are those of the last correction, where there is one; `fitness` and `novelty` stay what selection
+    used. `coverage_ends` is null where nobody saw in which cells steps end.
+    """
+    runs = complete_runs(ledger, condition)
+    query = _ROWS.format(runs=", ".join(map(str, runs)))
+    return pl.DataFrame([_row(dict(row)) for row in ledger._all(query, condition)], schema=SCHEMA)
+
+
+def _row(row: dict[str, Any]) -> dict[str, Any]:
+    genome = json.loads(row["genome"])
+    cells = json.loads(row["cells"])
+    n_ends = row["n_ends"]
+    return {
+        **{name: row[name] for name in ("condition", "replicate", "generation", "individual", "species")},
+        "parents": json.loads(row["parents"]),
+        "fitness": row["fitness"],
+        "novelty": row["novelty"],
+        "coverage_line": len(cells) / row["n_cells"],
+        "coverage_ends": None if n_ends is None else n_ends / row["n_cells"],
+        "cells": cells,
+        "stalls": row["stalls"],
+        "nodes": row["nodes"],
+        "connections": sum(genome["enabled"]),
+        "genome": genome,
+        "key": int(row["key"]),
+    }

@@ -1,0 +1,122 @@
+"""Do two people who count the cells of the same lines agree?"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from realitygap.errors import LedgerError
+from realitygap.records import LEDGER_NAME, Ledger
+from realitygap.report._effects import BCA_SMALLEST_N, RESAMPLES
+from realitygap.report._permutation import SEED
+from realitygap.report._statistics import CONFIDENCE
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How two people agree on which cells lines cross.
+
+    Attributes:
+        n_trials: counted by two.
+        n_cells: judged in all, every reachable cell of each trial.
+        same: share of these that both judge alike [0..1].
+        kappa: Cohen's kappa: 1 where they always agree, 0 where as often as by chance; None where all cells are alike.
+        low: lower bound of its 95 % interval; None below 10 trials.
+        high: upper bound.
+    """
+
+    n_trials: int
+    n_cells: int
+    same: float
+    kappa: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        counted = f"{self.n_trials} trials counted by two people, {self.n_cells:,} cells"
+        if self.kappa is None:
+            return f"{counted}: all judged alike, and no kappa without both kinds of cells."
+        interval = (
+            f"no interval below {BCA_SMALLEST_N} trials"
+            if self.low is None or self.high is None
+            else f"95 % interval {self.low:.3f} to {self.high:.3f}, trials resampled whole"
+        )
+        return (
+            f"{counted}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa:.3f} ({interval})."
+        )
+
+
+def measure_agreement(folder: str | Path) -> Agreement:
+    """How the second counts of trials agree with the first ones.
+
+    Args:
+        folder: of results, with a ledger in it.
+
+    Raises:
+        LedgerError: there is none, or no trial was counted by two.
+
+    Source: Cohen (1960), Educational and Psychological Measurement 20(1). Cells of one line depend on each other, so
+    the interval comes from a bootstrap (BCa) that resamples whole trials.
+    """
+    with Ledger.open(Path(folder) / LEDGER_NAME, writable=False) as ledger:
+        first, second = _counted(ledger, "score"), _counted(ledger, "second")
+        sizes = {name: about["n_cells"] for name, about in ledger.conditions().items()}
+        n_cells = {trial.trial: sizes[trial.condition] for trial in ledger.trials() if trial.state != "void"}
+    both = sorted(first.keys() & second.keys() & n_cells.keys())
+    if not both:
+        raise LedgerError(
+            f"{folder}: no trial was counted by two people yet. The second one enters what they see by `realitygap "
+            "trials score DIR --second`."
+        )
+    tables = np.array([_table(first[trial], second[trial], n_cells[trial]) for trial in both], np.float64)
+    kappa = float(_kappa(*tables.T))
+    same = float(tables[:, [0, 3]].sum() / tables.sum())
+    low, high = _interval(tables)
+    is_number = np.isfinite(kappa)
+    return Agreement(len(both), int(tables.sum()), same, kappa if is_number else None, low, high)
+
+
+def _counted(ledger: Ledger, role: str) -> dict[int, set[int]]:
+    """The cells of each trial as last entered in a role."""
+    return {
+        row["trial"]: set(row["cells"])
+        for row in ledger.scores()
+        if row["role"] == role and row["undone"] is None
+    }
+
+
+def _table(one: set[int], other: set[int], n_cells: int) -> tuple[int, int, int, int]:
+    """Cells that both, only the one, only the other, and neither mark."""
+    return len(one & other), len(one - other), len(other - one), n_cells - len(one | other)
+
+
+def _kappa(both: Any, one: Any, other: Any, neither: Any, axis: int = -1) -> npt.NDArray[np.float64]:
+    """Kappa of the tables added up along an axis."""
+    a, b, c, d = (np.asarray(part, np.float64).sum(axis=axis) for part in (both, one, other, neither))
+    n = a + b + c + d
+    observed = (a + d) / n
+    expected = ((a + b) * (a + c) + (d + b) * (d + c)) / (n * n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((observed - expected) / (1 - expected))
+
+
+def _interval(tables: npt.NDArray[np.float64]) -> tuple[float | None, float | None]:
+    if len(tables) < BCA_SMALLEST_N:
+        return None, None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # where all resamples give the same there is no interval
+        found = stats.bootstrap(
+            tuple(tables.T), _kappa, paired=True, vectorized=True, confidence_level=CONFIDENCE, method="BCa",
+            n_resamples=RESAMPLES, random_state=np.random.default_rng(SEED),
+        ).confidence_interval  # fmt: skip
+    if not (np.isfinite(found.low) and np.isfinite(found.high)):
+        return None, None
+    return float(found.low), float(found.high)

@@ -1,0 +1,103 @@
+"""What a report says of conditions that a robot drove: their label, void trials, and unfinished runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from realitygap.errors import RecordError
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
+
+Paths = dict[tuple[int, int], npt.NDArray[np.float64]]
+"""(4 t + 1, 3) poses of the driven line, by generation and individual."""
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What the ledger says of one condition.
+
+    Attributes:
+        label: EMULATED or REAL; None before its first sitting.
+        n_driven: trials that count, those of unfinished runs among them.
+        n_void: trials that were driven, or begun, and do not count.
+        unfinished: replicate of each run that is begun and not complete, and how many of its generations are closed.
+        n_generations: of a whole run.
+        n_corrected: trials whose cells were corrected after they had bred a generation.
+    """
+
+    label: str | None
+    n_driven: int
+    n_void: int
+    unfinished: tuple[tuple[int, int], ...]
+    n_generations: int
+    n_corrected: int
+
+
+def read_driven(folder: ResultsFolder) -> dict[str, Driven]:
+    """What the ledger of a folder says of each condition; nothing where there is none."""
+    if not (folder.path / LEDGER_NAME).exists():
+        return {}
+    with Ledger.open(folder.path / LEDGER_NAME, writable=False) as ledger:
+        return {name: _of(ledger, name, about) for name, about in ledger.conditions().items()}
+
+
+def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> Driven:
+    trials = ledger.trials(name)
+    complete = set(complete_runs(ledger, name))
+    unfinished = []
+    for replicate in sorted({trial.replicate for trial in trials} - complete):
+        unfinished.append((replicate, sum(closed for _, closed in ledger.generations(name, replicate))))
+    own = {trial.trial for trial in trials}
+    corrected = {row["trial"] for row in ledger.scores() if row["role"] == "correction"} & own
+    return Driven(
+        label=about["label"],
+        n_driven=sum(trial.state in ("driven", "scored") for trial in trials),
+        n_void=sum(trial.state == "void" for trial in trials),
+        unfinished=tuple(unfinished),
+        n_generations=about["n_generations"],
+        n_corrected=len(corrected),
+    )
+
+
+def describe_driven(name: str, driven: Driven) -> str:
+    """The same in a sentence or two."""
+    parts = [
+        f"{name} ({driven.label or 'not driven yet'}): {driven.n_driven:,} trials that count, {driven.n_void} void"
+    ]
+    if driven.n_corrected:
+        parts.append(
+            f"{driven.n_corrected} corrected afterwards, which the figures use and the evolution did not know"
+        )
+    if driven.unfinished:
+        runs = ", ".join(
+            f"run {replicate} ({closed} of {driven.n_generations} generations)"
+            for replicate, closed in driven.unfinished
+        )
+        parts.append(f"left out because unfinished: {runs}")
+    return "; ".join(parts) + "."
+
+
+def driven_paths(folder: ResultsFolder, condition: str, replicate: int) -> Paths:
+    """The lines of a run as the emulator's witness saw them; nothing where a person scored what lies on paper."""
+    with Ledger.open(folder.path / LEDGER_NAME, writable=False) as ledger:
+        which = {
+            trial.trial: (trial.generation, trial.individual)
+            for trial in ledger.trials(condition, replicate, states=["scored"])
+        }
+        return {
+            which[row["trial"]]: np.array(row["path"], np.float64).reshape(-1, 3)
+            for row in ledger.scores()
+            if row["trial"] in which and row["path"] is not None and row["undone"] is None
+        }
+
+
+def refuse_replay(condition: str) -> RecordError:
+    """What to say where a trial of a robot would have to be computed again."""
+    return RecordError(
+        f"The trials of condition {condition!r} were driven by a robot, and no program drives them again. What it "
+        "saw and was told stands step by step in the ledger: realitygap.records.Ledger.open(...).steps(TRIAL)."
+    )

@@ -1,0 +1,146 @@
+"""One run of a condition generation by generation, for trials that take their time: by asking and telling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.evolution import (
+    Genome,
+    NearestArchive,
+    PaperArchive,
+    Population,
+    genome_record,
+    sorted_cells_distance,
+)
+from realitygap.kernels._genome import first_genomes, make_genomes
+
+from ._condition import Condition
+
+N_INPUTS = 3
+N_OUTPUTS = 2
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An individual that is to be tried.
+
+    Attributes:
+        genome: its genes.
+        species: the species it belongs to.
+        parents: individuals of the generation before from which it descends.
+    """
+
+    genome: Genome
+    species: int
+    parents: tuple[int, ...]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The genome as a row of results has it."""
+        return genome_record(self.genome)
+
+
+@dataclass(frozen=True)
+class Told:
+    """What selection made of a generation.
+
+    Attributes:
+        fitness: (n,) the number that it uses.
+        novelty: (n,) of each individual; None unless selection is novelty.
+    """
+
+    fitness: tuple[float, ...]
+    novelty: tuple[float | None, ...]
+
+
+class Evolution:
+    """One run: `ask` for a generation, `tell` the cells that each individual visited, and so on.
+
+    What is asked is a function of the condition, the replicate and what was told: as in the whole runs that
+    `run_replicates` carries out, by the same kernels and with the same random numbers. The novelty archive is updated
+    after the whole generation, in the order of individuals.
+    """
+
+    def __init__(self, condition: Condition, replicate: int) -> None:
+        self._condition = condition
+        self._replicate = replicate
+        self.generation = 0
+        bias = condition.has_bias_input
+        self._population = Population(
+            N_INPUTS, N_OUTPUTS, condition.neat, replicate=replicate, bias=bias, key=condition.key
+        )
+        self._grid = condition.arena.arena().grid
+        self._archive = self._make_archive()
+
+    def ask(self) -> list[Asked]:
+        """This generation, in the order in which `tell` wants their cells."""
+        if self._condition.selection == "random":
+            return [Asked(genome, 0, ()) for genome in self._unrelated()]
+        return [
+            Asked(genome, int(species), tuple(int(parent) for parent in parents if parent >= 0))
+            for genome, species, parents in zip(
+                self._population.ask(), self._population.species, self._population.parents, strict=True
+            )
+        ]
+
+    def tell(self, cells: Sequence[Sequence[int]]) -> Told:
+        """Take the cells that each individual visited, and breed the next generation.
+
+        Args:
+            cells: n lists, in the order of individuals; their order within a list does not matter.
+
+        Raises:
+            ValueError: Another number of lists, or a cell outside the grid.
+        """
+        n = self._condition.neat.population
+        if len(cells) != n:
+            raise ValueError(f"There are cells of {len(cells)} individuals, expected {n}.")
+        coverage = [len(set(each)) / self._grid.n_cells for each in cells]
+        if self._archive is None:
+            told = Told(tuple(coverage), (None,) * n)
+        else:
+            novelty = tuple(float(value) for value in self._archive(cells))
+            told = Told(novelty, novelty)
+        if self._condition.selection != "random":
+            self._population.tell(told.fitness)
+        self.generation += 1
+        return told
+
+    def _unrelated(self) -> list[Genome]:
+        """Networks without parents, others in each generation."""
+        rules = self._condition.neat_rules
+        genomes = make_genomes(
+            self._condition.neat.population, N_OUTPUTS, rules.n_first_genes, rules.start_hidden + 1
+        )
+        first_genomes(genomes, rules, np.uint64(self._condition.key), self._replicate, self.generation)
+        bias_value = float(self._condition.neat.bias_value)
+        return [Genome(genomes, row, rules, bias_value) for row in range(self._condition.neat.population)]
+
+    def _make_archive(self) -> Any:
+        """From the behaviors of a generation to their novelty; None where selection is something else."""
+        if self._condition.selection != "novelty":
+            return None
+        settings, grid = self._condition.novelty, self._grid
+        if settings.kind == "paper":
+            return PaperArchive(settings, columns=grid.columns, rows=grid.rows).update
+
+        def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+            cells = [np.flatnonzero(each) for each in (one, other)]
+            return sorted_cells_distance(*cells, columns=grid.columns, rows=grid.rows, sort=settings.sort)
+
+        nearest = NearestArchive(
+            distance, k=settings.neighbors, threshold=settings.threshold, patience=settings.patience
+        )
+
+        def update(behaviors: Sequence[Sequence[int]]) -> NDArray[np.float64]:
+            visited = np.zeros((len(behaviors), grid.n_cells))
+            for row, cells in enumerate(behaviors):
+                visited[row, list(cells)] = 1.0
+            return nearest.update(visited)
+
+        return update

@@ -1,0 +1,343 @@
+"""Carrying out the physical conditions of a study: planned, driven, scored, closed, generation by generation."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from realitygap.errors import LedgerError, RobotError, StudyError
+from realitygap.records import Generation, Individual, Ledger, Trial, complete_runs
+from realitygap.robots import Robot, ScribblerPlatform
+from realitygap.runs import Condition, Evolution
+from realitygap.trials import (
+    Card,
+    DrivenTrial,
+    EndReason,
+    Operator,
+    TrialInterrupted,
+    drive_trial,
+    preflight,
+)
+
+from ._blocks import Block, blocks_of, turns_of
+from ._study import Study
+
+OpenRobot = Callable[[ScribblerPlatform], Robot]
+"""Opens the robot at the port, with the settings of a condition."""
+
+
+@dataclass(frozen=True)
+class PhysicalResult:
+    """How far the physical conditions are.
+
+    Attributes:
+        n_runs: Runs of physical conditions in the study.
+        n_complete: Of them complete.
+        n_driven: Trials driven in this sitting.
+        waiting: What has to be done before it can go on; empty when nothing has.
+    """
+
+    n_runs: int
+    n_complete: int
+    n_driven: int
+    waiting: str
+
+
+def physical_conditions(study: Study) -> list[Condition]:
+    """Those that a robot drives."""
+    return [condition for condition in study.conditions if condition.is_physical]
+
+
+class PhysicalStudy:
+    """The physical conditions of a study, taken up where their ledger stands."""
+
+    def __init__(
+        self, study: Study, ledger: Ledger, operator: Operator, open_robot: OpenRobot, port: str
+    ) -> None:
+        """Take up a study.
+
+        Args:
+            study: As resolved.
+            ledger: Open for writing.
+            operator: Who places the robot and says what was drawn.
+            open_robot: Called when the first trial is to be driven.
+            port: What to call the robot's port in the ledger.
+        """
+        self._study = study
+        self._conditions = physical_conditions(study)
+        self._ledger = ledger
+        self._operator = operator
+        self._open_robot = open_robot
+        self._port = port
+        self._robot: Robot | None = None
+        self._opened_with: ScribblerPlatform | None = None
+        self._sitting = 0
+        self._evolutions: dict[tuple[str, int], Evolution] = {}
+        self._is_looked_at = False
+        self.n_driven = 0
+
+    def carry_out(self) -> str:
+        """Drive and score what is missing.
+
+        Returns:
+            What has to be done before it can go on; empty when the study is complete.
+
+        Raises:
+            RobotError: The robot failed; what became of the trial in flight is asked when the study goes on.
+            LedgerError: The ledger cannot be written or trusted.
+            StudyError: The operator did not accept the pre-flight.
+            TrialInterrupted: The program is being stopped.
+        """
+        for condition in self._conditions:
+            self._ledger.add_condition(
+                condition.name,
+                condition.hash(),
+                condition.settings(),
+                n_generations=condition.neat.generations,
+                n_cells=condition.arena.arena().grid.n_cells,
+            )
+        try:
+            for block in blocks_of(self._conditions, self._study.about.replicates, self._study.trials):
+                if waiting := self._carry_out_block(block):
+                    return waiting
+        finally:
+            self._let_go()
+        return ""
+
+    # blocks
+
+    def _carry_out_block(self, block: Block) -> str:
+        missing = tuple(
+            (condition, replicate, generation)
+            for condition, replicate, generation in block
+            if generation >= len(self._ledger.generations(condition.name, replicate))
+        )
+        if missing:
+            self._plan(missing)
+        open_ones = [each for each in block if not self._is_closed(*each)]
+        if not open_ones:
+            return ""
+        for each in open_ones:
+            self._check_planned(*each)
+        while True:
+            if waiting := self._drive_and_enter(open_ones):
+                return waiting
+            taken_back = self._operator.close(self._cards(self._trials(open_ones)))
+            for number in taken_back:
+                self._ledger.undo(number)
+            if not taken_back:
+                break
+        for each in open_ones:
+            self._close(*each)
+        return ""
+
+    def _plan(self, generations: Block) -> None:
+        planned = [
+            Generation(condition.name, replicate, generation, self._individuals(condition, replicate))
+            for condition, replicate, generation in generations
+        ]
+        turns = turns_of(
+            generations,
+            self._study.trials,
+            first_sheet=self._ledger.last_sheet() + 1,
+            used_codes=self._ledger.used_codes(),
+        )
+        self._ledger.plan(planned, turns)
+
+    def _individuals(self, condition: Condition, replicate: int) -> list[Individual]:
+        """The generation that is due, bred from the scores so far."""
+        rules = condition.neat_rules
+        return [
+            Individual(
+                individual=number,
+                species=asked.species,
+                parents=asked.parents,
+                nodes=rules.n_inputs + rules.n_outputs + asked.genome.n_hidden,
+                genome=asked.record,
+                key=condition.key,
+            )
+            for number, asked in enumerate(self._evolution(condition, replicate).ask())
+        ]
+
+    def _evolution(self, condition: Condition, replicate: int) -> Evolution:
+        """A run brought to where the ledger stands, by telling it the frozen scores."""
+        evolution = self._evolutions.setdefault((condition.name, replicate), Evolution(condition, replicate))
+        for generation, is_closed in self._ledger.generations(condition.name, replicate):
+            if is_closed and generation >= evolution.generation:
+                self._check_planned(condition, replicate, generation)
+                rows = self._ledger.individuals(condition.name, replicate, generation)
+                told = evolution.tell([row["cells"] for row in rows])
+                if list(told.fitness) != [row["fitness"] for row in rows]:
+                    raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
+        return evolution
+
+    def _check_planned(self, condition: Condition, replicate: int, generation: int) -> None:
+        """Refuse to go on with individuals that this program would not have bred."""
+        evolution = self._evolutions.setdefault((condition.name, replicate), Evolution(condition, replicate))
+        if evolution.generation != generation:
+            evolution = self._evolution(condition, replicate)
+        rows = self._ledger.individuals(condition.name, replicate, generation)
+        if [row["genome"] for row in rows] != [asked.record for asked in evolution.ask()]:
+            raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
+
+    def _is_closed(self, condition: Condition, replicate: int, generation: int) -> bool:
+        return (generation, True) in self._ledger.generations(condition.name, replicate)
+
+    def _close(self, condition: Condition, replicate: int, generation: int) -> None:
+        evolution = self._evolution(condition, replicate)
+        trials = [
+            each
+            for each in self._ledger.trials(condition.name, replicate, generation)
+            if each.state == "scored"
+        ]
+        cells = {each.individual: each.cells or () for each in trials}
+        told = evolution.tell([cells[k] for k in range(condition.neat.population)])
+        self._ledger.close_generation(condition.name, replicate, generation, told.fitness, told.novelty)
+
+    # trials
+
+    def _trials(self, generations: Sequence[tuple[Condition, int, int]]) -> list[Trial]:
+        """Trials of these generations that are not void, in the order of their turns."""
+        found = [
+            trial
+            for condition, replicate, generation in generations
+            for trial in self._ledger.trials(condition.name, replicate, generation)
+            if trial.state != "void"
+        ]
+        return sorted(found, key=lambda trial: trial.place)
+
+    def _drive_and_enter(self, generations: Sequence[tuple[Condition, int, int]]) -> str:
+        """Drive and score all trials of these generations; what it waits for, if it cannot go on."""
+        while True:
+            trials = self._trials(generations)
+            running = [trial for trial in trials if trial.state == "running"]
+            planned = [trial for trial in trials if trial.state == "planned"]
+            if running:
+                self._settle(running[0])
+            elif planned:
+                self._drive(planned[0], len(planned))
+                self._enter(planned[0].sheet, generations)
+            else:
+                break
+        for sheet in dict.fromkeys(trial.sheet for trial in trials):
+            self._enter(sheet, generations)
+        left = [trial for trial in self._trials(generations) if trial.state == "driven"]
+        if not left:
+            return ""
+        return (
+            f"{len(left)} driven trials wait for their scores. `realitygap trials list` shows them and `realitygap "
+            "trials score` takes what was drawn; then run the same command again."
+        )
+
+    def _enter(self, sheet: int, generations: Sequence[tuple[Condition, int, int]]) -> None:
+        """Ask what was drawn, once all lines of a sheet are drawn."""
+        trials = [trial for trial in self._trials(generations) if trial.sheet == sheet]
+        if any(trial.state in ("planned", "running") for trial in trials):
+            return
+        driven = [trial for trial in trials if trial.state == "driven"]
+        if driven:
+            for number, score in self._operator.enter(self._cards(driven)).items():
+                self._ledger.score(number, score)
+
+    def _settle(self, trial: Trial) -> None:
+        problem = trial.problem or "the program ended while the trial was running"
+        (card,) = self._cards([trial])
+        self._ledger.settle(trial.trial, self._operator.settle(card, problem), problem)
+
+    def _drive(self, trial: Trial, n_left: int) -> None:
+        condition = self._condition(trial)
+        robot = self._ready(condition.scribbler)
+        (card,) = self._cards([trial], n_left)
+        self._operator.place(card)
+        network = self._evolution(condition, trial.replicate).ask()[trial.individual].genome.network()
+        self._ledger.start(trial.trial, self._sitting)
+        try:
+            driven = drive_trial(
+                robot,
+                network,
+                condition.scribbler.steps,
+                watch=lambda step, seen, command: self._operator.watch(card, step, seen, command),
+            )
+        except TrialInterrupted as error:
+            self._interrupt(trial, error.driven)
+            raise
+        self.n_driven += 1
+        if driven.end is EndReason.STEP_LIMIT:
+            score = self._operator.drawn(card, driven)
+            self._ledger.finish(trial.trial, driven.end, driven.steps, stalls=driven.stalls, score=score)
+            return
+        self._interrupt(trial, driven)
+        if driven.end is EndReason.LOST:
+            raise RobotError(
+                f"Trial {trial.trial}, step {len(driven.steps)} of {condition.scribbler.steps}: {driven.problem} "
+                "Nothing that was scored is lost. Put the robot right, then run the same command again: it asks what "
+                "becomes of this trial."
+            )
+
+    def _interrupt(self, trial: Trial, driven: DrivenTrial) -> None:
+        self._ledger.interrupt(
+            trial.trial, driven.end, driven.steps, stalls=driven.stalls, problem=driven.problem
+        )
+
+    def _condition(self, trial: Trial) -> Condition:
+        return next(condition for condition in self._conditions if condition.name == trial.condition)
+
+    def _cards(self, trials: Sequence[Trial], n_left: int = 0) -> list[Card]:
+        settings = self._study.trials
+        return [
+            Card(
+                trial=trial,
+                title=trial.code if settings.blind else trial.name,
+                pen=settings.pens[trial.pen % len(settings.pens)],
+                n_steps=self._condition(trial).scribbler.steps,
+                n_left=n_left,
+                key=self._condition(trial).key,
+                arena=self._condition(trial).arena.arena(),
+            )
+            for trial in trials
+        ]
+
+    # the robot
+
+    def _ready(self, platform: ScribblerPlatform) -> Robot:
+        """The robot, opened and looked at; opened anew where a condition wants other settings."""
+        wanted = platform.model_copy(update={"steps": 1})
+        if self._robot is not None and self._opened_with == wanted:
+            return self._robot
+        self._let_go()
+        self._robot, self._opened_with = self._open_robot(platform), wanted
+        self._begin_sitting(self._robot)
+        return self._robot
+
+    def _begin_sitting(self, robot: Robot) -> None:
+        before = self._ledger.sittings()
+        remembered = before[-1]["robot"] if before else None
+        self._operator.meet(robot)
+        found = preflight(robot, remembered)
+        if not self._is_looked_at and not self._operator.accept(found):
+            said = "; ".join(found.problems) or "the operator stopped there"
+            raise StudyError(f"The pre-flight was not accepted, and nothing was driven: {said}.")
+        self._is_looked_at = True
+        self._sitting = self._ledger.begin_sitting(
+            robot.label, self._port, found.robot, found.to_dict(), [each.name for each in self._conditions]
+        )
+
+    def _let_go(self) -> None:
+        if self._robot is not None:
+            robot, self._robot = self._robot, None
+            with contextlib.suppress(RobotError, LedgerError):  # what was said before is what matters
+                robot.close()
+                self._ledger.end_sitting(self._sitting)
+
+
+def _bred_otherwise(ledger: Ledger, condition: Condition, replicate: int, generation: int) -> str:
+    return (
+        f"{ledger.path}: generation {generation} of {condition.name!r}, run {replicate}, is not what this realitygap "
+        "makes of the scores before it. Was the ledger begun by another version? Use that one."
+    )
+
+
+def n_complete(ledger: Ledger, conditions: Sequence[Condition], replicates: int) -> int:
+    """How many runs of these conditions are complete, of those that the study asks for."""
+    return sum(run < replicates for each in conditions for run in complete_runs(ledger, each.name))

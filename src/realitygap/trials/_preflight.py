@@ -1,0 +1,126 @@
+"""Before the first trial: is this the right robot, and is it fit to drive?"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import statistics
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from realitygap.errors import RobotError
+from realitygap.robots import Clock, Command, Robot, SystemClock
+
+N_READS = 10
+"""Observations by which the link and the sensors are judged."""
+
+LEAST_BATTERY_V = 6.15
+"""Below it the Fluke 1 blinks for new batteries (its firmware), and with weak cells Bluetooth drops out."""
+
+_LOAD = Command(0.0, 0.5)
+"""A turn on the spot, by which the motors load the battery."""
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What a pre-flight found.
+
+    Attributes:
+        facts: Name and value of each thing looked at, as a person reads them.
+        problems: What speaks against driving; empty when nothing does.
+        robot: What tells this robot from another: model, fluke and name.
+    """
+
+    facts: dict[str, str]
+    problems: tuple[str, ...]
+    robot: dict[str, str] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As the ledger keeps it."""
+        return {"facts": self.facts, "problems": list(self.problems)}
+
+
+def preflight(robot: Robot, remembered: Mapping[str, str] | None = None) -> Preflight:
+    """Look at a robot that is free to turn on the spot for one command.
+
+    Args:
+        robot: Connected.
+        remembered: What the robot of earlier sittings was told by; None before the first.
+
+    Raises:
+        RobotError: It does not answer.
+    """
+    clock: Clock = getattr(robot, "clock", None) or SystemClock()
+    facts: dict[str, str] = {"label": robot.label}
+    problems: list[str] = []
+    identity = identity_of(robot)
+    facts |= identity
+    problems += _other_robot(identity, remembered)
+    times, raws = [], []
+    for _ in range(N_READS):
+        began = clock.now()
+        raws.append(robot.observe().raw)
+        times.append(clock.now() - began)
+    facts["round trip"] = f"{1000 * statistics.median(times):.0f} ms, at most {1000 * max(times):.0f} ms"
+    if max(times) > robot.step_s:
+        problems.append(
+            f"reading the sensors took up to {max(times):.2f} s, longer than a command ({robot.step_s:g} s): the link "
+            "is too slow"
+        )
+    facts["readings"] = ", ".join(f"{value:g}" for value in raws[-1])
+    problems += _insane(raws, robot.n_sensors, getattr(robot, "reading_max", None))
+    volts = _battery_under_load(robot)
+    facts["battery under load"] = "not told" if volts is None else f"{volts:.2f} V"
+    if volts is not None and volts < LEAST_BATTERY_V:
+        problems.append(
+            f"the battery has {volts:.2f} V under load, expected at least {LEAST_BATTERY_V} V: change it"
+        )
+    return Preflight(facts, tuple(problems), identity)
+
+
+def identity_of(robot: Robot) -> dict[str, str]:
+    """What tells a robot from another, as far as it says so itself."""
+    info = getattr(robot, "info", None)
+    found = {name: getattr(info, name, None) for name in ("model", "fluke")}
+    with contextlib.suppress(RobotError):
+        found["name"] = getattr(robot, "name", None)
+    return {name: str(value).strip() for name, value in found.items() if value is not None}
+
+
+def _other_robot(identity: Mapping[str, str], remembered: Mapping[str, str] | None) -> list[str]:
+    differing = [
+        f"{name} is {identity.get(name, 'not told')!r}, before {value!r}"
+        for name, value in (remembered or {}).items()
+        if identity.get(name) != value
+    ]
+    return [f"this is another robot than before: {', '.join(differing)}"] if differing else []
+
+
+def _insane(raws: list[tuple[float, ...]], n_sensors: int, reading_max: float | None) -> list[str]:
+    """What cannot be right about the readings of several moments."""
+    if any(len(raw) != n_sensors for raw in raws):
+        return [f"{len(raws[-1])} sensors answer, expected {n_sensors}"]
+    values = [value for raw in raws for value in raw]
+    if not all(math.isfinite(value) and value >= 0 for value in values):
+        return ["a reading is no number from 0 on"]
+    if reading_max is not None and all(value >= reading_max for value in values):
+        return [
+            f"all readings are at their limit ({reading_max:g}) all the time: take the robot away from the wall, or "
+            "lower ir_power"
+        ]
+    return []
+
+
+def _battery_under_load(robot: Robot) -> float | None:
+    """Voltage while both motors run [V]; None where the robot cannot tell."""
+    battery = getattr(robot, "battery", None)
+    if battery is None:
+        return None
+    try:
+        robot.drive(_LOAD)
+        return float(battery())
+    except RobotError:
+        return None
+    finally:
+        robot.stop()

@@ -1,0 +1,285 @@
+"""The operator's questions in a real (pseudo-)terminal, and without one."""
+
+from __future__ import annotations
+
+import io
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from realitygap.cli import main
+from realitygap.cli._grid_editor import GridEdit, edit_cells
+from realitygap.records import LEDGER_NAME, Ledger
+from realitygap.world import paper_arena
+
+from .fake_port import open_fake
+
+ROOT = Path(__file__).parents[2]
+COMMAND = [sys.executable, "-m", "tests.cli.fake_port"]
+PATIENCE_S = 60
+
+STUDY = """
+[study]
+name = "small"
+replicates = 1
+
+[neat]
+population = 2
+generations = 1
+
+[trials]
+pens = ["red", "blue"]
+
+[platform.scribbler]
+steps = 3
+
+[[condition]]
+name = "robot"
+platform = "scribbler"
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(STUDY)
+    return path
+
+
+class Terminal:
+    """A command in a pseudo-terminal, with somebody who reads what is asked and types."""
+
+    def __init__(self, *arguments: str) -> None:
+        import pty
+
+        self._own, theirs = pty.openpty()
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "TERM": "dumb", "COLUMNS": "100"}
+        self._process = subprocess.Popen(
+            [*COMMAND, *arguments],
+            stdin=theirs, stdout=theirs, stderr=theirs, cwd=ROOT, env=environment, close_fds=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background job ignores it
+        )  # fmt: skip
+        os.close(theirs)
+        self.seen = ""
+        self._mark = 0
+
+    def wait_for(self, text: str) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while text not in self.seen[self._mark :]:
+            assert time.monotonic() < until, f"{text!r} was not asked; seen: {self.seen[self._mark :]!r}"
+            if not self._read():
+                raise AssertionError(f"It ended before {text!r}; seen: {self.seen[self._mark :]!r}")
+        self._mark = self.seen.index(text, self._mark) + len(text)
+
+    def answer(self, question: str, keys: str) -> None:
+        self.wait_for(question)
+        os.write(self._own, keys.encode())
+
+    def interrupt(self) -> None:
+        """What Ctrl-C does."""
+        self._process.send_signal(signal.SIGINT)
+
+    def end(self) -> int:
+        while self._read():
+            pass
+        return self._process.wait(PATIENCE_S)
+
+    def _read(self) -> bool:
+        if not select.select([self._own], [], [], PATIENCE_S)[0]:
+            raise AssertionError(f"Nothing came; seen: {self.seen[self._mark :]!r}")
+        try:
+            data = os.read(self._own, 4096)
+        except OSError:  # what Linux says when the other end is closed
+            return False
+        self.seen += data.decode(errors="replace")
+        return bool(data)
+
+
+pty_only = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+
+
+@pty_only
+def test_a_person_is_led_through_a_study(tmp_path, study):
+    out = tmp_path / "out"
+    terminal = Terminal("run", str(study), "--port", "real", "--out", str(out), "--who", "anna")
+    terminal.answer("then press Enter", "\n")
+    terminal.wait_for("battery under load: 7.20 V")
+    terminal.wait_for("pen: red")
+    terminal.wait_for("facing right")
+    terminal.answer("Enter drives", "n the floor is wet\n")
+    terminal.answer("Enter drives", "\n")
+    terminal.wait_for("step   3/3")
+    terminal.answer("Enter drives", "\n")
+    # a sheet of two lines: the first goes right and up, with a cell taken back
+    terminal.answer("Escape: later", " \x1b[C\x1b[C u\x1b[A \r")
+    terminal.answer("Escape: later", "dlll\r")
+    # the second score is taken back and entered anew
+    terminal.answer("Enter closes it", "2\n")
+    terminal.answer("Escape: later", "dl\r")
+    terminal.answer("Enter closes it", "\n")
+    assert terminal.end() == 0
+    assert "1 of 1 runs on a robot are complete. 2 trials were driven just now." in terminal.seen
+    with Ledger.open(out / LEDGER_NAME) as ledger:
+        trials = ledger.trials()
+        assert [trial.state for trial in trials] == ["scored", "scored"]
+        assert set(trials[0].cells) == {27}
+        assert set(trials[1].cells) == {13, 14}
+        assert [(note["text"], note["who"], note["trial"]) for note in ledger.notes()] == [
+            ("the floor is wet", "anna", 1)
+        ]
+        undone = [row for row in ledger.scores() if row["undone"]]
+        assert [set(row["cells"]) for row in undone] == [{13, 14, 15, 16}]
+        assert ledger.conditions()["robot"]["label"] == "REAL"
+
+
+@pty_only
+def test_a_key_aborts_a_trial_and_the_operator_says_what_becomes_of_it(tmp_path, study):
+    long = study.read_text().replace("steps = 3", "steps = 30000")
+    study.write_text(long)
+    out = tmp_path / "out"
+    terminal = Terminal("run", str(study), "--port", "real", "--out", str(out), "--score", "later")
+    terminal.answer("then press Enter", "\n")
+    terminal.answer("Enter drives", "\n")
+    terminal.answer("space aborts", " ")
+    terminal.wait_for("aborted by the operator before step")
+    terminal.answer("d: driven", "what\n")
+    terminal.answer("d: driven", "v\n")
+    terminal.wait_for("Enter drives")
+    terminal.interrupt()
+    assert terminal.end() == 130
+    assert "Traceback" not in terminal.seen
+    with Ledger.open(out / LEDGER_NAME) as ledger:
+        states = [(trial.individual, trial.attempt, trial.state) for trial in ledger.trials()]
+        assert states == [(0, 0, "void"), (0, 1, "planned"), (1, 0, "planned")]
+
+
+@dataclass
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def no_terminal(monkeypatch, capsys):
+    """Commands in this process, with nobody at a terminal."""
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setattr("realitygap.study._run.connect_robot", open_fake)
+
+    def command(*arguments: str) -> Done:
+        monkeypatch.setattr(sys, "argv", ["realitygap", *arguments])
+        try:
+            main()
+            code = 0
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        return Done(code, *capsys.readouterr())
+
+    return command
+
+
+def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path, study, no_terminal):
+    out = tmp_path / "out"
+    run = ("run", str(study), "--port", "real", "--out", str(out))
+    refused = no_terminal(*run)
+    assert refused.returncode == 1
+    assert "There is no terminal in which to ask" in refused.stderr
+    assert "--no-wait drives without waiting" in refused.stderr
+    assert "Traceback" not in refused.stderr
+    driven = no_terminal(*run, "--no-wait")
+    assert driven.returncode == 0, driven.stderr
+    assert "2 driven trials wait for their scores" in driven.stdout
+    sheet = tmp_path / "sheet.txt"
+    sheet.write_text("# sheet 1\n1: 13 14 15\n\n2: 13,26\n")
+    scored = no_terminal("trials", "score", str(out), "--file", str(sheet), "--who", "anna")
+    assert scored.stdout == "Trial 1: 3 cells.\nTrial 2: 2 cells.\n"
+    second = no_terminal("trials", "score", str(out), "1", "--cells", "13,14", "--second", "--who", "ben")
+    assert second.returncode == 0, second.stderr
+    agreement = no_terminal("trials", "agreement", str(out))
+    assert (
+        "1 trials counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
+        in agreement.stdout
+    )
+    assert no_terminal(*run).returncode == 0
+    with Ledger.open(out / LEDGER_NAME) as ledger:
+        assert [row["fitness"] for row in ledger.individuals("robot", 0, 0)] == [3 / 72, 2 / 72]
+    refused = no_terminal("trials", "undo", str(out), "1")
+    assert refused.returncode == 1
+    assert "is closed: its score bred the next one and stays" in refused.stderr
+    corrected = no_terminal("trials", "score", str(out), "1", "--cells", "13 14", "--correct")
+    assert corrected.returncode == 0
+    listed = no_terminal("trials", "list", str(out))
+    assert "2 trials: 2 scored." in listed.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("score", "1", "--cells", "13,x"), "--cells: expected numbers of cells such as 0,1,13, came '13,x'"),
+        (("score", "1", "--cells", "72"), "Cell 72 is outside the grid: expected numbers from 0 to 71"),
+        (("score", "9", "--cells", "1"), "has no trial 9: its trials are 1 to 2"),
+        (("score", "QQQQ", "--cells", "1"), "has no trial 'QQQQ'"),
+        (("score", "1", "--cells", " "), "No cell was named"),
+        (("score",), "There is no terminal in which to pick cells"),
+        (("void", "1"), "--text is missing"),
+        (("undo",), "a trial is missing"),
+        (("undo", "1"), "is driven; that can be done only while it is scored"),
+        (("note", "--text", " "), "A note without a word was not taken"),
+        (("lst",), "Did you mean 'list'?"),
+        (("agreement",), "no trial was counted by two people yet"),
+    ],
+)
+def test_wrong_input_gets_one_clear_message(driven, arguments, said, no_terminal):
+    what, *rest = arguments
+    done = no_terminal("trials", what, str(driven), *rest)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.fixture
+def driven(tmp_path, study, no_terminal):
+    """A folder whose two trials are driven and not scored."""
+    out = tmp_path / "out"
+    done = no_terminal("run", str(study), "--port", "real", "--out", str(out), "--no-wait")
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def keys(*names: str):
+    return iter([*names, None]).__next__
+
+
+def test_cells_are_marked_cleared_and_taken_back():
+    arena = paper_arena()
+    written = []
+    cells = edit_cells(
+        arena.grid, arena.start, keys("right", "space", "up", "space", "u", "enter"), written.append
+    )
+    assert cells == [13, 14]
+    assert "[#]" in "".join(written)
+
+
+def test_later_enters_nothing():
+    arena = paper_arena()
+    assert edit_cells(arena.grid, arena.start, keys("right", "space", "escape"), lambda text: None) is None
+    assert edit_cells(arena.grid, arena.start, keys("space"), lambda text: None) is None
+
+
+def test_the_cursor_stays_in_the_grid():
+    edit = GridEdit(3, 2)
+    for key in ("left", "down", "d", "right", "right", "right", "up", "up"):
+        edit.press(key)
+    assert (edit.column, edit.row) == (2, 1)
+    assert edit.cells == [0, 1, 2, 5]
+    assert edit.lines()[0].split() == ["1", ".", ".", "[#]"]
+    assert edit.press("enter") == "done"
+    edit.press("c")
+    assert edit.press("enter") is None, "an empty line is none"

@@ -1,0 +1,411 @@
+"""The ledger of physical trials: nothing is lost, nothing is deleted, and what is closed stays."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import threading
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from realitygap.errors import LedgerError, RecordVersionError
+from realitygap.records import (
+    SCHEMA,
+    Generation,
+    Individual,
+    Ledger,
+    Score,
+    Step,
+    Turn,
+    complete_runs,
+    ledger_frame,
+)
+
+GENOME = {
+    "hidden": [], "biases": [], "innovation": [0, 1], "source": [0, 1], "target": [3, 4], "weight": [0.5, -1.25],
+    "enabled": [True, False],
+}  # fmt: skip
+STEP = Step(0.5, (0.0, 1700.0, 12.0), (0.0, 1.0, 0.007), True, 0.25, -1.0)
+
+
+def new_ledger(path, n=2, n_generations=1):
+    ledger = Ledger.create(path / "ledger.sqlite")
+    ledger.add_condition("a", "hash", {"noise": 0.0}, n_generations=n_generations, n_cells=72)
+    plan(ledger, 0, n)
+    return ledger
+
+
+def plan(ledger, generation, n=2):
+    individuals = [Individual(k, 0, [], 5, GENOME, 2**64 - 1) for k in range(n)]
+    turns = [Turn("a", 0, generation, k, generation + 1, k, f"C{generation}{k}") for k in range(n)]
+    ledger.plan([Generation("a", 0, generation, individuals)], turns)
+
+
+def sit(ledger, label="EMULATED"):
+    return ledger.begin_sitting(label, "port", {"name": "Fake"}, {}, ["a"])
+
+
+def drive(ledger, number, cells=(13, 14)):
+    ledger.start(number, sit(ledger))
+    ledger.finish(number, "step limit", [STEP], stalls=1, score=Score(cells, "witness", n_ends=1))
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    with new_ledger(tmp_path) as ledger:
+        yield ledger
+
+
+def states(ledger):
+    return [(trial.individual, trial.attempt, trial.state) for trial in ledger.trials()]
+
+
+def test_a_trial_goes_from_planned_to_scored(ledger):
+    number = ledger.trials()[0].trial
+    ledger.start(number, sit(ledger))
+    assert ledger.trial(number).state == "running"
+    ledger.finish(number, "step limit", [STEP, STEP], stalls=2)
+    assert (ledger.trial(number).state, ledger.trial(number).n_steps) == ("driven", 2)
+    assert ledger.steps(number) == [STEP, STEP]
+    ledger.score(number, Score([14, 13, 14], "anna"))
+    assert (ledger.trial(number).state, ledger.trial(number).cells) == ("scored", (14, 13))
+    assert [event["what"] for event in ledger.events()] == [
+        "planned",
+        "planned",
+        "running",
+        "driven",
+        "scored",
+    ]
+
+
+def test_a_void_trial_stays_and_another_is_planned(ledger):
+    drive(ledger, 1)
+    ledger.void(1, "the pen fell out")
+    assert states(ledger) == [(0, 0, "void"), (0, 1, "planned"), (1, 0, "planned")]
+    again = ledger.trials()[1]
+    assert (again.code, again.place, again.sheet) == ("C00-2", 1, 1)
+    assert ledger.trial(1).reason == "the pen fell out"
+    drive(ledger, 2)
+    with pytest.raises(LedgerError, match="Give a reason"):
+        ledger.void(2, " ")
+
+
+def test_a_score_can_be_taken_back_and_is_kept_all_the_same(ledger):
+    drive(ledger, 1)
+    ledger.undo(1)
+    assert ledger.trial(1).cells is None
+    ledger.score(1, Score([20], "anna"))
+    assert ledger.trial(1).cells == (20,)
+    assert [(row["cells"], row["undone"] is None) for row in ledger.scores()] == [
+        ([13, 14], False),
+        ([20], True),
+    ]
+
+
+def test_closing_freezes_the_scores(ledger):
+    for number in (1, 2):
+        drive(ledger, number)
+    ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+    for forbidden in (
+        lambda: ledger.undo(1),
+        lambda: ledger.void(1, "why not"),
+        lambda: ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None]),
+    ):
+        with pytest.raises(LedgerError, match="is closed"):
+            forbidden()
+    ledger.score(1, Score([1, 2, 3], "ben"), "correction")
+    rows = ledger.individuals("a", 0, 0)
+    assert [row["cells"] for row in rows] == [[13, 14], [13, 14]], "resuming ignores corrections"
+    frame = ledger_frame(ledger, "a")
+    assert frame.schema == SCHEMA
+    assert frame["cells"].to_list() == [[1, 2, 3], [13, 14]], "reports use them"
+    assert frame["fitness"].to_list() == [0.5, 0.25]
+    assert frame["key"].to_list() == [2**64 - 1] * 2
+    assert frame["connections"].to_list() == [1, 1]
+
+
+def test_a_generation_with_an_unscored_trial_is_not_closed(ledger):
+    drive(ledger, 1)
+    with pytest.raises(LedgerError, match=r"individuals \[1\] are not scored"):
+        ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+    assert ledger.generations("a", 0) == [(0, False)]
+
+
+def test_a_correction_before_closing_is_refused(ledger):
+    drive(ledger, 1)
+    with pytest.raises(LedgerError, match="take its score back"):
+        ledger.score(1, Score([1], "ben"), "correction")
+
+
+def test_only_complete_runs_are_rows(tmp_path):
+    with new_ledger(tmp_path, n_generations=2) as ledger:
+        for number in (1, 2):
+            drive(ledger, number)
+        ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+        assert complete_runs(ledger, "a") == []
+        assert ledger_frame(ledger, "a").is_empty()
+        plan(ledger, 1)
+        for number in (3, 4):
+            drive(ledger, number)
+        ledger.close_generation("a", 0, 1, [0.5, 0.25], [None, None])
+        assert complete_runs(ledger, "a") == [0]
+        assert ledger_frame(ledger, "a").height == 4
+
+
+@pytest.mark.parametrize("table", ["trials", "scores", "notes", "events", "steps", "individuals", "sittings"])
+def test_the_file_itself_lets_nothing_be_deleted(ledger, table):
+    drive(ledger, 1)
+    ledger.note("a note", "anna", 1)
+    with sqlite3.connect(ledger.path) as other, pytest.raises(sqlite3.IntegrityError, match="ever deleted"):
+        other.execute(f"DELETE FROM {table}")
+
+
+@pytest.mark.parametrize(
+    ("do", "said"),
+    [
+        (
+            lambda ledger: ledger.score(1, Score([1], "anna")),
+            "is planned; that can be done only while it is driven",
+        ),
+        (lambda ledger: ledger.start(9, 1), "has no trial 9: its trials are 1 to 2"),
+        (lambda ledger: ledger.undo(1), "only while it is scored"),
+        (lambda ledger: ledger.settle(1, "void", "x"), "only while it is running"),
+        (lambda ledger: ledger.note("x", "anna", 9), "has no trial 9"),
+        (lambda ledger: plan(ledger, 0), "does not allow that"),
+        (
+            lambda ledger: ledger.add_condition("a", "other", {}, n_generations=1, n_cells=72),
+            "other settings",
+        ),
+    ],
+)
+def test_what_cannot_be_done_changes_nothing(ledger, do, said):
+    before = (ledger.trials(), ledger.events())
+    with pytest.raises(LedgerError, match=said):
+        do(ledger)
+    assert (ledger.trials(), ledger.events()) == before
+
+
+def test_the_label_is_that_of_the_first_sitting(ledger):
+    sit(ledger)
+    with pytest.raises(LedgerError, match="never mixed"):
+        sit(ledger, "REAL")
+
+
+# --- files --------------------------------------------------------------------------------------------------
+
+
+def test_a_ledger_is_never_replaced(ledger):
+    with pytest.raises(LedgerError, match="is there already"):
+        Ledger.create(ledger.path)
+
+
+def test_no_ledger_is_one_clear_error(tmp_path):
+    with pytest.raises(LedgerError, match="There is no ledger at"):
+        Ledger.open(tmp_path / "ledger.sqlite")
+
+
+@pytest.mark.parametrize("data", [b"", b"SQLite format 3\0" + bytes(500), b"hello", bytes(5000)])
+def test_a_foreign_or_torn_file_is_refused_and_left_alone(tmp_path, data):
+    path = tmp_path / "ledger.sqlite"
+    path.write_bytes(data)
+    with pytest.raises(LedgerError, match=r"was left as it is\. Restore"):
+        Ledger.open(path)
+    assert path.read_bytes() == data
+
+
+def test_somebody_elses_database_is_refused(tmp_path):
+    path = tmp_path / "ledger.sqlite"
+    with sqlite3.connect(path) as other:
+        other.execute("CREATE TABLE trials (id)")
+    with pytest.raises(LedgerError, match="not a ledger of realitygap"):
+        Ledger.open(path)
+
+
+def test_every_torn_page_is_found_or_harmless(tmp_path):
+    """A page of zeros anywhere: opening says so, or everything reads as it was."""
+    with new_ledger(tmp_path) as ledger:
+        drive(ledger, 1)
+        wanted = (ledger.trials(), ledger.scores())
+    whole = (tmp_path / "ledger.sqlite").read_bytes()
+    n_refused = 0
+    for start in range(0, len(whole), 4096):
+        path = tmp_path / f"torn-{start}" / "ledger.sqlite"
+        path.parent.mkdir()
+        path.write_bytes(whole[:start] + bytes(4096) + whole[start + 4096 :])
+        said = ""
+        try:
+            with Ledger.open(path) as ledger:
+                assert (ledger.trials(), ledger.scores()) == wanted
+        except LedgerError as error:
+            said = str(error)
+        assert not said or "Restore" in said
+        n_refused += bool(said)
+    assert n_refused >= 5
+
+
+def test_a_ledger_cut_off_is_refused(tmp_path):
+    with new_ledger(tmp_path):
+        pass
+    path = tmp_path / "ledger.sqlite"
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+    with pytest.raises(LedgerError, match="is torn"):
+        Ledger.open(path)
+
+
+def test_another_format_is_refused(ledger):
+    with sqlite3.connect(ledger.path) as other:
+        other.execute("PRAGMA user_version = 2")
+    with pytest.raises(RecordVersionError, match="format 2; this realitygap reads format 1"):
+        Ledger.open(ledger.path)
+
+
+def test_a_locked_ledger_is_one_clear_error(ledger, monkeypatch):
+    ledger._connection.execute("PRAGMA busy_timeout = 50")
+    other = sqlite3.connect(ledger.path, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    with pytest.raises(LedgerError, match="another program has been writing to it"):
+        ledger.note("a note", "anna")
+    other.execute("ROLLBACK")
+    other.close()
+    ledger.note("a note", "anna")
+
+
+def test_readers_read_while_somebody_writes(ledger):
+    drive(ledger, 1)
+    with Ledger.open(ledger.path, writable=False) as reader:
+        drive(ledger, 2)
+        assert [trial.state for trial in reader.trials()] == ["scored", "scored"]
+        with pytest.raises(LedgerError, match="Could not write"):
+            reader.note("a note", "anna")
+
+
+def test_two_writers_take_turns(ledger):
+    def write(name):
+        with Ledger.open(ledger.path) as own:
+            for k in range(20):
+                own.note(f"{name} {k}", name)
+
+    threads = [threading.Thread(target=write, args=(name,)) for name in ("anna", "ben")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(ledger.notes()) == 40
+
+
+def test_what_was_committed_survives_a_copy_of_the_files_at_any_moment(tmp_path):
+    """As after a loss of power: the database and its log of writes as they lie on the disk, without a proper end."""
+    ledger = new_ledger(tmp_path)
+    drive(ledger, 1)
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for path in tmp_path.glob("ledger.sqlite*"):
+        if not path.name.endswith("-shm"):
+            shutil.copy(path, copy / path.name)
+    with Ledger.open(copy / "ledger.sqlite") as found:
+        assert found.trials() == ledger.trials()
+    ledger.close()
+
+
+# --- anything, in any order ---------------------------------------------------------------------------------
+
+
+class AnyOrder(RuleBasedStateMachine):
+    """What is done in any order leaves a ledger that a plain model agrees with."""
+
+    @initialize(folder=st.uuids())
+    def begin(self, folder):
+        import tempfile
+        from pathlib import Path
+
+        self.folder = Path(tempfile.mkdtemp())
+        self.ledger = new_ledger(self.folder)
+        self.sitting = sit(self.ledger)
+        self.model = {1: ["planned", None], 2: ["planned", None]}
+        self.n_scores = 0
+        self.is_closed = False
+
+    def teardown(self):
+        if hasattr(self, "ledger"):
+            self.ledger.close()
+            shutil.rmtree(self.folder)
+
+    def _try(self, allowed, do):
+        if allowed:
+            do()
+            return True
+        before = (self.ledger.trials(), self.ledger.events())
+        with pytest.raises(LedgerError):
+            do()
+        assert (self.ledger.trials(), self.ledger.events()) == before
+        return False
+
+    trials = st.integers(1, 4)
+
+    @rule(number=trials)
+    def start(self, number):
+        state = self.model.get(number, [None])[0]
+        if self._try(state == "planned", lambda: self.ledger.start(number, self.sitting)):
+            self.model[number][0] = "running"
+
+    @rule(number=trials)
+    def finish(self, number):
+        state = self.model.get(number, [None])[0]
+        if self._try(state == "running", lambda: self.ledger.finish(number, "step limit", [STEP], stalls=0)):
+            self.model[number][0] = "driven"
+
+    @rule(number=trials, cells=st.lists(st.integers(0, 71), min_size=1, max_size=4, unique=True))
+    def score(self, number, cells):
+        state = self.model.get(number, [None])[0]
+        if self._try(state == "driven", lambda: self.ledger.score(number, Score(cells, "anna"))):
+            self.model[number] = ["scored", tuple(cells)]
+            self.n_scores += 1
+
+    @rule(number=trials)
+    def undo(self, number):
+        state = self.model.get(number, [None])[0]
+        if self._try(state == "scored" and not self.is_closed, lambda: self.ledger.undo(number)):
+            self.model[number] = ["driven", None]
+
+    @rule(number=trials)
+    def void(self, number):
+        state = self.model.get(number, [None])[0]
+        allowed = state in ("running", "driven", "scored") and not self.is_closed
+        if self._try(allowed, lambda: self.ledger.void(number, "why not")):
+            self.model[number][0] = "void"
+            self.model[max(self.model) + 1] = ["planned", None]
+
+    @rule()
+    def reopen(self):
+        self.ledger.close()
+        self.ledger = Ledger.open(self.folder / "ledger.sqlite")
+
+    @precondition(lambda self: hasattr(self, "model"))
+    @rule()
+    def close(self):
+        counted = [state for state, _ in self.model.values() if state != "void"]
+        allowed = not self.is_closed and counted == ["scored", "scored"]
+        if self._try(allowed, lambda: self.ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])):
+            self.is_closed = True
+
+    @invariant()
+    def agrees_with_the_model(self):
+        if not hasattr(self, "model"):
+            return
+        found = {trial.trial: [trial.state, trial.cells] for trial in self.ledger.trials()}
+        for number, (state, cells) in self.model.items():
+            assert found[number][0] == state
+            if state == "scored":
+                assert found[number][1] == cells
+        assert len(found) == len(self.model)
+        assert len(self.ledger.scores()) == self.n_scores, "nothing is ever deleted"
+
+
+TestAnyOrder = AnyOrder.TestCase
+TestAnyOrder.settings = settings(
+    max_examples=25, stateful_step_count=25, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)

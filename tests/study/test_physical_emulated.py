@@ -1,0 +1,224 @@
+"""The physical conditions of a study over the wire: driver, bytes, emulator, ledger and NEAT, with no real time."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from realitygap.errors import RealityGapError
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.study import run_study
+from realitygap.trials import TrialInterrupted, WitnessOperator
+
+from .physical import scored, small_study
+
+ROOT = Path(__file__).parents[2]
+PORT = "emulator://s2?fluke=1&speed=off"
+LONGER = {"steps": "12"}
+
+
+def trials_of(path: Path) -> list:
+    with Ledger.open(path / LEDGER_NAME, writable=False) as ledger:
+        return ledger.trials()
+
+
+@pytest.mark.parametrize("selection", ["coverage", "novelty"])
+def test_a_study_runs_unattended_and_comes_out_the_same_again(tmp_path, selection):
+    study = small_study(selection, **LONGER)
+    for name in ("a", "b"):
+        result = run_study(study, tmp_path / name, port=PORT)
+        assert result.physical is not None
+        assert (result.physical.n_complete, result.physical.n_driven) == (1, 6)
+    assert scored(tmp_path / "a") == scored(tmp_path / "b")
+    folder = ResultsFolder.open(tmp_path / "a")
+    assert folder.digest() == ResultsFolder.open(tmp_path / "b").digest()
+    frame = folder.read()
+    assert (frame["coverage_ends"] <= frame["coverage_line"]).all()
+    assert frame["coverage_line"].max() > 2 / 72, "some robot moved"
+    with Ledger.open(tmp_path / "a" / LEDGER_NAME) as ledger:
+        assert ledger.conditions()["robot"]["label"] == "EMULATED"
+        (sitting,) = ledger.sittings()
+        assert sitting["robot"]["model"] == "s2"
+        assert sitting["ended"] is not None
+        steps = ledger.steps(1)
+        assert len(steps) == 12
+        assert all(abs((after.time - before.time) - 0.5) < 0.3 for before, after in itertools.pairwise(steps))
+        assert len(ledger.scores()[0]["path"]) == 4 * 12 + 1
+
+
+def killed_after(n_trials: int, path: Path, study) -> bool:
+    """Carry out the study in a process that is killed in the middle of a trial; whether it was."""
+    child = os.fork()
+    if child == 0:
+        try:
+            run_study(study, path, port=PORT, operator=KilledAfter(n_trials))
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        return os.WTERMSIG(status) == signal.SIGKILL
+    assert os.waitstatus_to_exitcode(status) == 0
+    return False
+
+
+class KilledAfter(WitnessOperator):
+    """Ends its process without warning at a step."""
+
+    def __init__(self, n_steps: int) -> None:
+        super().__init__()
+        self._left = n_steps
+
+    def watch(self, card, step, seen, command):
+        if self._left == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        self._left -= 1
+        return super().watch(card, step, seen, command)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kills processes")
+def test_a_study_killed_at_each_step_goes_on_as_if_nothing_had_happened(tmp_path):
+    study = small_study("novelty", steps="3")
+    run_study(study, tmp_path / "whole", port=PORT)
+    wanted = scored(tmp_path / "whole")
+    n_steps = 6 * 3
+    for step in range(n_steps):
+        path = tmp_path / f"killed-{step}"
+        assert killed_after(step, path, study)
+        states = [trial.state for trial in trials_of(path)]
+        assert states.count("running") == 1
+        assert states.count("scored") == step // 3
+        assert not killed_after(10**9, path, study)
+        assert scored(path) == wanted, step
+        void = [trial for trial in trials_of(path) if trial.state == "void"]
+        assert len(void) == 1, "the trial in flight alone was driven again"
+
+
+def inject(n_faults: int, folder: Path) -> None:
+    """Pull plugs and stop programs at random steps, over the wire to one emulated robot that outlives the programs."""
+    rng = random.Random(n_faults)
+    n_struck = 0
+    n_studies = 0
+    while n_struck < n_faults:
+        path = folder / f"study-{n_studies}"
+        port = f"{PORT}&id=faults-{os.getpid()}-{n_faults}-{n_studies}"
+        n_studies += 1
+        known: dict[int, tuple[int, ...] | None] = {}
+        for _ in range(1000):
+            operator = Faulty(rng)
+            result = None
+            try:
+                result = run_study(small_study("novelty", steps="3"), path, port=port, operator=operator)
+            except (RealityGapError, TrialInterrupted, KeyboardInterrupt):
+                assert operator.has_struck
+            n_struck += operator.has_struck
+            if operator.has_met and operator.kind != "hang-up":
+                assert operator.witness.motors() == (0.0, 0.0), operator.kind
+            if (path / LEDGER_NAME).exists():
+                now = {trial.trial: trial.cells for trial in trials_of(path) if trial.state == "scored"}
+                assert known.items() <= now.items()
+                known = now
+            if result is not None and result.physical.n_complete == 1:
+                break
+        else:
+            raise AssertionError("The study came to no end.")
+        assert operator.witness.motors() == (0.0, 0.0)
+
+
+class Faulty(WitnessOperator):
+    """Does something to the program or the link at a random step."""
+
+    def __init__(self, rng: random.Random) -> None:
+        super().__init__()
+        self.kind = rng.choice(("hang-up", "interrupt", "terminate", "noise", "abort"))
+        self.has_struck = self.has_met = False
+        self._left = rng.randrange(20)
+        self._port = None
+
+    def meet(self, robot):
+        super().meet(robot)
+        self._port = robot.port
+        self.has_met = True
+
+    def watch(self, card, step, seen, command):
+        super().watch(card, step, seen, command)
+        self._left -= 1
+        if self._left >= 0 or self.has_struck:
+            return False
+        self.has_struck = True
+        if self.kind == "interrupt":
+            raise KeyboardInterrupt
+        if self.kind == "terminate":
+            raise SystemExit(143)
+        if self.kind == "noise":
+            self._port._buffer += bytes((7, 109, 0))  # bytes that nobody sent
+        if self.kind == "hang-up":
+            self._port.close()
+        return self.kind == "abort"
+
+
+def test_no_fault_on_the_wire_loses_a_scored_trial_or_leaves_the_motors_running(tmp_path):
+    inject(20, tmp_path)
+
+
+@pytest.mark.long
+def test_two_thousand_faults_on_the_wire(tmp_path):
+    inject(2_000, tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_an_emulator_in_another_program_is_driven_and_witnessed(tmp_path):
+    """The command line on a pseudo-terminal, 50 times as fast as real time."""
+    (tmp_path / "small.toml").write_text(SMALL_FILE)
+    command = [sys.executable, "-m", "realitygap"]
+    emulator = subprocess.Popen(
+        [*command, "emulate", "scribbler", "--fluke", "1", "--link", str(tmp_path / "port"), "--witness", "0",
+         "--speed", "50"],
+        stdout=subprocess.PIPE, text=True, cwd=ROOT,
+    )  # fmt: skip
+    try:
+        witness = None
+        for line in emulator.stdout:
+            if found := re.search(r"(127\.0\.0\.1:\d+)", line):
+                witness = found[1]
+                break
+        assert witness is not None
+        out = tmp_path / "out"
+        done = subprocess.run(
+            [*command, "run", str(tmp_path / "small.toml"), "--out", str(out), "--port", str(tmp_path / "port"),
+             "--witness", witness],
+            capture_output=True, text=True, cwd=ROOT, timeout=120, check=False,
+        )  # fmt: skip
+    finally:
+        emulator.terminate()
+        emulator.wait(20)
+    assert done.returncode == 0, done.stderr
+    assert "1 of 1 runs on a robot are complete" in done.stdout
+    with Ledger.open(out / LEDGER_NAME) as ledger:
+        assert ledger.conditions()["robot"]["label"] == "EMULATED"
+
+
+SMALL_FILE = """
+[study]
+name = "small"
+replicates = 1
+
+[neat]
+population = 2
+generations = 1
+
+[platform.scribbler]
+steps = 4
+
+[[condition]]
+name = "robot"
+platform = "scribbler"
+"""

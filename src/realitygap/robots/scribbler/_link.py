@@ -445,7 +445,7 @@ class Link:
                 try:
                     if greeting:
                         self._await_silence(FORGET_S)
-                    if greeting == 1:
+                    if greeting == 1 and seen is None:
                         self._release_counter(STRANGER_PROBES)
                     answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
                     if info == seen or codec.is_plain_info(answer):

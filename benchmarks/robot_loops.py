@@ -48,7 +48,8 @@ def loops_a_second(port: str) -> float:
 def _info(model: str, fluke: str) -> bytes:
     board = {"none": "", "1": "fluke:2.9.1,", "2": "fluke:3.0.5,"}[fluke]
     robot = {"s1": "Robot-Version:2.6.2,Robot:Scribbler", "s2": "Robot-Version:1.1.5,Robot:Scribbler2"}[model]
-    return f"{board}{robot},Mode:Serial\n".encode()
+    echo = "P        " if model == "s1" else ""
+    return f"{echo}{board}{robot},Mode:Serial\n".encode()
 
 
 def _answers(model: str, fluke: str) -> dict[int, bytes]:
@@ -70,7 +71,7 @@ def _answer_at_once(master: int, model: str, fluke: str) -> None:
         if command[0] in boards or command[0] == Op.GET_INFO:
             os.write(master, answers[command[0]])
         else:
-            os.write(master, command + answers[command[0]])
+            os.write(master, command + answers.get(command[0], b""))
 
 
 @contextmanager

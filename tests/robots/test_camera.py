@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import ProtocolError, RobotError
-from realitygap.robots.scribbler import Blob, Scribbler
+from realitygap.robots.scribbler import Blob, Scribbler, _images
 
 from .peers import INFOS, ScriptedPort, greeting
 from .pictures import counted, jpeg_parts, slope
@@ -165,6 +165,17 @@ def test_a_picture_that_is_none_is_asked_again_and_then_one_clear_error():
     ):
         robot.picture("gray")
     assert port.writes.count(bytes([136, 1])) == 5
+
+
+def test_a_damaged_header_that_asks_for_a_huge_picture_is_refused_before_it_is_made():
+    header, scan = jpeg_parts(slope(128, 192))
+    at = header.index(b"\xff\xc0") + 5  # of the frame: marker, length, bits; then height and width
+    size = _images.Size(256, 192)
+    for height, width in ((60_000, 60_000), (192, 600)):
+        huge = header[:at] + height.to_bytes(2, "big") + width.to_bytes(2, "big") + header[at + 4 :]
+        with pytest.raises(ProtocolError, match=r"The picture cannot be read \("):
+            _images.jpeg_pixels(huge, scan, size, gray=True)
+    assert _images.jpeg_pixels(header, scan, size, gray=True).shape == (192, 256)
 
 
 def test_an_unknown_kind_and_a_missing_camera_are_said():

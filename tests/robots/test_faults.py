@@ -305,6 +305,14 @@ def test_a_port_where_nobody_answers_is_one_error_after_a_few_tries():
     assert port.clock.now() < 40
 
 
+def test_an_info_line_that_is_not_quite_as_known_is_taken_when_it_comes_twice():
+    line = b"Robot:Scribbler2,Robot-Version:1.2,Color:red,Mode:Serial\n"
+    port = ScriptedPort([*greeting(line)[:1], *greeting(line)])
+    robot = Scribbler(port)
+    assert (robot.info.model, robot.info.robot_version) == ("s2", "1.2")
+    port.check_all_said()
+
+
 def test_an_answer_of_something_else_is_no_scribbler():
     port = ScriptedPort([])
     port.write = lambda data: port.incoming.extend(b"login: \n") or len(data)  # type: ignore[method-assign]

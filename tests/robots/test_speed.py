@@ -5,7 +5,9 @@ Processor time, the least of several measurements: what else runs on the machine
 
 from __future__ import annotations
 
+import importlib.util
 import time
+from pathlib import Path
 
 import pytest
 
@@ -73,3 +75,16 @@ def test_driver_wire_and_emulator_do_two_thousand_loops_a_second(setup):
     with Scribbler(f"emulator://{setup}&seed=1&speed=off&timing=off") as robot:
         assert loops_a_second(robot) > WANTED
         assert robot.faults.recoveries == 0
+
+
+def test_the_benchmark_measures_every_set_up_with_every_peer(monkeypatch):
+    path = Path(__file__).parents[2] / "benchmarks" / "robot_loops.py"
+    spec = importlib.util.spec_from_file_location("robot_loops", path)
+    robot_loops = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(robot_loops)
+    monkeypatch.setattr(robot_loops, "LOOPS", 5)
+    monkeypatch.setattr(robot_loops, "REPEATS", 1)
+    monkeypatch.setattr(robot_loops, "SETUPS", robot_loops.SETUPS[:1] + robot_loops.SETUPS[-1:])
+    rates = robot_loops.measure()
+    assert set(rates) == set(robot_loops.PEERS)
+    assert all(rate > 0 for row in rates.values() for rate in row.values())

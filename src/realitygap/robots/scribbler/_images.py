@@ -38,8 +38,10 @@ def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels
     """
     try:
         with Image.open(io.BytesIO(header + scan[:-12]), formats=("JPEG",)) as file:
+            if file.width > 2 * size.width or file.height > 2 * size.height:
+                raise ValueError(f"it would be {file.width} x {file.height}")
             picture = file.convert("L" if gray else "RGB")
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
         raise ProtocolError(f"The picture cannot be read ({error}): a byte was lost or added") from error
     if picture.size != size:
         picture = picture.resize(size, Image.Resampling.NEAREST)

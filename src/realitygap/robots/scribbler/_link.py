@@ -14,20 +14,19 @@ import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.errors import ProtocolError, RobotError
 from realitygap.robots._clock import Clock, SystemClock
 
 from . import _codec as codec
 from ._codec import Request
-from ._opcodes import COUNTED, JPEG_HEADER, JPEG_SCAN, LINE, PACKET, Op
+from ._opcodes import COUNTED, JPEG_HEADER, PACKET, Op
+from ._reading import GAP_S, Fault, HangUp, Port, read_answer
 
 T = TypeVar("T")
 
 BAUD = 38400
-GAP_S = 0.5
-"""An answer that has begun and then is silent for so long has lost a byte [s]."""
 QUIET_S = 0.5
 """Silence after which nothing more is on its way [s]. Source: Myro's manual_flush."""
 FORGET_S = 1.2
@@ -56,8 +55,6 @@ SILENT_GREETINGS = 3
 """How often if nothing at all comes: one that was reset as its port was opened is back by then."""
 STRANGER_PROBES = 8
 """Enough to release a Fluke, and less than a packet for a robot that has none."""
-LONGEST_LINE = 512
-LONGEST_SCAN = 1 << 20
 
 
 try:
@@ -70,19 +67,6 @@ except ImportError:  # Windows
 
 _MOVING = frozenset((Op.SET_MOTORS, Op.PATH, Op.MOVE, Op.ARC, Op.TURN))
 _STEERING = _MOVING | {Op.SET_MOTORS_OFF}
-
-
-class Port(Protocol):
-    """What is needed of a port: what `serial.Serial` offers, in the same words."""
-
-    timeout: float | None
-
-    @property
-    def in_waiting(self) -> int: ...
-    def read(self, size: int = 1, /) -> bytes: ...
-    def write(self, data: bytes, /) -> int | None: ...
-    def open(self) -> None: ...
-    def close(self) -> None: ...
 
 
 @dataclass
@@ -124,32 +108,10 @@ class Exchange(NamedTuple):
     outcome: str
 
 
-class _Fault(Exception):  # noqa: N818  # not one that leaves this module
-    """A command that did not get its answer.
-
-    Attributes:
-        kind: What to raise when it is not put right.
-        understood: Whether the robot has certainly read the whole command.
-        got: The bytes that came.
-    """
-
-    def __init__(
-        self, text: str, kind: type[RobotError], got: bytes = b"", *, understood: bool = False
-    ) -> None:
-        super().__init__(text)
-        self.kind = kind
-        self.got = got
-        self.understood = understood
-
-
-class _HangUp(_Fault):
-    """The port is gone."""
-
-
 class _LostStep(Exception):  # noqa: N818
     """The two sides could not be brought to agree, for this reason."""
 
-    def __init__(self, fault: _Fault | None) -> None:
+    def __init__(self, fault: Fault | None) -> None:
         super().__init__(str(fault))
         self.fault = fault
 
@@ -225,7 +187,7 @@ class Link:
         self.lock = threading.RLock()
         self._motors: Request | None = None
         self._in_step = False
-        self._fault: _Fault | None = None
+        self._fault: Fault | None = None
         self._recoveries = RECOVERIES
         self._is_open = True
         port.timeout = GAP_S
@@ -266,14 +228,14 @@ class Link:
                 except _LostStep as happened:
                     fault, lost = happened.fault, True
                     break
-                except _Fault as happened:
+                except Fault as happened:
                     fault = happened
                     if not request.repeatable:
                         break
             raise self._failure(request, fault, attempt + 1, lost=lost) from fault
 
     def _exchange(self, request: Request, decode: Callable[[bytes], T]) -> T:
-        """Send a command once; where what is due does not come, raise `_Fault`."""
+        """Send a command once; where what is due does not come, raise `Fault`."""
         port = self.port
         since = self.clock.now()
         # A signal may take us out of here at any point, and leave the link in doubt.
@@ -287,16 +249,16 @@ class Link:
                     self._discard()
                 port.write(request.data)
                 if request.answer or request.echoed:
-                    got = self._read(request)
+                    got = read_answer(port, request, self.fluke)
                     if port.in_waiting:
-                        raise _Fault("More came than the answer", ProtocolError, got, understood=True)
+                        raise Fault("More came than the answer", ProtocolError, got, understood=True)
             except _HANG_UPS as error:
-                raise _HangUp(f"The port hung up ({error})", RobotError, got) from error
+                raise HangUp(f"The port hung up ({error})", RobotError, got) from error
             try:
                 value = decode(self._body(request, got))
             except ProtocolError as error:
-                raise _Fault(str(error), ProtocolError, got, understood=True) from error
-        except _Fault as fault:
+                raise Fault(str(error), ProtocolError, got, understood=True) from error
+        except Fault as fault:
             self._fault = fault
             self._record(request, since, fault.got, str(fault))
             raise
@@ -332,67 +294,8 @@ class Link:
             return got
         if not codec.is_echo(request.data, got[:PACKET]):
             text = f"The echo was {got[:PACKET].hex(' ')} in place of {request.data.hex(' ')}"
-            raise _Fault(text, ProtocolError, got)
+            raise Fault(text, ProtocolError, got)
         return got[PACKET:]
-
-    # --- reading ----------------------------------------------------------------------------------------------
-
-    def _read(self, request: Request) -> bytes:
-        """The bytes of an answer, with its echo."""
-        kind = request.answer
-        if kind >= 0:
-            return self._read_counted(request, PACKET if request.echoed else 0)
-        if kind == LINE:
-            return self._read_until(b"\n", request.wait_s, LONGEST_LINE)
-        if kind == JPEG_SCAN:
-            return self._read_until(b"\xff\xd9", request.wait_s, LONGEST_SCAN, more=12)
-        length = self._read_exactly(2, request.wait_s)
-        n = int.from_bytes(length, "big" if kind == COUNTED else "little")
-        return length + (self._read_exactly(n, GAP_S) if n else b"")
-
-    def _read_counted(self, request: Request, n_echo: int) -> bytes:
-        try:
-            return self._read_exactly(n_echo + request.answer, request.wait_s, n_echo)
-        except _Fault as fault:
-            if request.may_stay_out and self.fluke == "2" and fault.got == request.data:
-                return fault.got
-            raise
-
-    def _read_exactly(self, n: int, wait_s: float, n_echo: int = 0) -> bytes:
-        """So many bytes; `wait_s` of silence before the answer begins, or a gap within it, is a fault."""
-        got = self.port.read(n)
-        if len(got) == n:
-            return got
-        buffer = bytearray(got)
-        silent = 0.0 if got else GAP_S
-        while len(buffer) < n:
-            patience = wait_s if len(buffer) <= n_echo else GAP_S
-            if silent >= patience:
-                raise _short(bytes(buffer), n, patience, n_echo)
-            got = self.port.read(n - len(buffer))
-            buffer += got
-            silent = 0.0 if got else silent + GAP_S
-        return bytes(buffer)
-
-    def _read_until(self, end: bytes, wait_s: float, longest: int, more: int = 0) -> bytes:
-        """Bytes up to an end mark, and so many more after it."""
-        buffer = bytearray()
-        silent, searched = 0.0, 0
-        while (at := buffer.find(end, searched)) < 0:
-            searched = max(len(buffer) - len(end) + 1, 0)
-            if len(buffer) > longest:
-                raise _Fault(f"{len(buffer)} bytes came without an end", ProtocolError, bytes(buffer[:64]))
-            if silent >= (GAP_S if buffer else wait_s):
-                raise _short(bytes(buffer), len(buffer) + 1 + more, silent, 0)
-            got = self.port.read(max(self.port.in_waiting, 1 + more))
-            buffer += got
-            silent = 0.0 if got else silent + GAP_S
-        n = at + len(end) + more
-        if len(buffer) < n:
-            buffer += self._read_exactly(n - len(buffer), GAP_S)
-        if len(buffer) > n:
-            raise _Fault("More came than the answer", ProtocolError, bytes(buffer), understood=True)
-        return bytes(buffer)
 
     def _discard(self) -> int:
         """Throw away what has come."""
@@ -415,22 +318,22 @@ class Link:
         n_silent = 0
         for _ in range(self._recoveries):
             try:
-                if isinstance(fault, _HangUp):
+                if isinstance(fault, HangUp):
                     self._reopen(fault)
                 self._settle(fault)
                 self._motors = motors if fault is not None else None
                 return
-            except _Fault as happened:
+            except Fault as happened:
                 fault = happened
             except _HANG_UPS as error:
-                fault = _HangUp(f"The port hung up ({error})", RobotError)
+                fault = HangUp(f"The port hung up ({error})", RobotError)
             n_silent += not fault.got
             if n_silent == SILENT_RECOVERIES:
                 break
         self._fault = fault
         raise _LostStep(fault)
 
-    def _settle(self, fault: _Fault | None) -> None:
+    def _settle(self, fault: Fault | None) -> None:
         """Silence, then commands whose answers prove that the two sides agree."""
         if fault is None:  # a signal came in between: what was sent was whole, and stopping is urgent
             self.port.write(codec.STOP.data)
@@ -439,7 +342,7 @@ class Link:
         if not self._await_silence(silence_s):
             self.port.write(codec.ECHO_OFF.data)  # a robot calls out its name until its first command
             if not self._await_silence(silence_s):
-                raise _Fault("The port is never silent, as no Scribbler would be", ProtocolError)
+                raise Fault("The port is never silent, as no Scribbler would be", ProtocolError)
         if self.fluke != "none" and not understood:
             self._release_counter(MAX_PROBES)
         if not self.has_robot:
@@ -447,7 +350,7 @@ class Link:
             return
         try:
             self._exchange(codec.STOP, codec.sensor_block)
-        except _Fault as disturbed:
+        except Fault as disturbed:
             if disturbed.kind is not ProtocolError:
                 raise
         self._exchange(codec.ECHO_OFF, codec.sensor_block)
@@ -493,11 +396,11 @@ class Link:
         got = self.port.read(2)
         return len(got) == 2 and got[0] <= 1
 
-    def _reopen(self, fault: _Fault) -> None:
+    def _reopen(self, fault: Fault) -> None:
         """Open the port again after a hang-up.
 
         Raises:
-            _Fault: in vain.
+            _LostStep: in vain.
         """
         self.faults.hang_ups += 1
         for _ in range(REOPENINGS if self._recoveries > 1 else 1):
@@ -542,19 +445,19 @@ class Link:
                 try:
                     if greeting:
                         self._await_silence(FORGET_S)
-                    if greeting == 1:
+                    if greeting == 1 and seen is None:
                         self._release_counter(STRANGER_PROBES)
                     answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
                     if info == seen or codec.is_plain_info(answer):
                         return info
-                    seen, fault = info, _Fault(f"{answer[:60]!r} is not a plain answer", ProtocolError)
+                    seen, fault = info, Fault(f"{answer[:60]!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
-                    raise _HangUp(f"The port hung up ({error})", RobotError) from error
-            except _HangUp as happened:
+                    raise HangUp(f"The port hung up ({error})", RobotError) from error
+            except HangUp as happened:
                 fault = happened
                 with contextlib.suppress(_LostStep):
                     self._reopen(happened)
-            except _Fault as happened:
+            except Fault as happened:
                 fault = happened
                 if greeting == SILENT_GREETINGS - 1 and not fault.got:
                     break
@@ -590,7 +493,7 @@ class Link:
             with contextlib.suppress(*_HANG_UPS):
                 self.port.close()
 
-    def _failure(self, request: Request, fault: _Fault | None, n_sent: int, *, lost: bool) -> RobotError:
+    def _failure(self, request: Request, fault: Fault | None, n_sent: int, *, lost: bool) -> RobotError:
         """One message for a command that failed, after the motors were stopped as far as the wire allows."""
         if not lost:
             with contextlib.suppress(_LostStep):
@@ -608,10 +511,3 @@ class Link:
             f"{fault}: '{request.name}' on {self.name} ({'; '.join(details)}).{again}"
             + (" The link is in step again." if self._in_step else " Is the robot on, paired and near?")
         )
-
-
-def _short(got: bytes, n: int, patience: float, n_echo: int) -> _Fault:
-    if not got:
-        return _Fault(f"No answer within {patience:.1f} s", RobotTimeout)
-    text = f"Only {len(got)} of {n} bytes came within {patience:.1f} s"
-    return _Fault(text, RobotTimeout, got, understood=len(got) >= max(n_echo, 1))

@@ -122,6 +122,20 @@ def test_runs_of_a_blob_picture_begin_with_what_is_no_blob(setup, word, width, h
     port.check_all_said()
 
 
+def test_a_fluke_that_knows_no_compression_sends_raw_pictures():
+    info = INFOS["s2+fluke1"].replace(b"2.9.1", b"2.7.7")
+    window = slope(128, 96)
+    ask = [(bytes([127, 3, 1, 0, 255, 191, 2, 2]), b""), (bytes([84, 3]), window.tobytes())]
+    port = ScriptedPort([*greeting(info), *PREPARE_1, *ask])
+    robot = Scribbler(port)
+    assert robot.picture("gray").shape == (192, 256)
+    port.check_all_said()
+    with pytest.raises(
+        RobotError, match=r"'get_ir_message' needs a Fluke with firmware 2\.8\.1 or newer; here is S2"
+    ):
+        robot.get_ir_message()
+
+
 def test_bright_sums_the_three_windows():
     ask = [(bytes([88, k]), bytes([k, 1, 0])) for k in range(3)]
     robot, port = opened("s2+fluke1", *ask)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import realitygap.emulator  # noqa: F401  # its ports are known from then on
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 from realitygap.robots import Command
 from realitygap.robots.scribbler import Scribbler
@@ -408,6 +409,31 @@ def test_a_silent_program_is_stopped_by_the_watchdog_at_the_very_moment():
         assert robot.faults.watchdog_stops == 1
         robot.drive(Command(1, 0))  # and goes on when told to
         assert port.robot.motors == (200, 200)
+
+
+@pytest.mark.parametrize("model", ["s1", "s2"])
+def test_an_emulated_robot_is_watched_on_its_own_clock_and_the_same_each_time(model):
+    """Where it came to stand after a silence, twice."""
+    ends = []
+    for _ in range(2):
+        with Scribbler(
+            f"emulator://{model}?arena=paper&seed=1&speed=off", watchdog_s=1.0, step_s=0.2
+        ) as robot:
+            robot.drive(Command(0.5, 0.1))
+            robot.clock.sleep(30.0)
+            assert robot.faults.watchdog_stops == 1
+            ends.append((robot.port.witness.pose(), robot.clock.now()))
+    assert ends[0] == ends[1]
+    assert ends[0][1] == pytest.approx(30.3, abs=0.2)
+
+
+def test_an_emulated_robot_in_real_time_is_watched_by_a_thread():
+    with Scribbler("emulator://s2?seed=1&speed=100", watchdog_s=1.0, step_s=0.1) as robot:
+        robot.drive(Command(0.5, 0.0))
+        until = time.monotonic() + 10
+        while not robot.faults.watchdog_stops and time.monotonic() < until:
+            time.sleep(0.01)
+        assert robot.faults.watchdog_stops == 1
 
 
 class RealTimePort(FakePort):

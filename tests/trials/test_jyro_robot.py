@@ -48,10 +48,9 @@ def test_a_controller_on_the_robot_drives_the_trial_of_the_batch(noise, settings
                 robot.drive(Command(*network.activate(inputs)))
                 assert list(robot.pose) == trial.poses[step + 1].tolist()
             assert robot.visited_cells == tuple(batch.behavior(k).tolist())
-            assert robot.coverage_line == batch.coverage_line[k]
-            assert robot.coverage_ends == batch.coverage_ends[k]
-            assert robot.n_stalls == batch.n_stalls[k]
-            n_stalls += robot.n_stalls
+            assert robot.coverage == (batch.coverage_line[k], batch.coverage_ends[k])
+            assert robot.n_blocked == batch.n_stalls[k]
+            n_stalls += robot.n_blocked
     assert n_stalls > 0
 
 
@@ -64,4 +63,4 @@ def test_a_trial_begins_anew_with_the_same_random_numbers_or_at_another_pose():
     assert robot.observe() == first
     robot.reset(Pose(0.5, 0.3, 1.0))
     assert robot.pose == pytest.approx((0.5, 0.3, 1.0))
-    assert robot.n_stalls == 0
+    assert robot.n_blocked == 0

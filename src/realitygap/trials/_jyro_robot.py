@@ -122,16 +122,12 @@ class JyroRobot:
         return tuple(self._cells[0, : self._counts[0, 0]].tolist())
 
     @property
-    def coverage_line(self) -> float:
-        """Visited share of the reachable cells along the line, 0..1."""
-        return float(self._counts[0, 0] / self.arena.grid.n_cells)
+    def coverage(self) -> tuple[float, float]:
+        """Visited share of the reachable cells, 0..1: along the line, and at the ends of steps."""
+        n = self.arena.grid.n_cells
+        return float(self._counts[0, 0] / n), float(self._counts[0, 1] / n)
 
     @property
-    def coverage_ends(self) -> float:
-        """Visited share of the reachable cells at the ends of steps, 0..1."""
-        return float(self._counts[0, 1] / self.arena.grid.n_cells)
-
-    @property
-    def n_stalls(self) -> int:
+    def n_blocked(self) -> int:
         """Blocked steps so far."""
         return int(self._counts[0, 2])

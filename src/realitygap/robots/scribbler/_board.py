@@ -11,14 +11,20 @@ from ._opcodes import COUNTED, Op
 
 RESET_S = 3.0
 """How long a robot takes to begin anew [s]. Source: what Scribbler2-Python waits."""
+FIRST_MESSAGES = (2, 8, 1)
+"""The firmware of the first Fluke that sends messages. Source: what Myro asks for."""
 _EMITTERS = {"right": 1, "center": 2, "left": 4}
 
 
 class Board(Device):
     """The parts of a Fluke that no trial needs."""
 
+    def _need_messages(self, what: str) -> None:
+        self._need(what, self.info.has_fluke(*FIRST_MESSAGES), "a Fluke with firmware 2.8.1 or newer")
+
     def send_ir_message(self, message: bytes) -> None:
         """Send up to 255 bytes by infrared."""
+        self._need_messages("send_ir_message")
         if len(message) > 255:
             raise ValueError(f"message has {len(message)} bytes, expected at most 255.")
         arguments = bytes((len(message),)) + message
@@ -26,7 +32,7 @@ class Board(Device):
 
     def get_ir_message(self) -> bytes:
         """The bytes that came by infrared since the last call; not asked again where the answer is lost."""
-        self.need_fluke("get_ir_message")
+        self._need_messages("get_ir_message")
         request = fluke_request("get_ir_message", Op.GET_IR_MESSAGE, answer=COUNTED, repeatable=False)
         return self._get(request, bytes)
 

@@ -24,6 +24,8 @@ PICTURE_WAIT_S = 6.0
 """How long a camera may take before the first byte of a picture [s]."""
 SETTLE_S = 0.15
 """How long a register of the camera takes to settle [s]. Source: Myro's scribbler.py."""
+FIRST_JPEG = (2, 7, 8)
+"""The firmware of the first Fluke that compresses pictures."""
 RAW_WINDOW = 3
 """Of the four windows, the one that raw gray pictures use; the other three are those of `bright`."""
 DEFAULT_BLOB = (90, 4, 0, 255, 51, 136, 190, 255)
@@ -150,18 +152,20 @@ class Camera(Device):
         Args:
             kind: "jpeg" or "jpeg-fast" in color, "grayjpeg" (also "gray") or "grayjpeg-fast" in gray; "color" and
                 "grayraw" without compression, which takes many seconds; "blob": 255 where the color of
-                `configure_blob` is.
+                `configure_blob` is. A Fluke older than 2.7.8 knows no compression.
         """
         if kind not in KINDS:
             raise ValueError(f"Unknown kind of picture {kind!r}. {did_you_mean(str(kind), KINDS)}")
         self._prepare("picture")
+        if "jpeg" in kind or kind == "gray":
+            if self.info.has_fluke(*FIRST_JPEG):
+                return self._jpeg_picture(gray=kind.startswith("gray"), fast=kind.endswith("-fast"))
+            kind = "grayraw" if kind.startswith("gray") else "color"
         if kind == "color":
             return self._raw_picture()
         if kind == "grayraw":
             return self._raw_gray_picture()
-        if kind == "blob":
-            return self._blob_picture()
-        return self._jpeg_picture(gray=kind.startswith("gray"), fast=kind.endswith("-fast"))
+        return self._blob_picture()
 
     def _jpeg_picture(self, *, gray: bool, fast: bool) -> Pixels:
         from ._images import jpeg_pixels

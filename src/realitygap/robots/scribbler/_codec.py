@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from realitygap.errors import ProtocolError
 
-from ._opcodes import FLUKE_2_COMMANDS, FLUKE_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
+from ._opcodes import FLUKE_2_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
 
 ANSWER_S = 2.0
 """How long an answer may take to begin [s]: an S1 in the dark takes 0.4 s; the rest is for Bluetooth."""
@@ -77,7 +77,8 @@ class MotorStats(NamedTuple):
     """How an S2 moves.
 
     Attributes:
-        left, right: Encoder counts of the last 0.1 s, -128 to 127.
+        left: Encoder counts of the last 0.1 s, -128 to 127.
+        right: Likewise.
         idler_age_s: Since when the idler wheel has not moved [s].
         idler_speed: 0 to 63.
         moving: Whether a motor turns.
@@ -96,8 +97,8 @@ class Blob(NamedTuple):
     """The patch of the color asked for: how many pixels, and their middle in columns and rows of the picture."""
 
     n_pixels: int
-    x: int
-    y: int
+    column: int
+    row: int
 
 
 def packet(op: Op, arguments: bytes = b"") -> bytes:
@@ -263,7 +264,7 @@ def motor_stats(answer: bytes) -> MotorStats:
 
 
 def blob(answer: bytes) -> Blob:
-    """Count, x and y from four bytes."""
+    """Count, column and row from four bytes."""
     return Blob(*struct.unpack(">HBB", answer))
 
 
@@ -289,7 +290,8 @@ class InfoLine(NamedTuple):
     Attributes:
         model: "s1", "s2" (also an S3), or None where no robot answers.
         fluke: "none", "1" or "2".
-        robot_version, fluke_version: As they came; empty where there is none.
+        robot_version: As it came; empty where there is no robot.
+        fluke_version: As it came; empty where there is no Fluke.
     """
 
     model: str | None
@@ -324,20 +326,19 @@ def info_line(answer: bytes) -> InfoLine:
     return InfoLine(model, fluke, values.get("robot-version", values.get("api", "")), fluke_version)
 
 
+_FLUKE_INFO = rb"((fluke|dongle):\d\.\d+\.\d+"
+_ROBOT_INFO = rb"(robot-version|api):\d\.\d+\.\d+,robot:scribbler"
 _PLAIN_INFO = re.compile(
-    rb"[Pp \0]*((fluke|dongle):[\d.]+(, ?|\n$))?((robot-version|api):[\d.]+,robot:scribbler[23]?,mode:serial\n)?$",
+    rb"P +" + _FLUKE_INFO + rb", ?)?" + _ROBOT_INFO + rb",mode:serial\n"  # an S1 sends the command back first
+    rb"|" + _FLUKE_INFO + rb",)?" + _ROBOT_INFO + rb"[23],mode:serial\n"
+    rb"|" + _FLUKE_INFO + rb"\n)",
     re.IGNORECASE,
 )
 
 
 def is_plain_info(answer: bytes) -> bool:
     """Whether an info line is letter by letter as the firmware known to us writes it."""
-    return _PLAIN_INFO.match(answer) is not None
-
-
-def fluke_arguments(op: Op, fluke: str) -> int:
-    """How many bytes follow an opcode on this Fluke."""
-    return (FLUKE_2_COMMANDS if fluke == "2" else FLUKE_COMMANDS)[op].arguments
+    return _PLAIN_INFO.fullmatch(answer) is not None
 
 
 def late_sensor_block(answer: bytes) -> SensorBlock | None:

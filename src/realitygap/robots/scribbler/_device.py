@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -24,7 +25,8 @@ class RobotInfo:
     Attributes:
         model: "s1", "s2" (also an S3), or None: a Fluke without a robot.
         fluke: "none", "1" or "2".
-        robot_version, fluke_version: Of the firmware, as it says; empty where there is none.
+        robot_version: Of the firmware, as it says; empty where there is no robot.
+        fluke_version: Of the Fluke's, likewise.
         port: Its name.
         label: What figures say of it.
     """
@@ -35,6 +37,10 @@ class RobotInfo:
     fluke_version: str
     port: str
     label: Label
+
+    def has_fluke(self, *version: int) -> bool:
+        """Whether there is a Fluke with at least this firmware."""
+        return self.fluke != "none" and numbers(self.fluke_version) >= version
 
     def __str__(self) -> str:
         robot = {"s1": "S1", "s2": "S2", None: "no robot"}[self.model]
@@ -101,6 +107,11 @@ class Device:
     def need_fluke_2(self, what: str) -> None:
         """Raise `RobotError` where there is no Fluke 2."""
         self._need(what, self.info.fluke == "2", "a Fluke 2")
+
+
+def numbers(version: str) -> tuple[int, ...]:
+    """A version to be compared with others."""
+    return tuple(int(each) for each in re.findall(r"\d+", version))
 
 
 def limited(name: str, value: float, low: float, high: float) -> float:

@@ -109,7 +109,8 @@ class Exchange(NamedTuple):
         time_s: When it was sent, by the port's clock [s].
         took_s: Until its answer was complete, or given up [s].
         name: Of the command.
-        sent, answered: The bytes.
+        sent: Its bytes.
+        answered: The bytes that came.
         outcome: "ok", or what went wrong.
     """
 
@@ -540,7 +541,7 @@ class Link:
                     answer, info = self._exchange(codec.INFO, lambda line: (line, codec.info_line(line)))
                     if info == seen or codec.is_plain_info(answer):
                         return info
-                    seen, fault = info, _Fault(f"{answer!r} is not a plain answer", ProtocolError)
+                    seen, fault = info, _Fault(f"{answer[:60]!r} is not a plain answer", ProtocolError)
                 except _HANG_UPS as error:
                     raise _HangUp(f"The port hung up ({error})", RobotError) from error
             except _HangUp as happened:

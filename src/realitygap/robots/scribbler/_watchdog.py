@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 import weakref
 
 from realitygap.errors import RobotError
@@ -12,14 +13,15 @@ from realitygap.robots._clock import Clock, SystemClock
 from . import _codec as codec
 from ._link import Link
 
-SHORTEST_LOOK_S = 0.02
+LOOK_S = 0.02
+"""How often the thread looks [s]."""
 
 
 class Watchdog:
     """Stops the motors when nobody has spoken to a robot for a while.
 
-    In real time a thread of its own looks. On any other clock time passes only where somebody lets it, so
-    that `clock` looks there, and results do not depend on threads.
+    Where time passes by itself a thread of its own looks. Elsewhere it passes only where somebody lets it, so that
+    `WatchedClock` looks there, and results do not depend on threads.
 
     Args:
         link: To the robot.
@@ -35,7 +37,7 @@ class Watchdog:
         self._is_stopping = False
         self._ended = threading.Event()
         link.watch = self.look
-        if isinstance(link.clock, SystemClock):
+        if _passes_by_itself(link.clock):
             threading.Thread(target=_keep_looking, args=(weakref.ref(self), self._ended), daemon=True).start()
 
     def excuse(self, seconds: float) -> None:
@@ -90,14 +92,19 @@ class WatchedClock:
         self._clock.sleep(max(until - self._clock.now(), 0.0))
 
 
+def _passes_by_itself(clock: Clock) -> bool:
+    """Whether time passes on a clock while nobody lets it."""
+    if isinstance(clock, SystemClock):
+        return True
+    before = clock.now()
+    time.sleep(0.002)
+    return clock.now() > before
+
+
 def _keep_looking(watched: weakref.ref[Watchdog], ended: threading.Event) -> None:
-    wait_s = SHORTEST_LOOK_S
-    while not ended.wait(wait_s):
+    while not ended.wait(LOOK_S):
         watchdog = watched()
         if watchdog is None:
             return
         watchdog.look()
-        wait_s = min(
-            max(watchdog.due_s - watchdog._link.clock.now(), SHORTEST_LOOK_S), watchdog.silence_s / 4
-        )
         del watchdog

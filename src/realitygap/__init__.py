@@ -64,6 +64,7 @@ __all__ = [
 
 _PACKAGES = {
     "drawing",
+    "emulator",
     "errors",
     "evolution",
     "gym",

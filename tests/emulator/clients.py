@@ -229,3 +229,19 @@ class Scribbler2Python:
 
     def set_long(self, op, *values):
         return self.sensors(op, *(byte for value in values for byte in long(value)))
+
+    def path(self, *values):
+        """A motion command: asks for the motors until they stand still, every half second, then for the sensors."""
+        self.sensors(*values)
+        polls = 0
+        while True:
+            self.robot(170)
+            moving = self.number(4) & 3
+            self.number(1)
+            if not moving:
+                break
+            self.wait(0.5)
+            polls += 1
+            assert polls < 100
+        self.sensors(65)
+        return polls

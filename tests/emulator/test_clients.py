@@ -299,10 +299,9 @@ def test_scribbler2_python_drives(other):
     other.set_long(168, 0)
     before = other.port.witness.pose()
     other.sensors(161, 1, 0, 7)
-    other.sensors(162, 5, *word(100), *word(0))
-    other.sensors(164, 5, *word(90))
-    other.sensors(161, 0)
-    other.wait(10.0)
+    assert other.path(162, 5, *word(100), *word(0)) == 0, "the last motion of a path waits"
+    assert other.path(164, 5, *word(90)) > 0
+    assert other.path(161, 0) > 0
     after = other.port.witness.pose()
     assert after.x - before.x == pytest.approx(0.1, abs=2e-3)
     assert after.heading - before.heading == pytest.approx(1.571, abs=0.01)

@@ -247,6 +247,11 @@ class Emulator:
         if isinstance(motors, S2Motors):
             motors.trip()
 
+    @property
+    def is_overloaded(self) -> bool:
+        """Whether too much current has stopped it."""
+        return isinstance(self.table.motors, S2Motors) and self.table.motors.tripped
+
     # -- what an observer sees --
 
     @property

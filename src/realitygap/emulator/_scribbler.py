@@ -417,7 +417,10 @@ class Scribbler:
         self._idle_since = now
 
     def leds(self, now: int) -> tuple[int, int, int]:
-        """Left, center and right, 1 for on."""
+        """Left, center and right, 1 for on; all blink after an over-current."""
+        if getattr(self._table.motors, "tripped", False):
+            on = 1 - now // (SECOND // 2) % 2
+            return on, on, on
         shown = self._leds ^ (((now - self._idle_since) // SECOND % 2) << 1)
         return shown >> 2 & 1, shown >> 1 & 1, shown & 1
 

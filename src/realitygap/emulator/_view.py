@@ -114,6 +114,8 @@ def status(emulator: Emulator) -> list[str]:
         lines.insert(
             2, f"{ahead} ahead   front LED {front}   back LED {fluke.back_led}   IR power {fluke.ir_power}"
         )
+    if emulator.is_overloaded:
+        lines.append("over-current: it answers nothing until a reset")
     if emulator.robot.tone is not None:
         lines.append(f"♪ {emulator.robot.tone[0]} Hz")
     if not emulator.is_connected:

@@ -157,6 +157,12 @@ def test_a_study_killed_again_and_again_comes_to_its_end(tmp_path):
     check_nothing_was_asked_twice(path)
 
 
+@pytest.fixture
+def no_waiting_for_the_disk(monkeypatch):
+    """A program that ends leaves what it wrote to the system; waiting for the disk is for a loss of power."""
+    monkeypatch.setattr("realitygap.records._ledger_file.SYNCHRONOUS", "OFF")
+
+
 FAULTS = ("lost", "interrupted", "terminated", "disk full", "foreign error")
 
 
@@ -220,11 +226,13 @@ def inject(n_faults: int, folder: Path) -> None:
         check_nothing_was_asked_twice(path)
 
 
+@pytest.mark.usefixtures("no_waiting_for_the_disk")
 def test_no_fault_loses_a_scored_trial_or_leaves_the_motors_running(tmp_path):
     inject(100, tmp_path)
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("no_waiting_for_the_disk")
 def test_ten_thousand_faults_lose_no_scored_trial_and_leave_no_motor_running(tmp_path):
     inject(10_000, tmp_path)
 

@@ -1,6 +1,7 @@
 """Random and mutated bytes: no crash, no hang, no memory without bounds, and a robot that can be used afterwards."""
 
 import random
+import traceback
 
 import pytest
 
@@ -100,6 +101,20 @@ def test_after_noise_the_known_way_out_leads_back_into_step(model, fluke):
         # behind a Fluke an argument of one of its own commands may still be missing: ask until the count is right
         answers = [say(robot, packet(98, 0), 3.0) for _ in range(3)]
         assert len(answers[-1]) == 20, (noise, answers)
+
+
+def test_many_packets_that_waited_are_carried_out_one_after_another():
+    """They were once carried out within each other, until Python's stack was full."""
+    robot = Emulator("s2", "none", timing=False)
+    depths = []
+    robot.senses.line = lambda: (depths.append(len(traceback.extract_stack())), (False, False))[1]
+    for _ in range(2):
+        robot.receive(packet(162, 5, 0, 50, 0, 50))
+    robot.receive(packet(65) * 60)
+    robot.advance(60.0)
+    assert len(depths) == 62
+    assert max(depths) < min(depths) + 12
+    assert robot.transmit()[-20:-11] == packet(65)
 
 
 def test_bytes_that_nobody_reads_are_bounded():

@@ -242,6 +242,16 @@ def test_a_blocked_motion_ends_because_the_wheels_slip():
     assert robot.wheel_speeds() == (0.0, 0.0)
 
 
+def test_placing_the_robot_drops_motions_that_waited(robot):
+    for _ in range(2):
+        robot.receive(packet(162, 5, *word(100), *word(50)))
+    robot.advance(0.5)
+    assert len(robot.transmit()) == 20 + 9, "the second waits for the first"
+    robot.place(Pose(1.0, 1.0, 0.0), 1)
+    robot.advance(0.01)
+    assert robot.wheel_speeds() == (0.0, 0.0)
+
+
 # -- time --
 
 

@@ -2,7 +2,7 @@
 
 Myro 2.9.9 sets DTR when it opens a port. A pseudo-terminal has no such line, the call fails (ENOTTY), and Myro waits
 for the port for ever. Python looks for a module `sitecustomize` when it starts; the one written here, for the child
-program only, lets pyserial go on after that failure. It is written for Python 2 and 3.
+program only, lets such a call do nothing. It is written for Python 2 and 3, and for every pyserial.
 """
 
 from __future__ import annotations
@@ -19,33 +19,28 @@ from realitygap.errors import RobotError
 PORT_VARIABLE = "REALITYGAP_PORT"
 
 PATCH = """\
-# Written by `realitygap emulate --exec`: a pseudo-terminal has no modem lines, and pyserial may go on without them.
+# Written by `realitygap emulate --exec`: a pseudo-terminal has no modem lines, and setting one does nothing.
 import errno
 import os
 import sys
 
-
-def _forgive(kind, name):
-    method = getattr(kind, name, None)
-    if method is None:
-        return
-
-    def forgiving(self, *args, **kwargs):
-        try:
-            return method(self, *args, **kwargs)
-        except (IOError, OSError) as error:
-            if error.errno not in (errno.ENOTTY, errno.EINVAL):
-                raise
-
-    setattr(kind, name, forgiving)
-
-
 try:
-    import serial
+    import fcntl
+    import termios
 
-    for _name in ("setDTR", "setRTS", "_update_dtr_state", "_update_rts_state"):
-        _forgive(serial.Serial, _name)
-except ImportError:
+    _ioctl = fcntl.ioctl
+    _lines = (termios.TIOCMBIS, termios.TIOCMBIC, termios.TIOCMSET)
+
+    def _forgiving(fd, request, *args):
+        try:
+            return _ioctl(fd, request, *args)
+        except (IOError, OSError) as error:
+            if request not in _lines or error.errno != errno.ENOTTY:
+                raise
+            return 0
+
+    fcntl.ioctl = _forgiving
+except (ImportError, AttributeError):
     pass
 
 # whoever else has a sitecustomize gets it as before
@@ -62,7 +57,7 @@ except ImportError:
 
 @contextlib.contextmanager
 def client_environment(port: str) -> Iterator[dict[str, str]]:
-    """The environment of a client program: the port's name in REALITYGAP_PORT, and the patch for pyserial."""
+    """The environment of a client program: the port's name in REALITYGAP_PORT, and the patch."""
     with tempfile.TemporaryDirectory(prefix="realitygap-client-") as folder:
         (Path(folder) / "sitecustomize.py").write_text(PATCH, encoding="utf-8")
         others = os.environ.get("PYTHONPATH")

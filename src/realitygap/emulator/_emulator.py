@@ -282,7 +282,7 @@ class Emulator:
         if not all(map(math.isfinite, (x, y, heading))):
             raise ValueError(f"pose is {tuple(pose)!r}, expected three finite numbers.")
         self.table.advance_to(self._now)
-        self.robot.reckoning.forget()
+        self.robot.drop_motions()
         self.table.place(Pose(x, y, heading - self._turn), self._now)
         self.senses.restart(seed)
 

@@ -91,6 +91,7 @@ class Fluke:
         self._battery, self._memory = battery, memory
         self._schedule, self._answer = schedule, answer
         self._timing = timing
+        self._jobs = 0
         self._commands = {**(FLUKE_COMMANDS if model == "1" else FLUKE_2_COMMANDS), **OWN_LENGTH}
         self._robot_byte_ns = BYTE_NS if timing else 0
         self._link_byte_ns = LINK_BYTE_NS if timing else 0
@@ -110,7 +111,6 @@ class Fluke:
         self._passes_all = False
         self._held: deque[tuple[int, int]] = deque()
         self._busy = 0  # counts what it is busy with; 0 for nothing
-        self._jobs = 0
         self._waiting = 0  # number of the job that waits for the robot's answer, 0 for none
         self._robot_line_free = 0
         self._info = ""  # "asked" after GET_INFO, "said" when the own version was sent
@@ -343,11 +343,7 @@ class Fluke:
 
     def _reset_robot(self, given: bytes, now: int) -> bytes:
         self._robot.reset(now)
-        self._end_wait()
         return b""
-
-    def _end_wait(self) -> None:
-        self._waiting = 0
 
     def _restart(self, given: bytes, now: int) -> bytes:
         self._wake()

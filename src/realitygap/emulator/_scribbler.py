@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 from realitygap.robots.scribbler._opcodes import PACKET, Op
@@ -84,6 +85,8 @@ class Scribbler:
         self._readers = self._all_readers()
         self._setters = self._all_setters()
         self._epoch = 0  # counts resets; what was begun before one is forgotten
+        self._is_taking = False
+        self._motions = 0  # counts how often motions were dropped
         self._wake(0)
 
     def _wake(self, now: int) -> None:
@@ -154,13 +157,20 @@ class Scribbler:
             if len(self._packets) < MOST_PACKETS:
                 self._packets.append((at, bytes(self._partial)))
             self._partial.clear()
-            if not self._busy:
-                self._take_next(at)
+            self._take_next(at)
 
     def _take_next(self, now: int) -> None:
-        self._busy = True
-        at, packet = self._packets.popleft()
-        self._later(max(at, now), lambda when: self._execute(packet, when))
+        """Carry out the packets that wait, one after another, as far as they take no time."""
+        if self._is_taking:
+            return  # called from within the loop below, which goes on
+        self._is_taking = True
+        try:
+            while self._packets and not self._busy:
+                self._busy = True
+                at, packet = self._packets.popleft()
+                self._later(max(at, now), partial(self._execute, packet))
+        finally:
+            self._is_taking = False
 
     def _execute(self, packet: bytes, now: int) -> None:
         """Carry out a command; the answer comes when it is done."""
@@ -190,18 +200,25 @@ class Scribbler:
             return
         work = setter(packet, now)
         if isinstance(work, list):
-            self._hand_on(work, packet, now)
+            self._hand_on(work, packet, self._motions, now)
         else:
             self._finish_after(work + self._block_ns, packet, self._sensor_block, now)
 
-    def _hand_on(self, segments: list[Segment], packet: bytes, now: int) -> None:
+    def drop_motions(self) -> None:
+        """Forget motions that have not begun."""
+        self.reckoning.forget()
+        self._motions += 1
+
+    def _hand_on(self, segments: list[Segment], packet: bytes, number: int, now: int) -> None:
         """Give motions to the motors; the answer waits until they have taken all of them."""
         motors = self._table.motors
         self._table.advance_to(now)
+        if number != self._motions:
+            segments = []
         while segments and isinstance(motors, S2Motors) and motors.post(segments[0]):
             segments = segments[1:]
         if segments:
-            self._later(now + RETRY_NS, lambda when: self._hand_on(segments, packet, when))
+            self._later(now + RETRY_NS, lambda when: self._hand_on(segments, packet, number, when))
         else:
             self._finish_after(self._block_ns, packet, self._sensor_block, now)
 
@@ -224,8 +241,7 @@ class Scribbler:
         self.tone = None
         self._busy = False
         self._busy_until = now + len(data) * BYTE_NS if self._timing and self.model == "s1" else now
-        if self._packets:
-            self._take_next(now)
+        self._take_next(now)
 
     # -- reading --
 

@@ -1,5 +1,6 @@
 """Platforms, whatever can try a controller, and the contract of a robot."""
 
+from . import scribbler
 from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
@@ -24,4 +25,5 @@ __all__ = [
     "check_command",
     "export_mcap",
     "read_recording",
+    "scribbler",
 ]

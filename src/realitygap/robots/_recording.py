@@ -12,14 +12,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
-
-import polars as pl
+from typing import TYPE_CHECKING, Any
 
 from realitygap._version import __version__
 from realitygap.errors import RecordError, RecordVersionError
 
 from ._clock import Clock
+
+if TYPE_CHECKING:
+    import polars as pl
 
 FORMAT = "realitygap robot recording"
 FORMAT_VERSION = 1
@@ -36,18 +37,17 @@ KINDS = {
     "wire": "bytes that went over the wire for it",
     "fault": "what went wrong with a call",
 }
-COLUMNS = pl.Schema(
-    {
-        "t": pl.Float64,
-        "kind": pl.String,
-        "name": pl.String,
-        "values": pl.String,
-        "sent": pl.String,
-        "answered": pl.String,
-        "took_s": pl.Float64,
-        "outcome": pl.String,
-    }
-)
+COLUMNS = {
+    "t": float,
+    "kind": str,
+    "name": str,
+    "values": str,
+    "sent": str,
+    "answered": str,
+    "took_s": float,
+    "outcome": str,
+}
+"""Of the table of a recording."""
 
 
 class Recorder:
@@ -162,6 +162,8 @@ class Recording:
 
     def table(self) -> pl.DataFrame:
         """A row a line, with the columns of `COLUMNS`; what a line has not is null."""
+        import polars as pl
+
         rows = [
             {**line, "values": json.dumps(line["values"]) if "values" in line else None}
             for line in self.lines

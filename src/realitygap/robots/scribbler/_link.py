@@ -44,8 +44,10 @@ WRITE_S = 2.0
 """How long a port may refuse to take a command [s]."""
 ATTEMPTS = 5
 """How often a command that is safe to repeat is sent: enough where half a percent of all bytes are lost."""
-RECOVERIES = 3
-"""How often the same step is sought after one fault."""
+RECOVERIES = 8
+"""How often the same step is sought after one fault, while something is heard of the robot."""
+SILENT_RECOVERIES = 3
+"""How often if nothing is."""
 REOPENINGS = 8
 """How often a port that hung up is opened again, once a second."""
 GREETINGS = 4
@@ -410,6 +412,7 @@ class Link:
         """
         self.faults.recoveries += 1
         motors, fault = self._motors, self._fault
+        n_silent = 0
         for _ in range(self._recoveries):
             try:
                 if isinstance(fault, _HangUp):
@@ -421,6 +424,9 @@ class Link:
                 fault = happened
             except _HANG_UPS as error:
                 fault = _HangUp(f"The port hung up ({error})", RobotError)
+            n_silent += not fault.got
+            if n_silent == SILENT_RECOVERIES:
+                break
         self._fault = fault
         raise _LostStep(fault)
 

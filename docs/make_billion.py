@@ -178,7 +178,7 @@ def _figures_table(f: dict[str, Any]) -> str:
             "chunks a second through one scheduler, from order to published file",
             f"{f['chunks_per_second_through_a_scheduler']:,.0f}",
         ),
-        ("bytes a second checked when a study is taken up again", f"{f['check_bytes_per_second']:,.0f}"),
+        ("checked a second when a study is taken up again", size(f["check_bytes_per_second"])),
         ("runs a second that `realitygap digest` reads", f"{f['digest_runs_per_second']:,.0f}"),
         ("microseconds to list a chunk", f"{1e6 * f['list_seconds_per_chunk']:.1f}"),
         ("bytes of memory for each chunk known", f"{f['memory_bytes_per_chunk']:,.0f}"),
@@ -190,7 +190,8 @@ def _figures_table(f: dict[str, Any]) -> str:
 
 
 def _time_table(f: dict[str, Any]) -> str:
-    rate = f["runs_per_second_a_core"]
+    # of a core while all of the machine's are at work, as they are then
+    rate = f["runs_per_second_a_core"] * f["speedup_of_all_cores"] / f["machine"]["processors"]
     rows = [
         (
             f"{cores:,}",
@@ -200,7 +201,8 @@ def _time_table(f: dict[str, Any]) -> str:
         )
         for cores in CORES
     ]
-    head = f"A billion runs are {size(RUNS * f['bytes_per_run'])} in {n_chunks(f):,} chunks. With cores like these:\n\n"
+    head = f"A billion runs are {size(RUNS * f['bytes_per_run'])} in {n_chunks(f):,} chunks. "
+    head += "With cores like these, all at work:\n\n"
     return head + _table(["cores", "time to compute", "written", "chunks a second"], rows)
 
 
@@ -232,9 +234,16 @@ def limits(f: dict[str, Any]) -> list[tuple[str, float, str, str]]:
 
 
 def _limits_table(f: dict[str, Any]) -> str:
-    rows = [(what, words, f"{share:.2g}", helps) for what, share, words, helps in limits(f)]
+    rows = [(what, words, _share(share), helps) for what, share, words, helps in limits(f)]
     head = "What gives way first stands first: its need in days, in 64 GB of memory, or in millions of files.\n\n"
     return head + _table(["part", "for a billion runs", "parts", "what helps"], rows)
+
+
+def _share(share: float) -> str:
+    """A share with the digits that count."""
+    if share < 0.001:
+        return "below 0.001"
+    return f"{share:,.0f}" if share >= 10 else f"{share:.2g}"
 
 
 def n_chunks(f: dict[str, Any]) -> int:

@@ -150,6 +150,7 @@ def test_tables_on_the_page_of_a_billion_runs_follow_from_its_figures(tmp_path, 
     make_billion = _load("make_billion")
     figures = json.loads(make_billion.DATA.read_text("utf-8")) | {
         "runs_per_second_a_core": 1000.0,
+        "speedup_of_all_cores": 1.6,
         "bytes_per_run": 2000.0,
         "runs_per_chunk": 500,
         "report_memory_bytes_per_run": 6400.0,
@@ -158,9 +159,10 @@ def test_tables_on_the_page_of_a_billion_runs_follow_from_its_figures(tmp_path, 
     make_billion.DATA.write_text(json.dumps(figures), "utf-8")
     page = make_billion.page_tables()
     assert "A billion runs are 2.0 TB in 2,000,000 chunks." in page
-    assert "| 2 | 5.8 days | 4.0 MB/s | 4.0 |" in page
-    assert "| 1,024 | 16.3 minutes | 2.0 GB/s | 2,048.0 |" in page
-    assert "| memory of the report | 6.4 TB | 1e+02 |" in page
+    assert "| 2 | 7.2 days | 3.2 MB/s | 3.2 |" in page
+    assert "| 1,024 | 20.3 minutes | 1.6 GB/s | 1,638.4 |" in page
+    assert "| memory of the report | 6.4 TB | 100 |" in page
+    assert "e-0" not in page
     shares = [share for _, share, _, _ in make_billion.limits(figures)]
     assert shares == sorted(shares, reverse=True)
 

@@ -6,6 +6,7 @@ import difflib
 import operator
 from collections.abc import Iterable
 from importlib import import_module
+from numbers import Real
 from typing import Any
 
 
@@ -85,13 +86,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"Known: {', '.join(choices)}." if choices else ""
 
 
-def whole_number(name: str, value: object, least: int, most: int | None = None) -> int:
+def whole_number(name: str, value: object, least: int | None = None, most: int | None = None) -> int:
     """An argument that counts or numbers something, as Python's own int; numpy's whole numbers are taken too.
 
     Args:
         name: Of the argument, for the message.
         value: What came.
-        least, most: What it may be; no upper limit when `most` is not given.
+        least, most: What it may be; no limit where one is not given, and no `most` without `least`.
 
     Raises:
         TypeError: It is not a whole number.
@@ -103,7 +104,27 @@ def whole_number(name: str, value: object, least: int, most: int | None = None) 
         number = None
     if number is None or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}, expected a whole number.")
-    if number < least or (most is not None and number > most):
+    if least is not None and (number < least or (most is not None and number > most)):
         expected = f"at least {least}" if most is None else f"{least} to {most}"
         raise ValueError(f"{name} is {number}, expected {expected}.")
+    return number
+
+
+def real_number(name: str, value: object, least: float, most: float) -> float:
+    """An argument that measures something, as Python's own float; numpy's numbers are taken too.
+
+    Args:
+        name: Of the argument, for the message.
+        value: What came.
+        least, most: What it may be.
+
+    Raises:
+        TypeError: It is not a number.
+        ValueError: It is out of range, or NaN.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}, expected a number from {least} to {most}.")
+    number = float(value)
+    if not least <= number <= most:
+        raise ValueError(f"{name} is {value}, expected {least} to {most}.")
     return number

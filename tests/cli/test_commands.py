@@ -349,9 +349,11 @@ def test_bench_of_a_task_prints_its_figures_beside_the_published_ones():
         ("bench xr", ["Unknown task 'xr'", "Did you mean 'xor'?"]),
         ("bench xor --settings stanley", ["Unknown NEAT settings 'stanley'"]),
         ("bench xor --change crossover", ["expected KEY=VALUE"]),
+        ("bench xor --change crossover=0 --change crossover=1", ["--change gives crossover twice: 0 and 1"]),
         ("bench xor --change crossover=2", ["crossover: expected at most 1.0, came 2"]),
         ("bench xor --seconds 1", ["--seconds goes with the measurement of speed"]),
         ("bench --seeds 3", ["--seeds goes with a task"]),
+        ("bench --seed 0", ["--seed goes with a task"]),
         ("run papr", ["Unknown study 'papr'", "Did you mean 'paper'?"]),
         ("run nowhere.toml", ["no file nowhere.toml", "new-study"]),
         ("digest nowhere", ["nowhere does not exist"]),
@@ -367,7 +369,10 @@ def test_a_wrong_word_gets_one_message(words, texts, tmp_path):
     one_message(realitygap(*words.split(), cwd=tmp_path), *texts)
 
 
-@pytest.mark.parametrize("words", ["run", "run paper --replicates 0", "run paper --replicates x", "fly"])
+@pytest.mark.parametrize(
+    "words",
+    ["run", "run paper --replicates 0", "run paper --replicates x", f"bench xor --seed {2**63}", "fly"],
+)
 def test_wrong_usage_ends_with_2(words, tmp_path):
     done = realitygap(*words.split(), cwd=tmp_path)
     assert done.returncode == 2

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from realitygap.cli import app
 from realitygap.errors import RealityGapError
+from realitygap.report import save_view
 from realitygap.study import parse_study, run_study
 
 STUDY = """
@@ -100,6 +101,21 @@ def test_a_file_that_is_there_gives_way(results, tmp_path):
     show(results, "-o", path)
     assert path.read_text().startswith("<svg")
     assert [each.name for each in tmp_path.iterdir()] == ["run.svg"]
+
+
+def test_mistakes_in_python_are_told_too(results, tmp_path):
+    """An unknown subject was taken for a run, and drawn."""
+    for changes, error, message in (
+        ({"subject": "netwrk"}, ValueError, "Unknown subject 'netwrk'. Did you mean 'network'?"),
+        ({"condition": ""}, ValueError, "Unknown condition ''"),
+        ({"replicate": "1"}, TypeError, "replicate is '1', expected a whole number"),
+        ({"generation": 0.5}, TypeError, "generation is 0.5, expected a whole number"),
+        ({"generation": 0, "individual": "a"}, TypeError, "individual is 'a', expected a whole number"),
+    ):
+        with pytest.raises(error) as caught:
+            save_view(results, tmp_path / "a.svg", **changes)
+        assert message in str(caught.value)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

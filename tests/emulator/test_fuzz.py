@@ -80,7 +80,7 @@ def test_random_strings_over_a_link_with_faults():
 @pytest.mark.parametrize(("model", "fluke"), SET_UPS)
 def test_a_million_random_and_mutated_strings(model, fluke):
     pauses = (0.0,) * 12 + PAUSES
-    assert hurl(model, fluke, 1_000_000 // len(SET_UPS) + 1, 3, pauses=pauses) > 1_000_000
+    assert hurl(model, fluke, 1_000_000 // len(SET_UPS) + 1, 3, pauses=pauses) > 100_000
 
 
 @pytest.mark.parametrize(("model", "fluke"), SET_UPS)

@@ -176,6 +176,16 @@ def test_dtr_going_low_resets_a_cabled_s2():
     assert len(port.read(20)) == 20
 
 
+def test_dtr_that_was_low_all_along_resets_nothing():
+    port = open_port("emulator://s2?fluke=none&speed=off", do_not_open=True)
+    port.dtr = False
+    port.open()
+    port.write(packet(109, 180, 180))
+    assert len(port.read(20)) == 20
+    port.dtr = False
+    assert port.witness.motors() != (0.0, 0.0)
+
+
 def test_speed_is_seconds_of_the_robot_in_one_of_ours():
     port = open_port("emulator://s2?fluke=2&speed=50")
     before, begun = port.clock.now(), time.monotonic()

@@ -257,6 +257,21 @@ def test_a_model_wants_names_for_the_inputs_that_are_given():
         to_onnx(network, precision="half")
 
 
+@pytest.mark.parametrize("wrong", [3, [1], "genome"])
+def test_what_is_no_mapping_is_refused_as_one(wrong):
+    for kind in (Genome, Network):
+        with pytest.raises(RecordError, match="The mapping has the format None"):
+            kind.from_dict(wrong)
+
+
+def test_a_genome_is_no_network_and_a_network_no_genome():
+    genome = evolved({})[0]
+    with pytest.raises(TypeError, match=r"expected a Network, such as genome\.network\(\)"):
+        to_onnx(genome)
+    with pytest.raises(TypeError, match="expected a Genome"):
+        to_networkx(genome.network())
+
+
 @pytest.mark.parametrize(("module", "export"), [("networkx", to_networkx), ("onnx", to_onnx)])
 def test_a_missing_extra_is_one_message_with_the_command(monkeypatch, module, export):
     monkeypatch.setitem(sys.modules, module, None)

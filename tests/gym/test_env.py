@@ -221,10 +221,24 @@ def test_actions_out_of_range_are_limited_as_in_a_trial():
         ({"cells": "lines"}, "expected 'line' or 'ends'"),
         ({"platform": {"step": 3}}, "step"),
         ({"arena": {"start": "middle"}}, "start"),
+        ({"arena": {"start": [0.01, 0.01, 0.0]}}, "does not fit at the start"),
     ],
 )
 def test_wrong_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
+        realitygap.gym.ScribblerCoverageEnv(**settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"noise": "0.5"}, "noise is '0.5', expected a number"),
+        ({"platform": 3}, "platform is 3, expected JyroPlatform"),
+        ({"arena": "paper"}, "arena is 'paper', expected ArenaSettings"),
+    ],
+)
+def test_settings_of_another_kind_are_refused(settings, message):
+    with pytest.raises(TypeError, match=message):
         realitygap.gym.ScribblerCoverageEnv(**settings)
 
 
@@ -246,6 +260,10 @@ def test_wrong_calls_are_refused():
         env.reset(options={"noise_keys": KEY})
     with pytest.raises(ValueError, match="expected at most"):
         envs.reset(options={"noise_key": {"key": 1, "individual": (1 << 24) - 2}})
+    with pytest.raises(TypeError, match="noise_key is 7, expected NoiseKey"):
+        env.reset(options={"noise_key": 7})
+    with pytest.raises(TypeError, match=r"num_envs is 1\.5, expected a whole number"):
+        realitygap.gym.ScribblerCoverageVectorEnv(1.5)
     with pytest.raises(ValueError, match="num_envs is 0"):
         realitygap.gym.ScribblerCoverageVectorEnv(0)
 

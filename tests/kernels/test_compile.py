@@ -4,7 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import realitygap.kernels
+from realitygap.kernels import _compile
 
 CODE = """
 from realitygap.kernels import _math
@@ -50,6 +53,15 @@ def test_a_folder_that_cannot_be_written_is_said_and_passed_over():
     done = start("/dev/null/cache")
     assert value_and_cache(done)[1] == (0, 1)
     assert done.stderr.count("cannot be kept in /dev/null/cache") == 1
+
+
+@pytest.mark.parametrize("folder", ["", "caches", "./caches"])
+def test_a_relative_folder_for_caches_is_none(folder, monkeypatch):
+    # an empty one put the kernels into whatever folder a command was run in
+    monkeypatch.setattr(_compile.sys, "platform", "linux")
+    monkeypatch.delenv("REALITYGAP_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", folder)
+    assert _compile.cache_root() == Path.home() / ".cache" / "realitygap"
 
 
 def test_another_source_means_another_folder(tmp_path):

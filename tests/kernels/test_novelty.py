@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import numpy as np
@@ -12,14 +13,21 @@ from tests.reference import novelty as reference
 from tests.reference.effort import COMPILED, cases
 
 COLUMNS, ROWS = 12, 6
-SPANS = _novelty.make_spans(COLUMNS, ROWS)
+BY_COLUMN, BY_ROW = (_novelty.make_cell_table(COLUMNS, ROWS, by_column) for by_column in (True, False))
 Cells = list[int]
+Points = list[tuple[int, int]]
 
 
-def sorted_points(cells: Cells, columns: int, rows: int, by_column: bool) -> np.ndarray:
-    points = np.empty((columns * rows, 2), np.uint8)
-    _novelty.sort_cells(np.array(cells, np.uint8), len(cells), columns, rows, by_column, points)
-    return points[: len(cells)].copy()
+def sorted_places(cells: Cells, table: _novelty.CellTable) -> np.ndarray:
+    places = np.empty(table.place.size, np.int32)
+    _novelty.sort_cells(np.array(cells), len(cells), table, places)
+    return places[: len(cells)].copy()
+
+
+def points_at(places: np.ndarray, columns: int, rows: int, by_column: bool) -> Points:
+    """The cells at some places."""
+    pairs = [divmod(int(place), 2 * (rows if by_column else columns) - 1) for place in places]
+    return pairs if by_column else [(x, y) for y, x in pairs]
 
 
 def random_cells(rng: random.Random, n_cells: int) -> Cells:
@@ -27,34 +35,52 @@ def random_cells(rng: random.Random, n_cells: int) -> Cells:
     return rng.sample(range(n_cells), rng.choice([1, 2, rng.randint(1, n_cells), n_cells]))
 
 
-def packed(behaviors: list[Cells], by_column: bool) -> tuple[np.ndarray, np.ndarray]:
-    points = np.zeros((len(behaviors), COLUMNS * ROWS, 2), np.uint8)
+def packed(behaviors: list[Cells], table: _novelty.CellTable) -> tuple[np.ndarray, np.ndarray]:
+    places = np.zeros((len(behaviors), COLUMNS * ROWS), np.int32)
     for k, cells in enumerate(behaviors):
-        points[k, : len(cells)] = sorted_points(cells, COLUMNS, ROWS, by_column)
-    return points, np.array([len(cells) for cells in behaviors], np.int32)
+        places[k, : len(cells)] = sorted_places(cells, table)
+    return places, np.array([len(cells) for cells in behaviors], np.int32)
 
 
 @pytest.mark.parametrize("by_column", [True, False])
-def test_cells_are_sorted_as_pairs(by_column: bool) -> None:
+@pytest.mark.parametrize(
+    ("columns", "rows"), [(12, 6), (1, 9), (5, 1), (16, 16), (1, 1), (2, 128), (400, 1), (20, 30)]
+)
+def test_cells_are_sorted_as_pairs(columns: int, rows: int, by_column: bool) -> None:
     rng = random.Random(1)
-    for _ in range(cases(300, 50)):
-        columns, rows = rng.choice([(12, 6), (1, 9), (5, 1), (16, 16)])
-        cells = random_cells(rng, columns * rows)
-        expected = reference.points_of(cells, columns, x_first=by_column)
-        assert sorted_points(cells, columns, rows, by_column).tolist() == [list(point) for point in expected]
+    table = _novelty.make_cell_table(columns, rows, by_column)
+    for _ in range(cases(80, 10)):
+        cells = random_cells(rng, columns * rows) if columns * rows > 1 else [0]
+        found = points_at(sorted_places(cells, table), columns, rows, by_column)
+        assert found == reference.points_of(cells, columns, x_first=by_column)
+
+
+@pytest.mark.parametrize("by_column", [True, False])
+@pytest.mark.parametrize(("columns", "rows"), [(12, 6), (1, 9), (16, 16)])
+def test_the_difference_of_two_places_says_how_far_apart_the_cells_are(
+    columns: int, rows: int, by_column: bool
+) -> None:
+    table = _novelty.make_cell_table(columns, rows, by_column)
+    places = sorted_places(list(range(columns * rows)), table)
+    points = points_at(places, columns, rows, by_column)
+    for one, a in zip(places.tolist(), points, strict=True):
+        found = table.span[table.span.size // 2 + one - places]
+        assert found.tolist() == [math.sqrt((a[0] - x) ** 2 + (a[1] - y) ** 2) for x, y in points]
+    assert table.span[0] == table.span.max()
 
 
 @pytest.mark.parametrize("by_column", [True, False])
 def test_the_distance_equals_the_reference(by_column: bool) -> None:
     rng = random.Random(2)
+    table = BY_COLUMN if by_column else BY_ROW
     for _ in range(cases(500, 50)):
         one, other = random_cells(rng, COLUMNS * ROWS), random_cells(rng, COLUMNS * ROWS)
-        a, b = (sorted_points(cells, COLUMNS, ROWS, by_column) for cells in (one, other))
-        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), SPANS)
+        a, b = sorted_places(one, table), sorted_places(other, table)
+        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), table.span)
         points = [reference.points_of(cells, COLUMNS, x_first=by_column) for cells in (one, other)]
         assert distance == pytest.approx(reference.paper_distance(*points, COLUMNS, ROWS), rel=1e-13)
-        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), SPANS)
-        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), SPANS) == 0.0
+        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), table.span)
+        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), table.span) == 0.0
 
 
 # --- the paper's archive ----------------------------------------------------------------------------------------
@@ -65,23 +91,24 @@ class KernelPaperArchive:
 
     def __init__(self, size: int, *, above_all: bool, by_column: bool) -> None:
         self.above_all, self.by_column = above_all, by_column
+        self.table = BY_COLUMN if by_column else BY_ROW
         self.archive = _novelty.make_archive(0, size, COLUMNS * ROWS)
 
     def update(self, behaviors: list[Cells]) -> list[float]:
-        points, n_points = packed(behaviors, self.by_column)
+        places, n_places = packed(behaviors, self.table)
         n = len(behaviors)
-        novelty, distance = np.empty(n), np.empty((n, self.archive.n_points.size))
+        novelty, distance = np.empty(n), np.empty((n, self.archive.n_places.size))
         archive = self.archive._replace(place_of=np.empty(n, np.int64), distance=distance)
-        _novelty.paper_archive_step(points, n_points, SPANS, archive, self.above_all, novelty)
+        _novelty.paper_archive_step(places, n_places, self.table.span, archive, self.above_all, novelty)
         return novelty.tolist()
 
-    def behaviors(self) -> list[list[tuple[int, int]]]:
+    def behaviors(self) -> list[Points]:
         """Oldest first."""
         n, oldest = self.archive.state.tolist()
-        places = [(oldest + k) % n for k in range(n)]
+        archived = [(oldest + k) % n for k in range(n)]
         return [
-            [(int(x), int(y)) for x, y in self.archive.points[place, : self.archive.n_points[place]]]
-            for place in places
+            points_at(self.archive.places[k, : self.archive.n_places[k]], COLUMNS, ROWS, self.by_column)
+            for k in archived
         ]
 
 
@@ -174,7 +201,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         rng = random.Random(seed)
         n, k, generations = 4 + seed % 6, rng.randint(1, 12), 10
         start = [20.0, 400.0, 0.0, 150.0][seed % 4]
-        archive = np.empty((n * generations, COLUMNS * ROWS, 2), np.uint8)
+        archive = np.empty((n * generations, COLUMNS * ROWS), np.int32)
         n_archive = np.zeros(n * generations, np.int32)
         state, counters = np.zeros(1, np.int64), np.zeros(2, np.int64)
         threshold = np.array([start])
@@ -183,13 +210,13 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         )
         for _ in range(generations):
             behaviors = [random_cells(rng, COLUMNS * ROWS) for _ in range(n)]
-            points, n_points = packed(behaviors, True)
+            places, n_places = packed(behaviors, BY_COLUMN)
             novelty = np.empty(n)
             room = _novelty.NearestRoom(np.empty(n + len(archive)), np.empty(k), np.empty(n, np.bool_))
             _novelty.nearest_archive_step(
-                points,
-                n_points,
-                SPANS,
+                places,
+                n_places,
+                BY_COLUMN.span,
                 patience,
                 archive,
                 n_archive,
@@ -204,7 +231,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
             assert state[0] == len(plain.behaviors)
             assert threshold[0] == pytest.approx(plain.threshold, rel=1e-12)
             for place, behavior in enumerate(plain.behaviors):
-                assert archive[place, : n_archive[place]].tolist() == [list(point) for point in behavior]
+                assert points_at(archive[place, : n_archive[place]], COLUMNS, ROWS, True) == behavior
         moved.add(int(np.sign(threshold[0] - start)))
     assert {-1, 1} <= moved or not COMPILED
 

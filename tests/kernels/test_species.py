@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realitygap.evolution import Population
 from realitygap.kernels import _species
 from realitygap.kernels._species import SpeciesTable
 from tests.kernels.genome_arrays import grown, rules_of, settings, to_arrays
@@ -65,6 +66,21 @@ def test_disabled_genes_count_as_others_do() -> None:
 def test_genomes_without_a_gene_in_common_are_infinitely_far_apart() -> None:
     neat = Neat(settings(), 1, 1)
     assert distance(neat, genome((0, 1.0)), genome((1, 1.0))) == math.inf
+
+
+def test_without_a_gene_in_common_structure_alone_counts_where_weights_do_not() -> None:
+    neat = Neat(settings(**{**COEFFICIENTS, "weight_coefficient": 0.0}), 1, 1)
+    assert distance(neat, genome((0, 1.0)), genome((1, 1.0), (2, 1.0))) == 3.0 + 2.0 * 2
+
+
+def test_genomes_of_a_random_start_are_one_species_where_no_difference_counts() -> None:
+    """So that NEAT without speciation has one species; a high threshold alone leaves those that share no gene."""
+    n = 40
+    nothing = {"excess_coefficient": 0, "disjoint_coefficient": 0, "weight_coefficient": 0}
+    for changes, several in ((nothing, False), ({"threshold": 1_000_000}, True)):
+        chosen = settings(start_hidden=10, start_topology="random", target_species=0, **changes)
+        population = Population(6, 1, chosen.model_copy(update={"population": n}), seed=3)
+        assert (len(set(population.species.tolist())) > 1) == several
 
 
 def test_a_genome_is_at_distance_0_from_itself() -> None:

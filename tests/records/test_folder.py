@@ -192,6 +192,10 @@ def test_read_selects_conditions_replicates_and_columns(tmp_path):
     expected = make_rows(n=6).filter(pl.col("replicate").is_in([1, 4])).select("novelty", "cells")
     assert part.equals(expected)
     assert folder.read(replicates=range(0)).is_empty()
+    assert folder.derive("lineage", replicates=[4, 10**20, -1])["replicate"].unique().to_list() == [4]
+    for wrong in ("4", 1.5, None):
+        with pytest.raises(TypeError, match="expected a whole number"):
+            folder.read(replicates=[wrong])
     assert folder.read(replicates=iter([2])).height == 16
 
 

@@ -272,7 +272,7 @@ class Neat:
 
     def distance(self, a: Genome, b: Genome) -> float:
         matching = sorted(a.genes.keys() & b.genes.keys())
-        if not matching:
+        if not matching and self.settings.weight_coefficient:
             return math.inf
         end = min(max(a.genes), max(b.genes))
         alone = a.genes.keys() ^ b.genes.keys()
@@ -288,7 +288,7 @@ class Neat:
         return (
             self.settings.excess_coefficient * excess / size
             + self.settings.disjoint_coefficient * disjoint / size
-            + self.settings.weight_coefficient * sum(apart) / len(apart)
+            + self.settings.weight_coefficient * sum(apart) / max(len(apart), 1)
         )
 
     def offspring(

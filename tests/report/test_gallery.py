@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
 import xml.etree.ElementTree as ET
 
@@ -319,6 +320,40 @@ def ancestors_of(rows: pl.DataFrame, generation: int, individual: int) -> set[tu
     return found
 
 
+def test_numbers_of_species_keep_apart_in_a_long_run(tmp_path):
+    """Each species had its number at its largest share: hundreds of them lay over each other, and beyond the axes."""
+    text = """
+    [study]
+    name = "long"
+    replicates = 1
+    [neat]
+    population = 60
+    generations = 40
+    add_node = 0.5
+    threshold = 1.0
+    [platform.jyro]
+    steps = 5
+    [[condition]]
+    name = "coverage"
+    """
+    folder = run_study(parse_study(text, "long.toml"), tmp_path / "r").folder
+    drawing = draw_species(folder)
+    left = drawing.figure.axes[0]
+    drawing.figure.draw_without_rendering()
+    numbers = [each for each in left.texts if each.get_text().isdigit()]
+    boxes = [each.get_window_extent() for each in numbers]
+    n_species = folder.read(columns=["species"])["species"].n_unique()
+    assert 2 <= len(numbers) < n_species
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    assert all(left.bbox.y0 <= box.y0 and box.y1 <= left.bbox.y1 for box in boxes)
+    assert len(left.collections) == n_species
+    for generation in (0, 20, 39):
+        tops = [band.get_paths()[0].vertices for band in left.collections]
+        highest = max(v[np.abs(v[:, 0] - generation) <= 0.5, 1].max(initial=0) for v in tops)
+        assert highest == pytest.approx(1.0)
+    assert "numbers of larger species" in drawing.caption
+
+
 def test_a_lineage_shows_every_ancestor_with_its_coverage_and_species(tiny_study):
     rows = tiny_study.read("novelty", [1])
     drawing = draw_lineage(tiny_study, "novelty", 1, 2, 5)
@@ -326,14 +361,14 @@ def test_a_lineage_shows_every_ancestor_with_its_coverage_and_species(tiny_study
     assert f"{len(ancestors) - 1} in all" in drawing.caption
     assert "Ancestors of novelty, run 1, generation 2, individual 5 (ringed" in drawing.caption
     drawn = texts(drawing.svg)
+    coverages = []
     for generation, individual in ancestors:
         row = rows.filter(pl.col("generation") == generation, pl.col("individual") == individual).row(
             0, named=True
         )
-        assert f"{row['coverage_line']:.3f}" in drawn
+        coverages.append(f"{row['coverage_line']:.3f}")
         assert str(row["species"]) in drawn
-    n_dots = sum(text == f"{r['coverage_line']:.3f}" for text in drawn for r in rows.iter_rows(named=True))
-    assert n_dots >= len(ancestors)
+    assert sorted(text for text in drawn if re.fullmatch(r"0\.\d{3}", text)) == sorted(coverages)
 
 
 def test_a_lineage_is_that_of_the_champion_of_the_typical_run(tiny_study):
@@ -365,6 +400,10 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
     early = draw_lineage(folder, "coverage", 0, 14, 3)
     assert "Colors tell species apart" in early.caption
     assert not [each for each in texts(early.svg) if each.startswith("+ ")]
+    n_dots = sum(len(line.get_xdata()) for line in early.figure.axes[0].lines if line.get_marker() == "o")
+    n_ancestors = len(ancestors_of(folder.read("coverage", [0]), 14, 3))
+    assert n_dots == n_ancestors + 1, "each has its dot, and the chosen one a ring besides"
+    assert len(early.figure.axes[0].lines) < 20, "not one by one, which takes minutes for tens of thousands"
     lineage = folder.derive("lineage", "coverage")
     rows = folder.read("coverage").with_columns(lineage["new"])
     assert re.search(r"generation \d+: node h\d+", early.alt)

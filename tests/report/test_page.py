@@ -110,6 +110,7 @@ def test_page_says_what_was_run(tiny_page, tiny_study):
     assert f"{28 * 24 * 30:,}" in page.words
     assert "realitygap run STUDY.toml --seed 1 --replicates 7 --out DIR" in page.words
     assert "no robot was driven" in page.words
+    assert "Abandoning objectives" in page.words, "the study has a condition with novelty"
 
 
 def test_numbers_are_those_of_the_summary(tiny_page, tiny_study):
@@ -216,6 +217,7 @@ def test_the_smallest_studies_have_a_page(out, no_replay, n, generations):
 def test_conditions_without_settings_have_a_page(out, no_replay):
     _, page = report(write_results(out, ["c"], {"c": random_runs(2)}))
     assert "unlabeled" in page.words
+    assert "Abandoning objectives" not in page.words
 
 
 def test_no_rows_is_a_clear_error_and_leaves_nothing(out):

@@ -128,6 +128,18 @@ def test_new_conditions_extend_the_results(undisturbed, tmp_path):
     assert ResultsFolder.open(tmp_path / "r").digest() == undisturbed.digest()
 
 
+def test_a_new_condition_whose_files_would_be_those_of_another_is_refused(undisturbed, tmp_path):
+    """On a disk that does not tell capitals, chunks of `Novelty` would take the place of those of `novelty`."""
+    path = tmp_path / "r"
+    run_study(parse_study(SMALL, "small.toml"), path)
+    renamed = parse_study(SMALL.replace('name = "novelty"', 'name = "Novelty"'), "small.toml")
+    with pytest.raises(StudyError, match="'Novelty' would share files with condition 'novelty'"):
+        run_study(renamed, path)
+    assert ResultsFolder.open(path).digest() == undisturbed.digest()
+    assert not list(path.glob("trials/Novelty*"))
+    assert run_study(renamed, path, fresh=True).n_computed == 36
+
+
 def test_a_changed_condition_is_refused_with_the_difference(study, undisturbed, tmp_path):
     run_study(study, tmp_path / "r")
     changed = parse_study(SMALL.replace("noise = 0.5", "noise = 0.6"), "small.toml")

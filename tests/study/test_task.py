@@ -35,7 +35,9 @@ compiled_only = pytest.mark.skipif(not COMPILED, reason="takes minutes as plain 
 def test_figures_have_their_keys_and_the_published_ones_beside(task: str) -> None:
     told: list[Progress] = []
     figures = measure_task(task, seeds=3, changes=SMALL, threads=2, tell=told.append)
-    expected = KEYS if task != "double-pole-no-velocity" else [*KEYS[:-1], "mean_generalization", KEYS[-1]]
+    expected = KEYS
+    if task == "double-pole-no-velocity":
+        expected = [*KEYS[:-1], "mean_generalization", "sd_generalization", KEYS[-1]]
     assert list(figures) == expected
     assert (figures["task"], figures["seeds"]) == (task, 3)
     assert figures["settings"] == "default population=4 generations=2"
@@ -56,6 +58,7 @@ def test_figures_are_over_the_runs_that_solved_the_task() -> None:
     assert figures["worst_evaluations"] == 4_000
     assert (figures["mean_hidden"], figures["mean_connections"]) == (1.5, 6.5)
     assert figures["mean_generalization"] == 275.5
+    assert figures["sd_generalization"] == statistics.stdev([300, 251])
     nothing = summarize_runs(task, "default", [lost])
     assert nothing["solved"] == 0
     assert nothing["mean_evaluations"] is nothing["sd_evaluations"] is nothing["worst_evaluations"] is None
@@ -93,6 +96,7 @@ def test_settings_are_of_the_set_then_of_the_task_then_changed() -> None:
         ("xr", "default", {}, "Unknown task 'xr'. Did you mean 'xor'?"),
         ("xor", "stanley", {}, "Did you mean 'stanley-2002'?"),
         ("xor", "default", {"crosover": 0}, "crosover: unknown setting. Did you mean 'crossover'?"),
+        ("xor", "default", {"settings": "stanley-2002"}, "The set is 'default' already"),
         ("xor", "default", {"crossover": 2}, "crossover: expected at most 1.0"),
     ],
 )
@@ -104,10 +108,22 @@ def test_what_cannot_be_is_refused_with_a_hint(
     assert text in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["seeds", "threads"])
-def test_counts_below_one_are_refused(name: str) -> None:
-    with pytest.raises(ValueError, match=f"{name} is 0, expected at least 1"):
-        measure_task("xor", **{name: 0})  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("name", "number", "error", "text"),
+    [
+        ("seeds", 0, ValueError, "expected 1 to"),
+        ("seeds", "3", TypeError, "expected a whole number"),
+        ("threads", 0, ValueError, "expected at least 1"),
+        ("seed", -1, ValueError, "expected 0 to"),
+        ("seed", 2**63, ValueError, "expected 0 to"),
+        ("seed", 1.5, TypeError, "expected a whole number"),
+    ],
+)
+def test_counts_and_seeds_that_cannot_be_are_refused(
+    name: str, number: object, error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error, match=f"{name} is {number!r}, {text}"):
+        measure_task("xor", **{name: number})  # type: ignore[arg-type]
 
 
 @compiled_only

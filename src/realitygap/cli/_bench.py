@@ -27,7 +27,8 @@ def bench(
         int | None, typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}]")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="With a task: of the random numbers. [default: 1]")
+        int | None,
+        typer.Option(min=0, max=2**63 - 1, help="With a task: of the random numbers. [default: 1]"),
     ] = None,
     change: Annotated[
         list[str] | None,
@@ -59,9 +60,9 @@ def bench(
     In Python: realitygap.study.measure_task("xor", "stanley-2002", seeds=100)
     """
     if task is None:
-        given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change}
+        given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change or None}
         for option, value in given.items():
-            if value:
+            if value is not None:
                 raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
         _bench_speed(2.0 if seconds is None else seconds, as_json=as_json)
         return
@@ -72,9 +73,20 @@ def bench(
         "default" if settings is None else settings,
         DEFAULT_SEEDS if seeds is None else seeds,
         1 if seed is None else seed,
-        dict(map(_changed_setting, change or [])),
+        _changes(change or []),
         as_json=as_json,
     )
+
+
+def _changes(texts: list[str]) -> dict[str, Any]:
+    changes: dict[str, Any] = {}
+    for key, value in map(_changed_setting, texts):
+        if key in changes:
+            raise StudyError(
+                f"--change gives {key} twice: {changes[key]!r} and {value!r}. Leave one of them out."
+            )
+        changes[key] = value
+    return changes
 
 
 def _changed_setting(text: str) -> tuple[str, Any]:
@@ -109,6 +121,7 @@ def _bench_task(
         "mean_hidden": "mean hidden nodes",
         "mean_connections": "mean enabled connections",
         "mean_generalization": "mean generalization, of 625",
+        "sd_generalization": "its standard deviation",
     }
     typer.echo(f"{task}, {figures['settings']}, seed {seed}")
     typer.echo(f"{'':28} {'ours':>10} {'published':>10}")

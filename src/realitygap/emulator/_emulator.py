@@ -66,7 +66,7 @@ class Emulator:
         robot: SimulatedRobot | None = None,
     ) -> None:
         if model not in MODELS:
-            raise RobotError(f"Unknown model {model!r}; expected {' or '.join(MODELS)}.")
+            raise RobotError(f"Unknown model {model!r}; expected {' or '.join(MODELS)}; an S3 is an s2.")
         if fluke not in FLUKES:
             raise RobotError(f"Unknown Fluke {fluke!r}; expected {', '.join(FLUKES)}.")
         seed = whole_number("seed", seed, 0)

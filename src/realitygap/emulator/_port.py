@@ -65,6 +65,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._begun = 0.0
         self.clock = EmulatorClock(self)
         self.is_open = False
+        self._dtr_was_high = False
         super().__init__(*args, **kwargs)
 
     # -- opening --
@@ -81,6 +82,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._robot.transmit()
         self._buffer.clear()
         self.is_open = True
+        self._dtr_was_high = bool(self._dtr_state)
         self._reconfigure_port()
 
     def _make(self, url: str) -> None:
@@ -215,8 +217,11 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     def _update_dtr_state(self) -> None:
         """DTR going low restarts a cabled S2, as on its socket."""
-        if self.is_open and not self._dtr_state:
+        falls = self._dtr_was_high and not self._dtr_state
+        self._dtr_was_high = bool(self._dtr_state)
+        if falls:
             with self._lock:
+                self._sync()
                 self._robot.reset_line()
 
     def _update_rts_state(self) -> None:

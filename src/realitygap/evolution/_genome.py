@@ -132,9 +132,7 @@ class Network:
             RecordError: The values are not a network's.
             RecordVersionError: Another version wrote them.
         """
-        return cls._from(
-            _json.checked(dict(values), _json.NetworkForm, "network", "The mapping"), "The mapping"
-        )
+        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
         """The network as JSON with a version; numbers come back bit for bit."""
@@ -251,9 +249,7 @@ class Genome:
             RecordError: The values are not a genome's.
             RecordVersionError: Another version wrote them.
         """
-        return cls._from(
-            _json.checked(dict(values), _json.GenomeForm, "genome", "The mapping"), "The mapping"
-        )
+        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
         """The genome as JSON with a version; numbers come back bit for bit."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from realitygap.errors import from_extra
 
+from ._genome import Genome
 from ._json import head
 from ._picture import node_names
-
-if TYPE_CHECKING:
-    from ._genome import Genome
 
 
 def to_networkx(
@@ -35,8 +33,11 @@ def to_networkx(
 
     Raises:
         MissingExtraError: networkx is not installed.
+        TypeError: Something else than a genome, such as a network.
         ValueError: Another number of names than of inputs or outputs.
     """
+    if not isinstance(genome, Genome):
+        raise TypeError(f"genome is {genome!r}, expected a Genome.")
     networkx = from_extra("networkx", "export")
     names = node_names(genome, input_names, output_names)
     graph = networkx.DiGraph(**head("genome", genome.rules, genome.bias_value))

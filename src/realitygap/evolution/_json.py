@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -143,7 +144,7 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
         RecordVersionError: of another version.
     """
     expected = f"realitygap {kind}"
-    found = values.get("format") if isinstance(values, dict) else None
+    found = values.get("format") if isinstance(values, Mapping) else None
     if found != expected:
         raise RecordError(f"{where} has the format {found!r}, expected {expected!r}.")
     if values.get("version") != FORMAT_VERSION:
@@ -152,7 +153,7 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
             f"{FORMAT_VERSION}. Use the realitygap that wrote it."
         )
     try:
-        return form.model_validate(values)
+        return form.model_validate(dict(values))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import reprlib
 from collections.abc import Callable, Sequence
@@ -9,22 +10,21 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from realitygap.kernels import _novelty
+from realitygap.settings import Settings
 
 Cells = Sequence[int] | NDArray[np.integer]
 
 
-class NoveltySettings(BaseModel):
+class NoveltySettings(Settings):
     """How novelty is measured, and what is remembered.
 
     `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
     mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in
     population and archive, which takes what exceeds a moving threshold. Both compare sorted lists of cells.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Which novelty search.")
     sort: Literal["x-then-y", "y-then-x"] = Field(
@@ -59,9 +59,16 @@ def largest_cell_distance(columns: int, rows: int) -> float:
     return math.hypot(columns - 1, rows - 1)
 
 
-def _sorted_points(
-    cells: Cells, columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
-) -> NDArray[np.uint8]:
+Sort = Literal["x-then-y", "y-then-x"]
+
+
+@functools.cache
+def _table_of(columns: int, rows: int, sort: Sort) -> _novelty.CellTable:
+    table: _novelty.CellTable = _novelty.make_cell_table(columns, rows, sort == "x-then-y")
+    return table
+
+
+def _sorted_places(cells: Cells, columns: int, rows: int, table: _novelty.CellTable) -> NDArray[np.int32]:
     given = np.asarray(cells)
     if given.size and given.dtype.kind not in "iu":
         raise TypeError(f"A behavior is {reprlib.repr(cells)}, expected whole numbers: those of its cells.")
@@ -71,9 +78,9 @@ def _sorted_points(
             f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
             f"expected 0 to {columns * rows - 1}: the grid has {columns} columns and {rows} rows."
         )
-    points = np.empty((columns * rows, 2), np.uint8)
-    _novelty.sort_cells(numbers, numbers.size, columns, rows, sort == "x-then-y", points)
-    return points[: numbers.size]
+    places = np.empty(columns * rows, np.int32)
+    _novelty.sort_cells(numbers, numbers.size, table, places)
+    return places[: numbers.size]
 
 
 def sorted_cells_distance(
@@ -82,7 +89,7 @@ def sorted_cells_distance(
     *,
     columns: int = 12,
     rows: int = 6,
-    sort: Literal["x-then-y", "y-then-x"] = "x-then-y",
+    sort: Sort = "x-then-y",
 ) -> float:
     """The paper's distance of two behaviors [cells].
 
@@ -100,9 +107,10 @@ def sorted_cells_distance(
 
     Source: Rosenzweig & Remy, section 2.4.
     """
-    a = _sorted_points(one, columns, rows, sort)
-    b = _sorted_points(other, columns, rows, sort)
-    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), _novelty.make_spans(columns, rows)))
+    table = _table_of(columns, rows, sort)
+    a = _sorted_places(one, columns, rows, table)
+    b = _sorted_places(other, columns, rows, table)
+    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), table.span))
 
 
 class PaperArchive:
@@ -137,14 +145,15 @@ class PaperArchive:
             TypeError: A cell that is not a whole number.
             ValueError: A cell outside the grid.
         """
-        points, n_points = _pack(behaviors, self._columns, self._rows, self.settings.sort)
+        table = _table_of(self._columns, self._rows, self.settings.sort)
+        places, n_places = _pack(behaviors, self._columns, self._rows, table)
         n = len(behaviors)
         novelty = np.empty(n)
         room = {"place_of": np.zeros(n, np.int64), "distance": np.zeros((n, self.settings.archive_size))}
         _novelty.paper_archive_step(
-            points,
-            n_points,
-            _novelty.make_spans(self._columns, self._rows),
+            places,
+            n_places,
+            table.span,
             self._archive._replace(**room),
             self.settings.enter == "above-all",
             novelty,
@@ -153,15 +162,15 @@ class PaperArchive:
 
 
 def _pack(
-    behaviors: Sequence[Cells], columns: int, rows: int, sort: Literal["x-then-y", "y-then-x"]
-) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    points = np.zeros((len(behaviors), columns * rows, 2), np.uint8)
-    n_points = np.zeros(len(behaviors), np.int32)
+    behaviors: Sequence[Cells], columns: int, rows: int, table: _novelty.CellTable
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    places = np.zeros((len(behaviors), columns * rows), np.int32)
+    n_places = np.zeros(len(behaviors), np.int32)
     for k, cells in enumerate(behaviors):
-        found = _sorted_points(cells, columns, rows, sort)
-        points[k, : len(found)] = found
-        n_points[k] = len(found)
-    return points, n_points
+        found = _sorted_places(cells, columns, rows, table)
+        places[k, : len(found)] = found
+        n_places[k] = len(found)
+    return places, n_places
 
 
 def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

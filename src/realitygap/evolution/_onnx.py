@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from realitygap._version import __version__
 from realitygap.errors import from_extra
 
-if TYPE_CHECKING:
-    from ._genome import Network
+from ._genome import Network
 
 OPSET = 13
 IR_VERSION = 8
@@ -46,8 +45,11 @@ def to_onnx(
 
     Raises:
         MissingExtraError: onnx is not installed.
+        TypeError: Something else than a network, such as a genome.
         ValueError: Another number of names than of inputs or outputs, or an unknown precision.
     """
+    if not isinstance(network, Network):
+        raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
     if precision not in ("double", "single"):
         raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
     for what, given, n in (

@@ -8,7 +8,6 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ValidationError
 
 from realitygap.errors import RecordError, whole_number
 from realitygap.kernels._evolve import next_generation
@@ -214,14 +213,14 @@ class Population:
             population = cls(
                 about["n_inputs"],
                 about["n_outputs"],
-                NeatSettings.model_validate(about["settings"]),
+                NeatSettings(**about["settings"]),
                 replicate=about["replicate"],
                 bias=about["bias"],
                 key=about["key"],
             )
             population._restore(arrays)
             population.generation = about["generation"]
-        except (KeyError, TypeError, ValidationError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise RecordError(
                 f"{path} is a checkpoint, but not one of a population as this version has it ({error})."
             ) from error

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from realitygap.errors import did_you_mean
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import IDENTITY, SIGMOID, TANH
+from realitygap.settings import Settings
 
 _NEVER = 2**31 - 1
 
@@ -17,7 +18,7 @@ ACTIVATIONS = {"tanh": TANH, "sigmoid": SIGMOID, "identity": IDENTITY}
 """The kernels' numbers of the activation functions, by name."""
 
 
-class NeatSettings(BaseModel):
+class NeatSettings(Settings):
     """NEAT after Stanley & Miikkulainen (2002), with the choices that the paper leaves open settled by name.
 
     The marks in the descriptions: *EC02*, the paper (Evolutionary Computation 10(2), with its section);
@@ -35,8 +36,6 @@ class NeatSettings(BaseModel):
     link in the generation; no "severe" half in weight mutation; no worst species marked for removal every 30
     generations; interspecies mating takes the champion of a species drawn uniformly.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     settings: str = Field("default", description="The named set that fills in what is not given.")
     population: int = Field(
@@ -173,7 +172,13 @@ class NeatSettings(BaseModel):
 
     excess_coefficient: float = Field(1.0, ge=0, le=1e6, description="c1 of the distance (EC02 4.1: 1).")
     disjoint_coefficient: float = Field(1.0, ge=0, le=1e6, description="c2 of the distance (EC02 4.1: 1).")
-    weight_coefficient: float = Field(0.4, ge=0, le=1e6, description="c3 of the distance (EC02 4.1: 0.4).")
+    weight_coefficient: float = Field(
+        0.4,
+        ge=0,
+        le=1e6,
+        description="c3 of the distance (EC02 4.1: 0.4). Genomes without a gene in common are never compatible, unless "
+        "it is 0; with all three at 0 there is one species.",
+    )
     normalize_genes: Literal["never", "large", "always"] = Field(
         "never",
         description="Whether excess and disjoint genes are divided by the larger genome's size: never (C++, JAIR04), "
@@ -271,7 +276,7 @@ class NeatSettings(BaseModel):
             changes: Settings by name.
 
         Raises:
-            ValueError: No such set, a second name for it, or a setting is wrong (pydantic's message names it).
+            ValueError: No such set, a second name for it, or a setting that is unknown or cannot be.
         """
         if "settings" in changes:
             raise ValueError(
@@ -279,7 +284,7 @@ class NeatSettings(BaseModel):
             )
         if not _is_known(name):
             raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}")
-        return cls.model_validate({"settings": name, **changes})
+        return cls(settings=name, **changes)
 
     def rules(self, n_inputs: int, n_outputs: int, *, bias_input: int = -1) -> NeatRules:
         """The settings in the form that the kernels read.

@@ -49,7 +49,8 @@ class ScribblerCoverageEnv(gymnasium.Env[Array, Array]):
         cells: What rewards count: cells along the line driven, or those in which steps end.
 
     Raises:
-        ValueError: A setting out of range, or an unknown one.
+        TypeError: Something else than such settings.
+        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import did_you_mean
+from realitygap.errors import did_you_mean, real_number, whole_number
 from realitygap.kernels._fleet import make_fleet, observe_robots, start_robots, step_robots
 from realitygap.kernels._philox import MAX_INDIVIDUALS
 from realitygap.robots import JyroPlatform
 from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene, poses_of
-from realitygap.world import ArenaSettings
+from realitygap.world import ArenaSettings, check_start
 
 Cells = Literal["line", "ends"]
+T = TypeVar("T")
 
 
 class Robots:
@@ -31,7 +32,8 @@ class Robots:
         cells: What rewards count: cells along the line driven, or those in which steps end.
 
     Raises:
-        ValueError: A setting out of range, or an unknown one.
+        TypeError: Something else than such settings.
+        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
     """
 
     def __init__(
@@ -43,16 +45,13 @@ class Robots:
         arena: ArenaSettings | Mapping[str, Any] | None,
         cells: Cells,
     ) -> None:
-        if not 1 <= n <= MAX_INDIVIDUALS:
-            raise ValueError(f"num_envs is {n}, expected 1 to {MAX_INDIVIDUALS}.")
-        if not 0 <= noise <= 10:
-            raise ValueError(f"noise is {noise}, expected 0 to 10.")
+        noise = real_number("noise", noise, 0, 10)
         if cells not in ("line", "ends"):
             raise ValueError(f"cells is {cells!r}, expected 'line' or 'ends'.")
-        self.n = n
-        self.platform = platform if isinstance(platform, JyroPlatform) else JyroPlatform(**(platform or {}))
-        settings = arena if isinstance(arena, ArenaSettings) else ArenaSettings(**(arena or {}))
-        self.arena = settings.arena()
+        self.n = whole_number("num_envs", n, 1, MAX_INDIVIDUALS)
+        self.platform = _made("platform", JyroPlatform, platform)
+        self.arena = _made("arena", ArenaSettings, arena).arena()
+        check_start(self.arena, self.platform.body)
         self._scene = jyro_scene(self.platform, self.arena)
         self._rules = jyro_rules(self.platform, noise=noise, bias_input=False, bias_value=1.0)
         self._fleet = make_fleet(self._scene, n)
@@ -87,6 +86,7 @@ class Robots:
             np_random: A key is drawn from it when none is given.
 
         Raises:
+            TypeError: The key is none.
             ValueError: An unknown option, or a key whose numbers would repeat.
         """
         options = options or {}
@@ -95,7 +95,7 @@ class Robots:
         given = options.get("noise_key")
         if given is None:
             given = NoiseKey(int(np_random.integers(1 << 64, dtype=np.uint64)))
-        key = given if isinstance(given, NoiseKey) else NoiseKey(**given)
+        key = _made("noise_key", NoiseKey, given)
         if key.individual + self.n > MAX_INDIVIDUALS:
             raise ValueError(
                 f"noise_key.individual is {key.individual} for {self.n} robots, expected at most "
@@ -149,6 +149,15 @@ class Robots:
     def cells(self, k: int) -> tuple[int, ...]:
         """The cells that robot k visited along its line, in order of first visit, columns * row + column."""
         return tuple(self._cells[k, : self._counts[k, 0]].tolist())
+
+
+def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
+    """What was given, made of its settings where it is a mapping."""
+    if isinstance(given, kind):
+        return given
+    if not isinstance(given, Mapping | None):
+        raise TypeError(f"{name} is {given!r}, expected {kind.__name__}, or a mapping of what it is made of.")
+    return kind(**(given or {}))
 
 
 def by_robot(blocks: NDArray[Any], n: int) -> NDArray[np.float64]:

@@ -31,7 +31,8 @@ class ScribblerCoverageVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         noise, platform, arena, cells: As of `ScribblerCoverageEnv`.
 
     Raises:
-        ValueError: A setting out of range, or an unknown one.
+        TypeError: Something else than such settings.
+        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it

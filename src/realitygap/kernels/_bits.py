@@ -1,4 +1,4 @@
-"""Shifts of 32-bit words, which Numba would widen to 64 bits."""
+"""Shifts and places of the bits of 32-bit words, which Numba would widen to 64; powers of two from their bits."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -14,6 +15,18 @@ if numba.config.DISABLE_JIT:
     def shift_left(word: Any, places: Any) -> Any:
         """A uint32 shifted left by 0 to 31 places."""
         return np.uint32((int(word) << int(places)) & 0xFFFFFFFF)
+
+    def lowest_bit(word: Any) -> Any:
+        """The place, 0 to 31, of the lowest bit that is set in a uint32, at least one of which is."""
+        return (int(word) & -int(word)).bit_length() - 1
+
+    def highest_bit(word: Any) -> Any:
+        """The place of the highest bit, likewise."""
+        return int(word).bit_length() - 1
+
+    def power_of_two(exponent: Any) -> Any:
+        """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
+        return type(exponent)(2.0 ** int(exponent))
 
 else:
 
@@ -25,3 +38,35 @@ else:
             return builder.shl(*arguments)
 
         return types.uint32(types.uint32, types.uint32), generate
+
+    @intrinsic
+    def lowest_bit(context, word):
+        """The place, 0 to 31, of the lowest bit that is set in a uint32, at least one of which is."""
+
+        def generate(context, builder, signature, arguments):
+            place = builder.cttz(arguments[0], ir.IntType(1)(1))
+            return builder.zext(place, ir.IntType(64))
+
+        return types.int64(types.uint32), generate
+
+    @intrinsic
+    def highest_bit(context, word):
+        """The place of the highest bit, likewise."""
+
+        def generate(context, builder, signature, arguments):
+            place = builder.sub(ir.IntType(32)(31), builder.ctlz(arguments[0], ir.IntType(1)(1)))
+            return builder.zext(place, ir.IntType(64))
+
+        return types.int64(types.uint32), generate
+
+    @intrinsic
+    def power_of_two(context, exponent):
+        """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
+        word, digits = (ir.IntType(32), 23) if exponent == types.float32 else (ir.IntType(64), 52)
+        bias = (1 << (word.width - digits - 2)) - 1
+
+        def generate(context, builder, signature, arguments):
+            biased = builder.add(builder.fptosi(arguments[0], word), word(bias))
+            return builder.bitcast(builder.shl(biased, word(digits)), arguments[0].type)
+
+        return exponent(exponent), generate

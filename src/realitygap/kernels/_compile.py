@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import os
 import sys
@@ -13,11 +14,25 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba import _dynfunc
 from numba.core import caching
-from numba.core.compiler import Compiler
-from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.compiler import CompilerBase, Flags
+from numba.core.compiler_machinery import PassManager
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    IRLegalization,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    TranslateByteCode,
+)
+
+from ._lower import LowerForCallers, LowerKernel
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -47,7 +62,10 @@ def cache_root() -> Path:
         return Path.home() / "Library" / "Caches" / "realitygap"
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "realitygap"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "realitygap"
+    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not caches.is_absolute():  # its specification has such a one ignored
+        caches = Path.home() / ".cache"
+    return caches / "realitygap"
 
 
 def _writable_cache() -> Path | None:
@@ -92,56 +110,64 @@ def _mark_stage(state: Any) -> None:
     state.flags.noalias = True
 
 
-class _Stage(Compiler):
+# Of Numba's thirty steps those that kernels need: no closures, contexts, literals or formulas over whole arrays.
+BEFORE_LOWERING = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    AnnotateTypes,
+)
+
+
+class _Flags(Flags):
+    """Options that compare by those that were set; type inference compares them ten thousands of times."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Flags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+
+class _Entry(CompilerBase):
+    """For calls from Python."""
+
+    lowering = LowerKernel
+
+    def define_pipelines(self) -> Any:
+        self.state.flags = _Flags(self.state.flags)
+        manager = PassManager("kernel")
+        for step in (*BEFORE_LOWERING, self.lowering, NoPythonBackend):
+            manager.add_pass(step, step.__name__)
+        manager.finalize()
+        return [manager]
+
+    def compile_extra(self, function: Any) -> Any:
+        # Of the million objects that a compilation makes, nearly all live until it is done.
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(function)
+        finally:
+            if collecting:
+                gc.enable()
+
+
+class _Inner(_Entry):
+    """For calls from other kernels."""
+
+    lowering = LowerForCallers
+
+
+class _EntryStage(_Entry):
     def define_pipelines(self) -> Any:
         _mark_stage(self.state)
         return super().define_pipelines()
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _LowerForCallers(NativeLowering):
-    """Lowers a function to what its callers link, and leaves optimizing and machine code to them.
-
-    Numba would optimize each function with all it calls, and again within each of its callers.
-    """
-
-    _name = "lower_for_callers"
-
-    def run_pass(self, state: Any) -> bool:
-        library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
-        library.enable_object_caching()
-        library._optimize_final_module = lambda: None
-        library._finalize_final_module = functools.partial(_finish_without_code, library)
-        state.library = library
-        state.flags.no_compile = True
-        super().run_pass(state)
-        lowered = state["cr"]
-        # Callers know it by this object; it cannot be called.
-        name = lowered.fndesc.qualname
-        function = _dynfunc.make_function(
-            lowered.fndesc.lookup_module(), name, "", 0, lowered.env, (library,)
-        )
-        state.targetctx.insert_user_function(function, lowered.fndesc, [library])
-        state.reload_init.extend(library._reload_init)
-        state["cr"] = lowered._replace(cfunc=function)
-        return True
-
-
-def _finish_without_code(library: Any) -> None:
-    library._finalize_dynamic_globals()
-    library._finalized = True
-
-
-class _Inner(Compiler):
-    def define_pipelines(self) -> Any:
-        managers = super().define_pipelines()
-        for manager in managers:
-            manager.passes = [
-                (_LowerForCallers, text) if step is NativeLowering else (step, text)
-                for step, text in manager.passes
-            ]
-            manager.finalize()
-        return managers
 
 
 class _InnerStage(_Inner):
@@ -166,7 +192,7 @@ class Kernel:
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, stage: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._entry = numba.njit(**options, pipeline_class=_Stage if stage else Compiler)(function)
+        self._entry = numba.njit(**options, pipeline_class=_EntryStage if stage else _Entry)(function)
         if CACHE_FOLDER is not None:
             before = numba.config.CACHE_DIR
             numba.config.CACHE_DIR = str(CACHE_FOLDER)

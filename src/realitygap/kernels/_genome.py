@@ -84,14 +84,16 @@ class NeatRules(NamedTuple):
     @property
     def n_first_genes(self) -> int:
         """The most connection genes that a genome of the first generation has."""
-        return first_number_after_start(self)
+        return _count_first_numbers(self)  # not compiled for this alone
 
 
-@inlined
-def first_number_after_start(rules):
+def _count_first_numbers(rules):
     """How many numbers the links have that a start can have; one between hidden nodes leads to the later one."""
     h = rules.start_hidden
     return rules.n_inputs * rules.n_outputs + h * (rules.n_inputs + rules.n_outputs) + h * (h - 1) // 2
+
+
+first_number_after_start = inlined(_count_first_numbers)
 
 
 def make_genomes(n, n_outputs, room, hidden_room):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._bits import shift_left
+from ._bits import highest_bit, lowest_bit, shift_left
 from ._compile import kernel, stage
 from ._lanes import LANES, copy_row, words_of
 
@@ -195,15 +195,11 @@ def list_fresh(line, columns, rows, fresh, any_fresh, n_lanes, cells, first, n_l
             for j in range(words):
                 k = j if rightward else words - 1 - j
                 bits = fresh[row * words + k, lane]
-                place = 0 if rightward else 31
-                step = 1 if rightward else -1
                 while bits != 0:
-                    mask = shift_left(np.uint32(1), np.uint32(place))
-                    if bits & mask:
-                        cells[first + lane, n] = columns * row + 32 * k + place
-                        n += 1
-                        bits = np.uint32(bits & np.uint32(~mask))
-                    place += step
+                    place = lowest_bit(bits) if rightward else highest_bit(bits)
+                    bits = np.uint32(bits & np.uint32(~shift_left(np.uint32(1), np.uint32(place))))
+                    cells[first + lane, n] = columns * row + 32 * k + place
+                    n += 1
         n_line[lane] = n
 
 

@@ -7,7 +7,6 @@ longer one has.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,11 +15,22 @@ from numpy.typing import NDArray
 from ._compile import inlined, kernel
 
 
-class Archive(NamedTuple):
-    """The paper's archive of at most m behaviors, and room for n individuals; cells as in `sort_cells`."""
+class CellTable(NamedTuple):
+    """The c cells of a grid as places: numbers in whose order behaviors are sorted.
 
-    points: NDArray[np.uint8]  # (m, c, 2)
-    n_points: NDArray[np.int32]  # (m,)
+    Two places differ by a number that says how many columns and rows apart their cells are.
+    """
+
+    rank: NDArray[np.int32]  # (c,) how many cells have a lower place, by the number of the cell
+    place: NDArray[np.int32]  # (c,) by rank
+    span: NDArray[np.float64]  # (2 p + 1,) their distance [cells] by p + the difference of two places
+
+
+class Archive(NamedTuple):
+    """The paper's archive of at most m behaviors, and room for n individuals."""
+
+    places: NDArray[np.int32]  # (m, c) as of `sort_cells`
+    n_places: NDArray[np.int32]  # (m,)
     among: NDArray[np.float64]  # (m, m) distances of the archived behaviors; negative from each to itself
     state: NDArray[np.int64]  # (2,) behaviors in the archive; place of the oldest
     place_of: NDArray[np.int64]  # (n,) room
@@ -31,7 +41,7 @@ class Archive(NamedTuple):
 def make_archive(n, size, cells):
     """An empty archive."""
     return Archive(
-        np.zeros((size, cells, 2), np.uint8),
+        np.zeros((size, cells), np.int32),
         np.zeros(size, np.int32),
         np.zeros((size, size)),
         np.zeros(2, np.int64),
@@ -41,54 +51,51 @@ def make_archive(n, size, cells):
     )
 
 
-def make_spans(columns, rows):
-    """(columns, rows) distance of two cells so many columns and rows apart [cells]; the last is the largest."""
-    spans = np.zeros((columns, rows))
-    for column in range(columns):
-        for row in range(rows):
-            spans[column, row] = math.sqrt(column * column + row * row)
-    return spans
+def make_cell_table(columns, rows, by_column):
+    """The cells of a grid, sorted by x, then y, as Python sorts pairs (`by_column`), or by y, then x."""
+    number = np.arange(columns * rows, dtype=np.int32)
+    x, y = number % columns, number // columns
+    place = (2 * rows - 1) * x + y if by_column else (2 * columns - 1) * y + x
+    order = np.argsort(place)
+    across = np.arange(1 - columns, columns)[:, None]
+    up = np.arange(1 - rows, rows)
+    span = np.sqrt(across * across + up * up)
+    span = span if by_column else span.T
+    return CellTable(np.argsort(order).astype(np.int32), place[order], np.ascontiguousarray(span).reshape(-1))
 
 
 @kernel
-def sort_cells(cells, n, columns, rows, by_column, points):
-    """Write the n cells as sorted (x, y) points.
+def sort_cells(cells, n, table, places):
+    """Write the places of n cells in ascending order.
 
     Args:
         cells: (>= n,) cell numbers, columns * row + column, each at most once.
         n: How many.
-        columns, rows: Size of the grid.
-        by_column: Sort by x, then y, as Python sorts pairs; else by y, then x.
-        points: (>= n, 2) uint8, written [cells].
+        table: Of the grid.
+        places: (c,) int32, written: the first n are the cells'.
     """
+    for rank in range(table.place.size):
+        places[rank] = 0
     for k in range(n):
-        row = cells[k] // columns
-        column = cells[k] - columns * row
-        rank = column * rows + row if by_column else row * columns + column
-        place = k
-        while place > 0:
-            x = points[place - 1, 0]
-            y = points[place - 1, 1]
-            if (x * rows + y if by_column else y * columns + x) < rank:
-                break
-            points[place, 0] = x
-            points[place, 1] = y
-            place -= 1
-        points[place, 0] = column
-        points[place, 1] = row
+        places[table.rank[cells[k]]] = 1
+    found = 0
+    for rank in range(table.place.size):
+        here = places[rank]
+        places[found] = table.place[rank]
+        found += here
 
 
 @kernel
-def sorted_cells_distance(one, n_one, other, n_other, spans):
+def sorted_cells_distance(one, n_one, other, n_other, span):
     """The paper's distance of two behaviors [cells] (its section 2.4).
 
     Each cell without a counterpart counts with the largest distance in the grid. Four sums, so that one
     addition need not wait for the other.
 
     Args:
-        one, other: (>= n, 2) sorted points.
+        one, other: (>= n,) places of the cells, sorted.
         n_one, n_other: How many each has.
-        spans: Of the grid.
+        span: Of the grid's table.
     """
     shorter = min(n_one, n_other)
     first = 0.0
@@ -97,23 +104,21 @@ def sorted_cells_distance(one, n_one, other, n_other, spans):
     fourth = 0.0
     k = 0
     while k + 4 <= shorter:
-        first += _span(one, other, k, spans)
-        second += _span(one, other, k + 1, spans)
-        third += _span(one, other, k + 2, spans)
-        fourth += _span(one, other, k + 3, spans)
+        first += _apart(one[k], other[k], span)
+        second += _apart(one[k + 1], other[k + 1], span)
+        third += _apart(one[k + 2], other[k + 2], span)
+        fourth += _apart(one[k + 3], other[k + 3], span)
         k += 4
     while k < shorter:
-        first += _span(one, other, k, spans)
+        first += _apart(one[k], other[k], span)
         k += 1
-    padding = spans[spans.shape[0] - 1, spans.shape[1] - 1]
-    return ((first + second) + (third + fourth)) + padding * (max(n_one, n_other) - shorter)
+    return ((first + second) + (third + fourth)) + span[0] * (max(n_one, n_other) - shorter)
 
 
 @inlined
-def _span(one, other, k, spans):
-    dx = np.int64(one[k, 0]) - np.int64(other[k, 0])
-    dy = np.int64(one[k, 1]) - np.int64(other[k, 1])
-    return spans[abs(dx), abs(dy)]
+def _apart(one, other, span):
+    # An unsigned index: one that may be below zero is looked at first.
+    return span[np.uint64((span.size >> 1) + one - other)]
 
 
 @kernel
@@ -136,30 +141,40 @@ def archive_novelty(distance, n_archive, novelty):
 
 
 @kernel
-def _cells_to_archive(points, n_points, row, archive, n_archive, k):
-    """Put one behavior at place k of the archive."""
-    n_archive[k] = n_points[row]
-    for cell in range(n_points[row]):
-        archive[k, cell, 0] = points[row, cell, 0]
-        archive[k, cell, 1] = points[row, cell, 1]
+def _copy_places(places, n, to):
+    """Copy the n places of one behavior."""
+    for k in range(n):
+        to[k] = places[k]
 
 
 @kernel
-def _to_archive(archive, points, n_points, row, k, spans):
+def _to_archive(archive, places, n_places, row, k, span):
     """Put one behavior at place k of the paper's archive."""
-    _cells_to_archive(points, n_points, row, archive.points, archive.n_points, k)
+    _copy_places(places[row], n_places[row], archive.places[k])
+    archive.n_places[k] = n_places[row]
     archive.among[k, k] = -1.0
     for other in range(archive.state[0]):
         if other != k:
             apart = sorted_cells_distance(
-                archive.points[k], archive.n_points[k], archive.points[other], archive.n_points[other], spans
+                archive.places[k], archive.n_places[k], archive.places[other], archive.n_places[other], span
             )
             archive.among[k, other] = apart
             archive.among[other, k] = apart
 
 
 @kernel
-def paper_archive_step(points, n_points, spans, archive, above_all, novelty):
+def _bar(archive, above_all):
+    """The novelty of the most novel behavior in the paper's archive, or of the least novel one."""
+    size = archive.archived.size
+    archive_novelty(archive.among, size, archive.archived)
+    bar = archive.archived[0]
+    for k in range(1, size):
+        bar = max(bar, archive.archived[k]) if above_all else min(bar, archive.archived[k])
+    return bar
+
+
+@kernel
+def paper_archive_step(places, n_places, span, archive, above_all, novelty):
     """Novelty of one generation against the paper's archive, which is then brought up to date.
 
     While the archive has room, the generation's behaviors are put in first, in the order of individuals, and
@@ -168,42 +183,40 @@ def paper_archive_step(points, n_points, spans, archive, above_all, novelty):
     ones: of every one, or of the least novel one. Their novelty is their mean distance to one another.
 
     Args:
-        points: (n, c, 2) uint8, sorted cells of each individual.
-        n_points: (n,) int32.
-        spans: Of the grid.
+        places: (n, c) int32, sorted cells of each individual.
+        n_places: (n,) int32.
+        span: Of the grid's table.
         archive: Changed.
         above_all: Whether a newcomer must be more novel than all, else than the least novel one.
         novelty: (n,) float64, written [cells].
     """
-    size = archive.n_points.size
+    size = archive.n_places.size
     state = archive.state
     for row in range(novelty.size):
         archive.place_of[row] = -1
         if state[0] < size:
-            _to_archive(archive, points, n_points, row, state[0], spans)
+            _to_archive(archive, places, n_places, row, state[0], span)
             archive.place_of[row] = state[0]
             state[0] += 1
     for row in range(novelty.size):
+        at = archive.place_of[row]
         for k in range(state[0]):
-            if archive.place_of[row] == k:
-                archive.distance[row, k] = -1.0
-            else:
-                archive.distance[row, k] = sorted_cells_distance(
-                    points[row], n_points[row], archive.points[k], archive.n_points[k], spans
+            archive.distance[row, k] = (
+                archive.among[at, k]
+                if at >= 0
+                else sorted_cells_distance(
+                    places[row], n_places[row], archive.places[k], archive.n_places[k], span
                 )
+            )
     archive_novelty(archive.distance, state[0], novelty)
     if state[0] < size:
         return
+    bar = _bar(archive, above_all)
     for row in range(novelty.size):
-        if archive.place_of[row] >= 0:
-            continue
-        archive_novelty(archive.among, size, archive.archived)
-        bar = archive.archived[0]
-        for i in range(1, size):
-            bar = max(bar, archive.archived[i]) if above_all else min(bar, archive.archived[i])
-        if novelty[row] > bar:
-            _to_archive(archive, points, n_points, row, state[1], spans)
+        if archive.place_of[row] < 0 and novelty[row] > bar:
+            _to_archive(archive, places, n_places, row, state[1], span)
             state[1] = (state[1] + 1) % size
+            bar = _bar(archive, above_all)
 
 
 @kernel
@@ -270,16 +283,16 @@ class NearestRoom(NamedTuple):
 
 @kernel
 def nearest_archive_step(
-    points, n_points, spans, patience, archive, n_archive, state, counters, threshold, room, novelty
+    places, n_places, span, patience, archive, n_archive, state, counters, threshold, room, novelty
 ):
     """Novelty of one generation by nearest neighbors in population and archive, which then takes entries.
 
     Args:
-        points: (n, c, 2) uint8, sorted cells of each individual.
-        n_points: (n,) int32.
-        spans: Of the grid.
+        places: (n, c) int32, sorted cells of each individual.
+        n_places: (n,) int32.
+        span: Of the grid's table.
         patience: Evaluations without an entry after which the threshold falls.
-        archive: (size, c, 2) uint8, changed; room for everyone who can enter.
+        archive: (size, c) int32, changed; room for everyone who can enter.
         n_archive: (size,) int32, changed.
         state: (>= 1,) int64: behaviors in the archive. Changed.
         counters, threshold: As in `admit`.
@@ -290,16 +303,17 @@ def nearest_archive_step(
     for row in range(n):
         for other in range(n):
             room.distance[other] = sorted_cells_distance(
-                points[row], n_points[row], points[other], n_points[other], spans
+                places[row], n_places[row], places[other], n_places[other], span
             )
         room.distance[row] = -1.0
         for place in range(state[0]):
             room.distance[n + place] = sorted_cells_distance(
-                points[row], n_points[row], archive[place], n_archive[place], spans
+                places[row], n_places[row], archive[place], n_archive[place], span
             )
         novelty[row] = mean_of_nearest(room.distance, n + state[0], room.nearest)
     admit(novelty, counters, threshold, patience, room.entered)
     for row in range(n):
         if room.entered[row]:
-            _cells_to_archive(points, n_points, row, archive, n_archive, state[0])
+            _copy_places(places[row], n_places[row], archive[state[0]])
+            n_archive[state[0]] = n_places[row]
             state[0] += 1

@@ -30,8 +30,8 @@ MAX_REPEATS = 1 << 12
 
 _M0 = np.uint64(0xD2511F53)
 _M1 = np.uint64(0xCD9E8D57)
-_W0 = np.uint32(0x9E3779B9)
-_W1 = np.uint32(0xBB67AE85)
+_W0 = np.uint64(0x9E3779B9)
+_W1 = np.uint64(0xBB67AE85)
 _LOW = np.uint64(0xFFFFFFFF)
 _32 = np.uint64(32)
 _TO_UNIT = 1.0 / 4294967296.0
@@ -40,20 +40,19 @@ _TO_UNIT = 1.0 / 4294967296.0
 @inlined
 def philox(c0, c1, c2, c3, k0, k1):
     """Four 32-bit words from a counter of four words and a key of two, all uint32."""
+    # Words of 64 bits, of which the lower 32 count: what is above them costs nothing until the end.
+    c0, c1, c2, c3 = np.uint64(c0), np.uint64(c1), np.uint64(c2), np.uint64(c3)
+    k0, k1 = np.uint64(k0), np.uint64(k1)
     for _ in range(10):
-        p0 = _M0 * np.uint64(c0)
-        p1 = _M1 * np.uint64(c2)
-        high0 = np.uint32(p0 >> _32)
-        low0 = np.uint32(p0 & _LOW)
-        high1 = np.uint32(p1 >> _32)
-        low1 = np.uint32(p1 & _LOW)
-        c0 = np.uint32(high1 ^ c1 ^ k0)
-        c1 = low1
-        c2 = np.uint32(high0 ^ c3 ^ k1)
-        c3 = low0
-        k0 = np.uint32(k0 + _W0)
-        k1 = np.uint32(k1 + _W1)
-    return c0, c1, c2, c3
+        p0 = _M0 * (c0 & _LOW)
+        p1 = _M1 * (c2 & _LOW)
+        c0 = (p1 >> _32) ^ c1 ^ k0
+        c1 = p1
+        c2 = (p0 >> _32) ^ c3 ^ k1
+        c3 = p0
+        k0 += _W0
+        k1 += _W1
+    return np.uint32(c0 & _LOW), np.uint32(c1 & _LOW), np.uint32(c2 & _LOW), np.uint32(c3 & _LOW)
 
 
 @inlined

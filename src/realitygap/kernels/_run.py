@@ -17,8 +17,9 @@ from ._mutation import Innovations, clear_innovations
 from ._network import Networks, decode, make_networks
 from ._novelty import (
     Archive,
+    CellTable,
     NearestRoom,
-    make_spans,
+    make_cell_table,
     nearest_archive_step,
     paper_archive_step,
     sort_cells,
@@ -99,9 +100,9 @@ class RunRoom(NamedTuple):
     cells: NDArray[np.uint8]  # (t, k)
     ends: NDArray[np.uint8]  # (t, k)
     counts: NDArray[np.int32]  # (t, 3)
-    points: NDArray[np.uint8]  # (n, k, 2)
-    n_points: NDArray[np.int32]  # (n,)
-    spans: NDArray[np.float64]  # (columns, rows)
+    places: NDArray[np.int32]  # (n, k)
+    n_places: NDArray[np.int32]  # (n,)
+    table: CellTable
     nearest: NearestRoom
 
 
@@ -156,8 +157,8 @@ def _species_of_run(species, run):
 @inlined
 def _archive_of(archive, run):
     return Archive(
-        archive.points[run],
-        archive.n_points[run],
+        archive.places[run],
+        archive.n_places[run],
         archive.among[run],
         archive.state[run],
         archive.place_of,
@@ -197,7 +198,7 @@ def _make_runs(rules, cells, n_runs):
             np.zeros((4, n)),
         ),
         archive=Archive(
-            np.zeros((n_runs, archive_room, cells, 2), np.uint8),
+            np.zeros((n_runs, archive_room, cells), np.int32),
             np.zeros((n_runs, archive_room), np.int32),
             np.zeros((n_runs, rules.archive_size, rules.archive_size)),
             np.zeros((n_runs, 2), np.int64),
@@ -297,22 +298,22 @@ def _score(room, run, rules, scene, rows, to_run, generation):
         runs.fitness[run, row] = counted / n_cells
         if is_novelty:
             visited = room.ends[trial] if rules.count_ends else room.cells[trial]
-            sort_cells(visited, counted, scene.columns, scene.rows, rules.by_column, room.points[row])
-            room.n_points[row] = counted
+            sort_cells(visited, counted, room.table, room.places[row])
+            room.n_places[row] = counted
     if not is_novelty:
         return
     archive = _archive_of(runs.archive, run)
     novelty = runs.novelty[run]
     if rules.selection == NOVELTY:
-        paper_archive_step(room.points, room.n_points, room.spans, archive, rules.above_all, novelty)
+        paper_archive_step(room.places, room.n_places, room.table.span, archive, rules.above_all, novelty)
     else:
         nearest_archive_step(
-            room.points,
-            room.n_points,
-            room.spans,
+            room.places,
+            room.n_places,
+            room.table.span,
             rules.archive_patience,
-            archive.points,
-            archive.n_points,
+            archive.places,
+            archive.n_places,
             archive.state,
             runs.archive_counters[run],
             runs.archive_threshold[run],
@@ -352,9 +353,9 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
         cells=np.zeros((trials, n_cells), np.uint8),
         ends=np.zeros((trials, n_cells), np.uint8),
         counts=np.zeros((trials, 3), np.int32),
-        points=np.zeros((n, n_cells, 2), np.uint8),
-        n_points=np.zeros(n, np.int32),
-        spans=make_spans(scene.columns, scene.rows),
+        places=np.zeros((n, n_cells), np.int32),
+        n_places=np.zeros(n, np.int32),
+        table=make_cell_table(scene.columns, scene.rows, rules.by_column),
         nearest=NearestRoom(np.zeros(n + archive_room), np.zeros(rules.neighbors), np.zeros(n, np.bool_)),
     )
 

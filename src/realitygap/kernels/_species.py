@@ -65,10 +65,11 @@ def make_species(rules, n):
 
 @inlined
 def genome_distance(one, a, other, b, rules):
-    """Compatibility distance c1 E/N + c2 D/N + c3 W of two genomes; inf when no gene matches.
+    """Compatibility distance c1 E/N + c2 D/N + c3 W of two genomes.
 
     W is the mean difference of the weights of matching genes, disabled ones included, and of the biases of
-    nodes that both have where nodes have biases. N is 1 below `normalize_from` genes.
+    nodes that both have where nodes have biases; where no gene matches it is infinite, and counts unless c3 is
+    0. N is 1 below `normalize_from` genes.
     """
     n_a = one.n_connections[a]
     n_b = other.n_connections[b]
@@ -91,7 +92,7 @@ def genome_distance(one, a, other, b, rules):
         else:
             disjoint += 1
             j += 1
-    if matching == 0:
+    if matching == 0 and rules.weight_coefficient > 0.0:
         return math.inf
     excess = (n_a - i) + (n_b - j)
     if rules.node_bias:
@@ -108,7 +109,7 @@ def genome_distance(one, a, other, b, rules):
     return (
         rules.excess_coefficient * excess / size
         + rules.disjoint_coefficient * disjoint / size
-        + rules.weight_coefficient * difference / matching
+        + rules.weight_coefficient * difference / max(matching, 1)
     )
 
 

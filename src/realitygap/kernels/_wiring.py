@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ._compile import kernel, stage
 from ._lanes import LANES, copy_row
-from ._math import sigmoid, tanh
+from ._math import exp_series, sigmoid, tanh_of_series, tanh_remainder
 from ._network import IDENTITY_LIMIT, SIGMOID, TANH
 
 
@@ -95,9 +95,14 @@ def _add_edge(weight, value, total):
 
 @stage
 def _tanh(slope, total, value):
+    # In three passes: a processor does not look far enough ahead to take such long chains side by side.
     real = total.dtype.type
     for lane in range(LANES):
-        value[lane] = tanh(real(slope) * total[lane])
+        value[lane] = tanh_remainder(real(slope) * total[lane])
+    for lane in range(LANES):
+        value[lane] = exp_series(value[lane])
+    for lane in range(LANES):
+        value[lane] = tanh_of_series(real(slope) * total[lane], value[lane])
 
 
 @stage

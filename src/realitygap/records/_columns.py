@@ -167,8 +167,10 @@ def _check_nulls(frame: pl.DataFrame) -> None:
         parts = [(column, series)]
         parts += [(field, series.struct.field(field.name)) for field in column.fields]
         for part, values in parts:
+            # explode() would put a null where a list is empty
             inner = (
-                isinstance(part.dtype, pl.List) and values.list.eval(pl.element().is_null()).list.any().any()
+                isinstance(part.dtype, pl.List)
+                and values.filter(values.list.len() > 0).explode().null_count()
             )
             if (values.null_count() and not part.nullable) or inner:
                 name = part.name if part is column else f"{column.name}.{part.name}"

@@ -13,7 +13,7 @@ from typing import Any
 
 import polars as pl
 
-from realitygap.errors import RecordError, RecordVersionError, did_you_mean
+from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
 from realitygap.records._chunk import (
     MAX_REPLICATE,
     Chunk,
@@ -326,6 +326,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
@@ -347,6 +348,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition or column.
         """
         self._check_selection(condition, columns)
@@ -354,9 +356,7 @@ class ResultsFolder:
         if replicates is None:
             parts = list(self._all_frames(condition, columns))
         else:
-            # what is beyond any chunk may be beyond polars' numbers, too
-            possible = {number for number in replicates if 0 <= number <= MAX_REPLICATE}
-            wanted = pl.Series(sorted(possible), dtype=pl.Int64)
+            wanted = _wanted(replicates)
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
             parts = [frame.filter(chosen) for frame in self._all_frames(condition, needed, wanted)]
@@ -376,6 +376,7 @@ class ResultsFolder:
 
         Raises:
             RecordError: as `chunks`.
+            TypeError: a replicate is not a whole number.
             ValueError: no such condition, or nothing of that name to derive.
         """
         parts = list(self.derived_frames(what, condition, replicates))
@@ -389,7 +390,7 @@ class ResultsFolder:
             raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
         self._check_selection(condition, None)
         self._warn_of_version()
-        wanted = None if replicates is None else pl.Series(sorted(set(replicates)), dtype=pl.Int64)
+        wanted = None if replicates is None else _wanted(replicates)
         return self._derived(what, condition, wanted)
 
     def write_derived(
@@ -403,13 +404,13 @@ class ResultsFolder:
 
         Args:
             what, condition, replicates: As of `derive`.
-            path: The file; not in a folder of results.
+            path: The file; none of a study's own.
 
         Returns:
             How many rows it has.
 
         Raises:
-            RecordError: as `chunks`, or the file lies in a folder of results or cannot be written.
+            RecordError: as `chunks`, or the file is one of a study's own or cannot be written.
             ValueError: as `derive`.
         """
         path = Path(path)
@@ -731,3 +732,9 @@ class ResultsFolder:
             sync_folder(self._path)
         self._checked.clear()
         self._published = None
+
+
+def _wanted(replicates: Iterable[int]) -> pl.Series:
+    """The replicates that there may be, ascending; what is beyond any chunk may be beyond polars' numbers, too."""
+    numbers = {whole_number("replicate", number) for number in replicates}
+    return pl.Series(sorted(number for number in numbers if 0 <= number <= MAX_REPLICATE), dtype=pl.Int64)

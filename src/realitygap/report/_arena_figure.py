@@ -31,7 +31,7 @@ def draw_arena_and_robot(
         ValueError: there is no such condition.
     """
     tally = read_tally(folder)
-    (drawing,) = draw_tally_arena(tally, condition or tally.runs["condition"][0], widths=[width])
+    (drawing,) = draw_tally_arena(tally, tally.name_of(condition), widths=[width])
     return drawing
 
 

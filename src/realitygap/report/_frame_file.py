@@ -19,7 +19,7 @@ def export_frame(
     """Write species, innovations or lineage of a study's runs to a Parquet file.
 
     Args:
-        folder: the results of a study, or the path to them; nothing is ever written there.
+        folder: the results of a study, or the path to them; none of its files ever gives way.
         what: species (a row is one species in one generation), innovations (one innovation number in one run) or
             lineage (one individual).
         out: the file, ending in .parquet; one that is there gives way once the new one is complete.
@@ -30,8 +30,9 @@ def export_frame(
         The path of the file.
 
     Raises:
-        RecordError: there is no such folder, a file in it is damaged, or the file lies in a folder of results or
+        RecordError: there is no such folder, a file in it is damaged, or the file is one of a study's own or
             cannot be written.
+        TypeError: the number of the run is not a whole number.
         ValueError: there is no such condition, run, frame or ending.
     """
     out = Path(out)

@@ -39,7 +39,7 @@ def export_individual(
     Each has the names of inputs and outputs, and says which individual it is.
 
     Args:
-        folder: the results of a study, or the path to them; nothing is ever written there.
+        folder: the results of a study, or the path to them; none of its files ever gives way.
         out: the file; one that is there gives way once the new one is complete.
         format: what kind; by the ending of `out` when not given.
         condition: of which; the first one when not given.
@@ -54,6 +54,7 @@ def export_individual(
         MissingExtraError: the extra `export` is not installed; JSON needs none.
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, its settings are another
             version's, or the file is one of a study's own or cannot be written.
+        TypeError: the number of a run, generation or individual is not a whole number.
         ValueError: there is no such condition, run, generation, individual or format; the message says which there are.
     """
     out = Path(out)
@@ -81,7 +82,10 @@ def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dic
     word = out.suffix.lower().removeprefix(".") if format is None else format
     if word not in writers:
         what = f"{out} ends in {out.suffix or 'nothing'}" if format is None else f"Unknown format {format!r}"
-        raise ValueError(f"{what}, expected json, onnx or graphml. {did_you_mean(word, writers)}")
+        near = did_you_mean(word, writers)
+        raise ValueError(
+            f"{what}, expected json, onnx or graphml.{f' {near}' if near.startswith('Did') else ''}"
+        )
     return writers[word]
 
 

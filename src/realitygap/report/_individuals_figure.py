@@ -86,7 +86,7 @@ def draw_individuals(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_individuals(tally, name, replicate, widths=[width])
     return drawing
 
@@ -162,7 +162,7 @@ def draw_better_individuals(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_better(tally, name, replicate, widths=[width])
     return drawing
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -233,19 +234,14 @@ def _places(ancestors: list[Ancestor], shows_all: bool) -> dict[tuple[int, int],
     if shows_all:
         return {(each.generation, each.individual): float(each.individual) for each in ancestors}
     places: dict[tuple[int, int], float] = {}
-    last = ancestors[-1].generation
-    for generation in range(last, -1, -1):
-        here = [each for each in ancestors if each.generation == generation]
-        wanted = []
-        for each in here:
-            heights = [
-                places[child.generation, child.individual]
-                for child in ancestors
-                if child.generation == generation + 1 and each.individual in child.parents
-            ]
-            wanted.append(float(np.mean(heights)) if heights else 0.0)
+    of_children: dict[tuple[int, int], list[float]] = {}
+    for generation, members in itertools.groupby(reversed(ancestors), lambda each: each.generation):
+        here = list(members)[::-1]
+        wanted = [float(np.mean(of_children.get((generation, each.individual), 0.0))) for each in here]
         for each, height in zip(here, _apart(np.array(wanted)), strict=True):
             places[generation, each.individual] = float(height)
+            for parent in set(each.parents):
+                of_children.setdefault((generation - 1, parent), []).append(float(height))
     return places
 
 
@@ -279,18 +275,23 @@ def _draw_others(axes: Axes, n: int, n_individuals: int, ancestors: set[tuple[in
 def _draw_links(
     axes: Axes, ancestors: list[Ancestor], places: Mapping[tuple[int, int], float], *, is_few: bool
 ) -> None:
+    links: dict[tuple[bool, int], list[tuple[tuple[int, float], tuple[int, float]]]] = {}
     for each in ancestors:
-        here = places[each.generation, each.individual]
         for rank, parent in enumerate(each.parents):
-            axes.plot(
-                [each.generation - 1, each.generation],
-                [places[each.generation - 1, parent], here],
-                color=Ink.RUN,
-                linewidth=(3.0 if each.origin == "copy" else 1.1) * (1.0 if is_few else 0.6),
-                linestyle="solid" if rank == 0 else (0, (3, 2)),
-                zorder=1.5,
-                clip_on=False,
-            )
+            before = (each.generation - 1, places[each.generation - 1, parent])
+            here = (each.generation, places[each.generation, each.individual])
+            links.setdefault((each.origin == "copy", rank), []).append((before, here))
+    for (is_copy, rank), ends in links.items():
+        gaps = np.full((len(ends), 1, 2), np.nan)
+        points = np.concatenate([np.array(ends), gaps], axis=1).reshape(-1, 2)
+        axes.plot(
+            *points.T,
+            color=Ink.RUN,
+            linewidth=(3.0 if is_copy else 1.1) * (1.0 if is_few else 0.6),
+            linestyle="solid" if rank == 0 else (0, (3, 2)),
+            zorder=1.5,
+            clip_on=False,
+        )
 
 
 def _draw_dots(
@@ -301,21 +302,44 @@ def _draw_dots(
     is_few: bool,
     is_wide: bool,
 ) -> None:
+    champion = ancestors[-1]
+    at = (champion.generation, places[champion.generation, champion.individual])
+    axes.plot(*at, "o", markersize=18.0 if is_few else 9.0, markerfacecolor="none", markeredgecolor=Ink.TEXT,
+              markeredgewidth=1.1, zorder=2, clip_on=False)  # fmt: skip
+    for color, members in _by_color(ancestors).items():
+        dots = [(each.generation, places[each.generation, each.individual]) for each in members]
+        axes.plot(*np.transpose(dots), "o", markersize=13.0 if is_few else 4.5, markerfacecolor=Ink.GROUND,
+                  markeredgecolor=color, markeredgewidth=1.6 if is_few else 1.2, zorder=2.5, clip_on=False)  # fmt: skip
+        if is_few:
+            _draw_numbers(axes, members, places, color, champion=champion, is_wide=is_wide)
+
+
+def _by_color(ancestors: list[Ancestor]) -> dict[str, list[Ancestor]]:
+    """The ancestors by the color of their species."""
     numbers = sorted({each.species for each in ancestors})
+    colors = {number: str(_PENS[k % len(_PENS)]) for k, number in enumerate(numbers)}
+    members: dict[str, list[Ancestor]] = {}
     for each in ancestors:
+        members.setdefault(colors[each.species], []).append(each)
+    return members
+
+
+def _draw_numbers(
+    axes: Axes,
+    members: list[Ancestor],
+    places: Mapping[tuple[int, int], float],
+    color: str,
+    *,
+    champion: Ancestor,
+    is_wide: bool,
+) -> None:
+    """In each dot the species, beside it coverage and what is new."""
+    for each in members:
         x, y = each.generation, places[each.generation, each.individual]
-        color = _PENS[numbers.index(each.species) % len(_PENS)]
-        if each is ancestors[-1]:
-            axes.plot(x, y, "o", markersize=18.0 if is_few else 9.0, markerfacecolor="none", markeredgecolor=Ink.TEXT,
-                      markeredgewidth=1.1, zorder=2, clip_on=False)  # fmt: skip
-        axes.plot(x, y, "o", markersize=13.0 if is_few else 4.5, markerfacecolor=Ink.GROUND, markeredgecolor=color,
-                  markeredgewidth=1.6 if is_few else 1.2, zorder=2.5, clip_on=False)  # fmt: skip
-        if not is_few:
-            continue
         axes.annotate(
             str(each.species), (x, y), ha="center", va="center", fontsize=7.0, color=color, zorder=3
         )
-        right = 12.5 if each is ancestors[-1] else 9.5
+        right = 12.5 if each is champion else 9.5
         text = f"{each.coverage:.3f}" if is_wide else f"{each.coverage:.2f}".removeprefix("0")
         _label(axes, (x, y), (right, 4.5 if each.brought else 0.0), text, Ink.MUTED)
         if each.brought:
@@ -346,10 +370,9 @@ def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors
 
     best = rows.group_by("generation", maintain_order=True).agg(pl.col(trial.measure).max())
     axes.plot(best["generation"], best[trial.measure], color=Ink.RUN, linewidth=1.1)
-    numbers = sorted({each.species for each in ancestors})
-    for each in ancestors:
-        color = _PENS[numbers.index(each.species) % len(_PENS)]
-        axes.plot(each.generation, each.coverage, "o", markersize=4.0, color=color, clip_on=False)
+    for color, members in _by_color(ancestors).items():
+        dots = [(each.generation, each.coverage) for each in members]
+        axes.plot(*np.transpose(dots), "o", markersize=4.0, color=color, clip_on=False)
     axes.set_ylim(0, None)
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))

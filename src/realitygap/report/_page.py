@@ -37,6 +37,7 @@ from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap.report._statistics_section import statistics_content
+from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize_tally
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.study import load_study, named_studies
@@ -184,6 +185,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         ),
         "replay": replay_content(tally),
         "command": _command(tally),
+        "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
         "columns": column_table(),
         "exported": None,
     }

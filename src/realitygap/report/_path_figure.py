@@ -79,7 +79,7 @@ def draw_paths(
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = condition or tally.runs["condition"][0]
+    name = tally.name_of(condition)
     (drawing,) = draw_tally_paths(tally, name, replicate, widths=[width])
     return drawing
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from realitygap.drawing import Picture
 from realitygap.errors import did_you_mean
@@ -55,9 +55,12 @@ def save_view(
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, a trial comes out
             otherwise than recorded, its settings are another version's, or the file cannot be written.
-        ValueError: there is no such condition, run, generation, individual or ending; the message says which there are.
+        TypeError: the number of a run, generation or individual is not a whole number.
+        ValueError: there is no such subject, condition, run, generation, individual or ending; the message says which
+            there are.
     """
     out = Path(out)
+    _check_name("subject", subject, list(get_args(Subject)))
     ending = check_ending(out, (".gif", *_STILL) if subject == "run" else _STILL)
     refuse_results(out)
     with warnings.catch_warnings():
@@ -79,7 +82,7 @@ def save_view(
             draw_network(trial.condition, trial.row, trial.measure), out, f"Network of {trial.title}"
         )
     if generation is None and individual is None and ending != ".gif":
-        name = condition or str(tally.runs["condition"][0])
+        name = tally.name_of(condition)
         (drawing,) = draw_tally_paths(tally, name, replicate)
         return _save(drawing, out, f"A run of {name}")
     trial = choose_trial(tally, condition, replicate, generation, individual)

@@ -41,6 +41,12 @@ _LINES = {
 _MOST_BARS = 12
 """Generations up to which each has a bar and each share its species' number."""
 
+_LEAST_LABELED = 0.06
+"""Share of the population from which on there is room for a number."""
+
+_NUMBER_WIDTH, _NUMBER_HEIGHT = 22.0, 9.0
+"""Room that a number of four digits takes [pt]."""
+
 
 @dataclass(frozen=True)
 class SpeciesCounts:
@@ -121,7 +127,7 @@ def draw_tally_species(
     Raises:
         ValueError: there is no such condition or run.
     """
-    condition = condition or tally.runs["condition"][0]
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     of_runs = species.counts.filter(pl.col("condition") == condition)
     picked = replicate is None
@@ -137,14 +143,19 @@ def draw_tally_species(
     means = species.mean_by_selection(tally)
     n_runs = tally.runs.height
     why = (
-        "picked because it has most species (the first of several alike): in a typical run there is little to see"
+        "picked because it has most species (the first of several alike) and so most to see"
         if picked
         else "chosen by number"
+    )
+    numbered = (
+        "with the species’ numbers"
+        if len(next(iter(shares.values()))) <= _MOST_BARS
+        else "with the numbers of larger species where there is room; colors repeat when there are more than eight"
     )
     labels = ", ".join(sorted({label_of(each) for each in tally.conditions}))
     caption = (
         f"Left (on a phone, above), condition {condition}, run {replicate}, {why}: the share of each species in the "
-        f"population of each generation, with the species’ numbers. {label_of(described)}, n = 1 run. Right "
+        f"population of each generation, {numbered}. {label_of(described)}, n = 1 run. Right "
         f"(below), the mean number of species in each generation, over all runs with a selection. "
         f"{labels}, n = {n_runs:,} runs, no interval."
     )
@@ -175,47 +186,73 @@ def draw_tally_species(
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:
     """(g,) share of each species in each generation, by the species' number."""
-    n_generations = int(rows["generation"].max()) + 1  # type: ignore[arg-type]
-    sizes = np.bincount(rows["generation"].to_numpy(), minlength=n_generations)
-    return {
-        int(number): np.bincount(
-            rows.filter(pl.col("species") == number)["generation"].to_numpy(), minlength=n_generations
-        )
-        / sizes
-        for number in sorted(rows["species"].unique())
-    }
+    numbers, species = np.unique(rows["species"].to_numpy(), return_inverse=True)
+    generations = rows["generation"].to_numpy()
+    counts = np.zeros((len(numbers), int(generations.max()) + 1))
+    np.add.at(counts, (species, generations), 1)
+    return dict(zip(numbers.tolist(), counts / counts.sum(axis=0), strict=True))
 
 
 def _draw_shares(axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], title: str, label: str) -> None:
     n = len(next(iter(shares.values())))
-    few = n <= _MOST_BARS
-    floor = np.zeros(n)
-    for index, (number, share) in enumerate(shares.items()):
-        color = _PENS[index % len(_PENS)]
-        axes.bar(
-            np.arange(n),
-            share,
-            0.82 if few else 1.0,
-            floor,
-            color=color,
-            alpha=0.42,
-            linewidth=0.0,
-        )
-        if few:
-            axes.bar(np.arange(n), share, 0.82, floor, color="none", edgecolor=Ink.GROUND, linewidth=1.0)
-        labeled = np.flatnonzero(share > 0.06) if few else [int(share.argmax())]
-        for generation in labeled:
-            axes.annotate(
-                str(number),
-                (generation, floor[generation] + share[generation] / 2),
-                ha="center",
-                va="center",
-                fontsize=7.5,
-            )
-        floor = floor + share
     axes.set_ylim(0, 1)
     axes.set_xlim(-0.55, n - 0.45)
+    floors = np.cumsum([np.zeros(n), *shares.values()], axis=0)[:-1]
+    draw = _draw_bars if n <= _MOST_BARS else _draw_bands
+    draw(axes, shares, floors)
     _label(axes, n, "share of the population", title, f"{label}, n = 1")
+
+
+def _draw_bars(
+    axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], floors: npt.NDArray[np.float64]
+) -> None:
+    """A bar for each generation, in which each share has its species' number."""
+    for index, (number, share) in enumerate(shares.items()):
+        at = np.arange(len(share))
+        color = _PENS[index % len(_PENS)]
+        axes.bar(at, share, 0.82, floors[index], color=color, alpha=0.42, linewidth=0.0)
+        axes.bar(at, share, 0.82, floors[index], color="none", edgecolor=Ink.GROUND, linewidth=1.0)
+        for generation in np.flatnonzero(share > _LEAST_LABELED):
+            _write_number(axes, number, int(generation), floors[index, generation] + share[generation] / 2)
+
+
+def _draw_bands(
+    axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], floors: npt.NDArray[np.float64]
+) -> None:
+    """A band for each species, as long as it lives; the number of the larger ones where it has room."""
+    for index, share in enumerate(shares.values()):
+        alive = np.flatnonzero(share)
+        life = slice(alive[0], alive[-1] + 1)
+        edges = np.repeat(np.arange(alive[0], alive[-1] + 2) - 0.5, 2)[1:-1]
+        below, above = (np.repeat(height[life], 2) for height in (floors[index], floors[index] + share))
+        axes.fill_between(edges, below, above, color=_PENS[index % len(_PENS)], alpha=0.42, linewidth=0.0)
+    for number, x, y in _numbers_with_room(axes, shares, floors):
+        _write_number(axes, number, x, y)
+
+
+def _numbers_with_room(
+    axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], floors: npt.NDArray[np.float64]
+) -> list[tuple[int, int, float]]:
+    """Species of which a number can stand where they are largest, the largest first, with its place."""
+    width, height = (side * 72.0 / axes.figure.dpi for side in axes.bbox.size)
+    n = floors.shape[1]
+    placed: list[tuple[int, int, float]] = []
+    largest = sorted(enumerate(shares.items()), key=lambda each: -each[1][1].max())
+    for index, (number, share) in largest:
+        at_most = np.flatnonzero(share == share.max())
+        x = int(at_most[len(at_most) // 2])
+        y = floors[index, x] + share[x] / 2
+        is_free = all(
+            abs(x - other_x) * width / n > _NUMBER_WIDTH or abs(y - other_y) * height > _NUMBER_HEIGHT
+            for _, other_x, other_y in placed
+        )
+        if share[x] > _LEAST_LABELED and is_free:
+            placed.append((number, x, y))
+    return placed
+
+
+def _write_number(axes: Axes, number: int, x: float, y: float) -> None:
+    axes.annotate(str(number), (x, y), ha="center", va="center", fontsize=7.5)
 
 
 def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]], label: str) -> None:

@@ -63,6 +63,10 @@ class Tally:
             raise ValueError(f"Unknown condition {name!r}. {did_you_mean(name, names)}")
         return self.conditions[names.index(name)]
 
+    def name_of(self, condition: str | None) -> str:
+        """The name of a condition; that of the first with runs when none is given."""
+        return str(self.runs["condition"][0]) if condition is None else condition
+
     @cached_property
     def runs(self) -> pl.DataFrame:
         """One row per condition and replicate, in key order: `line` and `ends`, the best of the whole run."""

@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 
 from realitygap.drawing import Ink
+from realitygap.errors import whole_number
 from realitygap.records import ResultsFolder, write_whole
 from realitygap.report._drawing import (
     Drawing,
@@ -99,8 +100,11 @@ def choose_trial(
     Raises:
         ValueError: there is none such; the message says which there are.
     """
-    name = condition or str(tally.runs["condition"][0])
+    name = tally.name_of(condition)
     described = tally.condition(name)
+    for what, number in (("generation", generation), ("individual", individual)):
+        if number is not None:
+            whole_number(what, number)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
     rows = tally.folder.read(name, [replicate])
     if rows.is_empty():

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from realitygap.drawing import Picture
+from realitygap.settings import Settings
 from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
 
 STEP_S = 0.1  # one step of Jyro, one command [s]
 
 
-class JyroPlatform(BaseModel):
+class JyroPlatform(Settings):
     """The Scribbler as the paper simulated it.
 
     Box body, a blocked robot freezes, three thin rays, uniform noise. A step lasts 0.1 s; full output
@@ -24,8 +25,6 @@ class JyroPlatform(BaseModel):
     commands the poses are Jyro's within 1e-9; a network that closes the loop lets a difference grow. The
     rounding is in `realitygap simulate`.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     steps: int = Field(
         87,

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from realitygap.drawing import Picture
+from realitygap.settings import Settings
 from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
 
 
-class ScribblerPlatform(BaseModel):
+class ScribblerPlatform(Settings):
     """The Scribbler as the paper drove it; the port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command. A reading is the raw value of an
@@ -19,8 +20,6 @@ class ScribblerPlatform(BaseModel):
 
     Source: Rosenzweig & Remy, sections 2.2 and 2.3.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial (section 2.2: 100).")
     wait_s: float = Field(

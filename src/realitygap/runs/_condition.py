@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.evolution import NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask
-from realitygap.world import ArenaSettings, is_inside
+from realitygap.world import ArenaSettings, check_start
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -28,13 +28,11 @@ Selection = Literal["coverage", "novelty", "random"]
 Platform = Literal["jyro", "scribbler"]
 
 
-class Condition(BaseModel):
+class Condition(Settings):
     """One cell of a study's design.
 
     Its runs are a function of these values and the number of the replicate alone.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: str = Field(
         pattern=NAME_PATTERN, max_length=80, description="Letters, digits, dot, dash and underscore."
@@ -91,16 +89,7 @@ class Condition(BaseModel):
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        pose, arena = self.arena.pose(), self.arena.arena()
-        sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-        for forward, left in self.tried_on.body.corners:
-            x = pose.x + forward * cosine - left * sine
-            y = pose.y + forward * sine + left * cosine
-            if not is_inside(arena, x, y):
-                raise ValueError(
-                    f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
-                    f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
-                )
+        check_start(self.arena.arena(), self.tried_on.body)
         return self
 
     @model_validator(mode="after")
@@ -168,16 +157,14 @@ class Condition(BaseModel):
         try:
             condition = cls.model_validate({"name": name, **settings})
         except ValidationError as error:
-            mistakes = [
-                f"{'.'.join(str(part) for part in each['loc'])}: {each['msg']}" for each in error.errors()
-            ]
+            lines = [f"{place}: {text}" for place, text in mistakes(error, cls, settings)]
         else:
-            mistakes = [f"{place} is missing" for place in _missing(settings, condition.settings())]
-        if mistakes:
-            more = f" and {len(mistakes) - 3} more" if len(mistakes) > 3 else ""
+            lines = [f"{place} is missing." for place in _missing(settings, condition.settings())]
+        if lines:
+            more = f" and {len(lines) - 3} more" if len(lines) > 3 else ""
             raise RecordVersionError(
                 f"This realitygap ({__version__}) cannot read the settings of condition {name!r} "
-                f"({'; '.join(mistakes[:3])}{more}). Use the version that ran the study."
+                f"({' '.join(lines[:3])}{more}). Use the version that ran the study."
             )
         return condition
 

@@ -19,7 +19,7 @@ from ._executors import ChunkTask, Executor, Threads, usable_processors
 from ._file import load_study
 from ._physical import OpenRobot, PhysicalResult, PhysicalStudy, n_complete, physical_conditions
 from ._robot import connect_robot, default_operator
-from ._study import Study
+from ._study import Study, same_file
 
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.
 CHUNK_STEPS = 7_000_000
@@ -109,7 +109,7 @@ def run_study(
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
         RealityGapError: The cluster or the robot cannot be reached, or the robot failed; what was scored is safe.
-        TypeError: A count is not a whole number, or the study is none of these.
+        TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.
     """
     threads = None if threads is None else whole_number("threads", threads, 1)
@@ -187,6 +187,8 @@ def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
             "threads and cluster exclude each other: how many threads a worker of a cluster has is said where it is "
             "started (`dask worker --nthreads`, or `cores` in the settings of its jobs)."
         )
+    if not isinstance(cluster, str):
+        raise TypeError(f"cluster is {cluster!r}, expected a text, such as 'tcp://HOST:8786' or 'slurm:20'.")
     from ._cluster import Cluster
 
     with Cluster(cluster) as executor:
@@ -265,6 +267,12 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
+    for condition in new["conditions"]:
+        if (alike := same_file(condition["name"], there)) is not None:
+            differences.append(
+                f"condition {condition['name']!r} would share files with condition {alike!r} that is there; "
+                "give it another name"
+            )
     if there:
         # conditions that this study lacks may stay in a folder of its own, but not in that of another
         differences = [

@@ -6,10 +6,11 @@ import unicodedata
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from realitygap._version import __version__
 from realitygap.runs import NAME_PATTERN, Condition
+from realitygap.settings import Settings
 
 
 def _printable(text: str) -> str:
@@ -21,10 +22,8 @@ def _printable(text: str) -> str:
 Line = Annotated[str, AfterValidator(_printable)]
 
 
-class StudySection(BaseModel):
+class StudySection(Settings):
     """What the whole study shares."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str = Field(
         pattern=NAME_PATTERN,
@@ -46,20 +45,16 @@ class StudySection(BaseModel):
     )
 
 
-class ReportSection(BaseModel):
+class ReportSection(Settings):
     """How the report shows it; changes no result."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     points: Literal["best-of-generation", "best-so-far"] = Field(
         "best-of-generation", description="What Figure 4 shows at each generation. The paper does not say."
     )
 
 
-class TrialsSection(BaseModel):
+class TrialsSection(Settings):
     """How trials on a robot are led through; changes no simulated result."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     order: Literal["in-order", "shuffled"] = Field(
         "in-order",
@@ -79,10 +74,8 @@ class TrialsSection(BaseModel):
     )
 
 
-class ConditionNotes(BaseModel):
+class ConditionNotes(Settings):
     """What is said of a condition beside its settings; changes no result."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     published: list[Annotated[float, Field(ge=0, le=1)]] | None = Field(
         None, description="Published values of the best coverage of a run, shown beside ours."
@@ -97,10 +90,8 @@ def same_file(name: str, others: Iterable[str]) -> str | None:
     return next((other for other in others if other.casefold() == name.casefold()), None)
 
 
-class Study(BaseModel):
+class Study(Settings):
     """A study as resolved: nothing is left to a default."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     about: StudySection
     report: ReportSection

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Any
 
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
 from realitygap.runs import TaskRun, run_task
 from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
@@ -37,8 +37,8 @@ def measure_task(
         task: 'xor', 'double-pole' or 'double-pole-no-velocity'.
         settings: A named set of NEAT's settings; population, generations, recurrence and the constant input's
             value are the task's.
-        seeds: How many runs, >= 1.
-        seed: Of the random numbers from which all runs draw.
+        seeds: How many runs, 1 to 2**32.
+        seed: Of the random numbers from which all runs draw, 0 to 2**63 - 1.
         changes: Settings by name, in place of the set's and the task's.
         threads: Runs at once; as many as there are processors when not given.
         tell: Called with the progress after each run.
@@ -46,18 +46,20 @@ def measure_task(
     Returns:
         `task`, `settings`, `seeds`, `solved` (runs); over the runs that solved it, `mean_evaluations`,
         `median_evaluations`, `sd_evaluations`, `worst_evaluations`, and of the networks that did `mean_hidden`,
-        `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts); None where too
-        few solved it. `published` holds the same of the source, as far as it is given.
+        `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts) and
+        `sd_generalization`; None where too few solved it. `published` holds the same of the source, as far as it
+        is given.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
-        ValueError: A count below 1.
+        TypeError: A count or the seed is not a whole number.
+        ValueError: One of them is out of its range.
     """
-    for name, count in (("seeds", seeds), ("threads", threads)):
-        if count is not None and count < 1:
-            raise ValueError(f"{name} is {count}, expected at least 1.")
+    seeds = whole_number("seeds", seeds, 1, 2**32)
+    seed = whole_number("seed", seed, 0, 2**63 - 1)
+    threads = usable_processors() if threads is None else whole_number("threads", threads, 1)
     chosen = task_settings(task, settings, changes)
-    runs = _run_all(CLASSICAL_TASKS[task], chosen, seeds, seed, threads or usable_processors(), tell)
+    runs = _run_all(CLASSICAL_TASKS[task], chosen, seeds, seed, threads, tell)
     changed = "".join(f" {name}={value}" for name, value in (changes or {}).items())
     return summarize_runs(CLASSICAL_TASKS[task], settings + changed, runs)
 
@@ -74,6 +76,8 @@ def task_settings(
         raise StudyError(f"Unknown task {task!r}. {did_you_mean(task, CLASSICAL_TASKS)}")
     if settings not in NAMED_SETTINGS:
         raise StudyError(f"Unknown NEAT settings {settings!r}. {did_you_mean(settings, NAMED_SETTINGS)}")
+    if "settings" in (changes or {}):
+        raise StudyError(f"The set is {settings!r} already; name another one in its place (--settings).")
     chosen = {**NAMED_SETTINGS[settings], **CLASSICAL_TASKS[task].settings}
     if settings == "stanley-2002":
         chosen |= CLASSICAL_TASKS[task].published_settings
@@ -95,19 +99,25 @@ def summarize_runs(task: ClassicalTask, settings: str, runs: Sequence[TaskRun]) 
         "solved": len(solvers),
         "mean_evaluations": _mean(evaluations),
         "median_evaluations": statistics.median(evaluations) if evaluations else None,
-        "sd_evaluations": statistics.stdev(evaluations) if len(evaluations) > 1 else None,
+        "sd_evaluations": _deviation(evaluations),
         "worst_evaluations": max(evaluations, default=None),
         "mean_hidden": _mean([run.n_hidden for run in solvers]),
         "mean_connections": _mean([run.n_connections for run in solvers]),
     }
     if "mean_generalization" in task.published:
-        figures["mean_generalization"] = _mean([run.generalization for run in solvers])
+        passed = [run.generalization for run in solvers]
+        figures["mean_generalization"] = _mean(passed)
+        figures["sd_generalization"] = _deviation(passed)
     figures["published"] = {**task.published, "source": task.source}
     return figures
 
 
 def _mean(values: Sequence[int]) -> float | None:
     return statistics.fmean(values) if values else None
+
+
+def _deviation(values: Sequence[int]) -> float | None:
+    return statistics.stdev(values) if len(values) > 1 else None
 
 
 def _run_all(

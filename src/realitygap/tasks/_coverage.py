@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from realitygap.settings import Settings
 
 
-class CoverageTask(BaseModel):
+class CoverageTask(Settings):
     """What is counted and what the network is told.
 
     Source: Rosenzweig & Remy, sections 2.1 and 2.4.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     cells: Literal["line", "ends"] = Field(
         "line",

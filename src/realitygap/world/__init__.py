@@ -6,6 +6,7 @@ from ._arena import (
     Arena,
     Grid,
     Pose,
+    check_start,
     is_inside,
     paper_arena,
 )
@@ -26,6 +27,7 @@ __all__ = [
     "Pose",
     "RangeSensors",
     "arena_picture",
+    "check_start",
     "is_inside",
     "paper_arena",
     "robot_picture",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
+
+from ._robot import Body
 
 INCH = 0.0254  # [m]
 
@@ -99,6 +102,24 @@ NAMED_STARTS = {
     "center": Pose(21 * INCH, 12 * INCH, 0.0),  # on a junction of cells: belongs to the upper right one
     "left": Pose(7.5 * INCH, 12 * INCH, 0.0),  # on a border of cells: belongs to the upper one
 }
+
+
+def check_start(arena: Arena, body: Body) -> None:
+    """Refuse a start at which the body would not lie within the walls.
+
+    Raises:
+        ValueError: a corner of it lies beyond a wall.
+    """
+    pose = arena.start
+    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
+    for forward, left in body.corners:
+        x = pose.x + forward * cosine - left * sine
+        y = pose.y + forward * sine + left * cosine
+        if not is_inside(arena, x, y):
+            raise ValueError(
+                f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
+                f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
+            )
 
 
 def is_inside(arena: Arena, x: float, y: float) -> bool:

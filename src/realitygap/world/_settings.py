@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
+
+from realitygap.settings import Settings
 
 from ._arena import NAMED_STARTS, Arena, Pose, is_inside, paper_arena
 
 StartName = Literal["corner", "center", "left"]
 
 
-class ArenaSettings(BaseModel):
+class ArenaSettings(Settings):
     """The arena of a study."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     preset: Literal["paper"] = Field(
         "paper",

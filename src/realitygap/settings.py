@@ -1,0 +1,144 @@
+"""What all settings have in common: plain values, checked, whose mistakes are told in our words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import did_you_mean
+
+_EXPECTED = {
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "string_type": "a text in quotes",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "string_pattern_mismatch": "letters, digits, '.', '-' and '_', a letter or digit first",
+}
+_LIMITS = {
+    "greater_than_equal": ("at least", "ge"),
+    "greater_than": ("more than", "gt"),
+    "less_than_equal": ("at most", "le"),
+    "less_than": ("less than", "lt"),
+}
+
+
+class Settings(BaseModel):
+    """Settings that cannot be changed once they are made, of which no other than the named ones may be given.
+
+    Raises:
+        ValueError: A setting is unknown, missing, or cannot be what it is; the text has every mistake.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            found = mistakes(error, type(self), values)
+        else:
+            return
+        name = type(self).__name__
+        raise ValueError(
+            "\n".join(f"{name}.{place}: {text}" if place else f"{name}: {text}" for place, text in found)
+        )
+
+    # Else pydantic would call it for tables within tables, too, and tell of its errors as if they were a value's.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+
+def mistakes(
+    error: ValidationError, model: type[BaseModel], values: Mapping[str, Any]
+) -> list[tuple[str, str]]:
+    """What pydantic found wrong with the values of a model: the place in it, such as start[3], and what is wrong."""
+    found: dict[str, list[str]] = {}
+    is_setting: dict[str, bool] = {}
+    for problem in error.errors(include_url=False):
+        place, last, owner = _place(model, problem["loc"])
+        found.setdefault(place, []).append(_explained(problem, owner))
+        is_setting[place] = last in owner.model_fields
+    lines = []
+    for place, texts in found.items():
+        if is_setting[place] and len(texts) > 1:  # none of the types that it may have
+            expected = dict.fromkeys(text.split(", came ")[0].removeprefix("expected ") for text in texts)
+            texts = [f"expected {', or '.join(expected)}, came {shown(_value_at(values, place))}."]
+        lines += [(place, text) for text in texts]
+    return lines
+
+
+def shown(value: object) -> str:
+    """A value as it came, short enough for a message."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str, type[BaseModel]]:
+    """A problem's place as text, the last name in it, and the model that this belongs to.
+
+    What follows a setting that is no table itself is an entry of a list, or one of the types that the setting may
+    have, which is no part of the place.
+    """
+    names: list[str] = []
+    owner = model
+    rest = list(loc)
+    while rest:
+        names.append(str(rest.pop(0)))
+        inner = owner.model_fields[names[-1]].annotation if names[-1] in owner.model_fields else None
+        if not rest or not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+            break
+        owner = inner
+    entry = f"[{rest[0] + 1}]" if len(rest) == 1 and isinstance(rest[0], int) else ""
+    return ".".join(names) + entry, names[-1] + entry if names else "", owner
+
+
+def _value_at(values: Mapping[str, Any], place: str) -> Any:
+    found: Any = values
+    for name in place.split("."):
+        found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
+    return found
+
+
+def _explained(problem: Any, model: type[BaseModel]) -> str:
+    kind = problem["type"]
+    context = problem.get("ctx", {})
+    came = shown(problem["input"])
+    if kind == "extra_forbidden":
+        return f"unknown setting. {did_you_mean(str(problem['loc'][-1]), model.model_fields)}"
+    if kind == "missing":
+        return "missing, and it has no default."
+    if kind == "literal_error":
+        return f"expected {context['expected']}, came {came}.{_meant(problem['input'], context['expected'])}"
+    if kind == "value_error":
+        # of the model as a whole there is nothing short to show
+        return f"{context['error']}, came {came}." if problem["loc"] else f"{context['error']}."
+    expected = _EXPECTED.get(kind)
+    if kind in _LIMITS:
+        words, key = _LIMITS[kind]
+        expected = f"{words} {context[key]}"
+    if kind in ("too_long", "too_short"):
+        expected = f"{context.get('max_length', context.get('min_length'))} values"
+    text = f"expected {expected}" if expected else str(problem["msg"])
+    if len(problem["loc"]) > 2 and isinstance(problem["loc"][-1], int):
+        text += f" as value {problem['loc'][-1] + 1}"
+    return f"{text}, came {came}."
+
+
+def _meant(came: object, expected: str) -> str:
+    """Which of the words may have been meant; nothing where none is near."""
+    if not isinstance(came, str):
+        return ""
+    names = [name.strip(" '") for name in expected.replace(" or ", ",").split(",")]
+    near = did_you_mean(came, names)
+    return f" {near}" if near.startswith("Did") else ""

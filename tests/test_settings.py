@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from realitygap import Condition, NeatSettings, Study
+from realitygap.evolution import NoveltySettings
+from realitygap.robots import JyroPlatform
+from realitygap.study import ConditionNotes, ReportSection, StudySection
+from realitygap.tasks import CoverageTask
+from realitygap.world import ArenaSettings
+
+UNKNOWN = "unknown setting. Did you mean "
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: NeatSettings(popultion=3), f"NeatSettings.popultion: {UNKNOWN}'population'?"),
+        (lambda: NeatSettings(population="x"), "NeatSettings.population: expected a whole number, came 'x'."),
+        (lambda: NeatSettings(population=1), "NeatSettings.population: expected at least 2, came 1."),
+        (lambda: NeatSettings(crossover=2), "NeatSettings.crossover: expected at most 1.0, came 2."),
+        (
+            lambda: NeatSettings(weight_limit=float("nan")),
+            "NeatSettings.weight_limit: expected a finite number, came nan.",
+        ),
+        (
+            lambda: NeatSettings(activation="tan"),
+            "NeatSettings.activation: expected 'tanh', 'sigmoid' or 'identity', came 'tan'. Did you mean 'tanh'?",
+        ),
+        (
+            lambda: NeatSettings.named("default", popultion=3),
+            f"NeatSettings.popultion: {UNKNOWN}'population'?",
+        ),
+        (lambda: JyroPlatform(stepz=3), f"JyroPlatform.stepz: {UNKNOWN}'steps'?"),
+        (lambda: JyroPlatform(steps=1.5), "JyroPlatform.steps: expected a whole number, came 1.5."),
+        (lambda: ArenaSettings(stat="left"), f"ArenaSettings.stat: {UNKNOWN}'start'?"),
+        (
+            lambda: ArenaSettings(start="lef"),
+            "ArenaSettings.start: expected 'corner', 'center' or 'left', or a list, came 'lef'.",
+        ),
+        (lambda: CoverageTask(cell="line"), f"CoverageTask.cell: {UNKNOWN}'cells'?"),
+        (lambda: NoveltySettings(archive=3), f"NoveltySettings.archive: {UNKNOWN}'archive_size'?"),
+        (lambda: Condition(), "Condition.name: missing, and it has no default."),
+        (
+            lambda: Condition(name="a", neat={"popultion": 3}),
+            f"Condition.neat.popultion: {UNKNOWN}'population'?",
+        ),
+        (lambda: Condition(name="a", neat=3), "Condition.neat: expected a table, came 3."),
+        (lambda: StudySection(name="a", sed=3), f"StudySection.sed: {UNKNOWN}'seed'?"),
+        (
+            lambda: ConditionNotes(published=[0.1, 2.0]),
+            "ConditionNotes.published[2]: expected at most 1.0, came 2.0.",
+        ),
+        (
+            lambda: Study(
+                about=StudySection(name="a"), report=ReportSection(), conditions=(), notes=(ConditionNotes(),)
+            ),
+            "Study: there are 1 notes, expected 0: one a condition, such as ConditionNotes().",
+        ),
+    ],
+)
+def test_a_mistake_is_told_in_one_line_of_ours(make, text):
+    with pytest.raises(ValueError, match=":") as caught:
+        make()
+    assert str(caught.value) == text
+    assert type(caught.value) is ValueError
+
+
+def test_all_mistakes_are_told_at_once_a_line_each():
+    with pytest.raises(ValueError, match=":") as caught:
+        NeatSettings(population=1, generations=0, tournament=3)
+    places = [line.split(":")[0] for line in str(caught.value).splitlines()]
+    assert sorted(places) == [
+        "NeatSettings.generations",
+        "NeatSettings.population",
+        "NeatSettings.tournament",
+    ]
+
+
+def test_a_mistake_within_a_table_is_told_once_with_its_place():
+    """A constructor of ours that pydantic calls for the inner table would tell of it as of one wrong value."""
+    with pytest.raises(ValueError, match=":") as caught:
+        Condition(name="a", neat={"population": 1}, jyro={"steps": 0})
+    assert str(caught.value).splitlines() == [
+        "Condition.neat.population: expected at least 2, came 1.",
+        "Condition.jyro.steps: expected at least 1, came 0.",
+    ]
+
+
+def test_settings_are_made_copied_and_pickled_as_before():
+    settings = NeatSettings.named("rosenzweig-remy", population=20)
+    assert (
+        settings == NeatSettings.model_validate(settings.model_dump()) == pickle.loads(pickle.dumps(settings))
+    )
+    assert NeatSettings(settings="rosenzweig-remy", population=20) == settings
+    with pytest.raises(ValueError, match="frozen"):
+        settings.population = 3

@@ -113,9 +113,9 @@ def test_a_condition_on_a_robot_has_the_robots_settings():
 
 
 def test_what_means_nothing_on_a_robot_is_refused():
-    with pytest.raises(ValidationError, match=r"noise is 0\.1, expected none with platform 'scribbler'"):
+    with pytest.raises(ValueError, match=r"noise is 0\.1, expected none with platform 'scribbler'"):
         Condition(name="a", platform="scribbler", noise=0.1)
-    with pytest.raises(ValidationError, match="expected 'line' with platform 'scribbler'"):
+    with pytest.raises(ValueError, match="expected 'line' with platform 'scribbler'"):
         Condition(name="a", platform="scribbler", task={"cells": "ends"})
     with pytest.raises(ValueError, match="is tried on a robot, expected one with platform 'jyro'"):
         run_replicates(Condition(name="a", platform="scribbler"), 0, 1)

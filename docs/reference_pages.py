@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import re
 import types
 import typing
@@ -18,8 +19,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from scipy import stats
 
+from realitygap import myro
 from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.runs import Condition
@@ -67,12 +70,56 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
+    pages["parts/myro.md"] = myro_functions()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists() or path.read_text("utf-8") != text:
             path.write_text(text, "utf-8")
+
+
+# --- Myro ---------------------------------------------------------------------------------------------------
+
+
+def myro_functions() -> str:
+    """Every name of Myro: what is done by subject, and what is left out with its reason."""
+    parts = []
+    for subject, names in DONE.items():
+        rows = [f"| `{name}{signature(name)}` | {escape(meaning(name))} |" for name in names]
+        parts.append("\n".join([f"## {subject}", "", "| function | what it does |", "|---|---|", *rows]))
+    reasons: dict[str, list[str]] = {}
+    for name, reason in LEFT_OUT.items():
+        reasons.setdefault(reason, []).append(f"`{name}`")
+    rows = [f"| {', '.join(names)} | {escape(reason)} |" for reason, names in reasons.items()]
+    parts.append(
+        "\n".join(["## Left out", "", "| functions | why, and what to do instead |", "|---|---|", *rows])
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def signature(name: str) -> str:
+    """The arguments of one of Myro's functions, with their defaults and without types; nothing for values."""
+    item = getattr(myro, name)
+    if not callable(item):
+        return ""
+    arguments = []
+    for argument in inspect.signature(item).parameters.values():
+        bare = argument.replace(annotation=inspect.Parameter.empty)
+        arguments.append(str(bare))
+    return f"({', '.join(arguments)})"
+
+
+def meaning(name: str) -> str:
+    """The first line of what one of Myro's functions says of itself, and where it differs from Myro."""
+    item = getattr(myro, name)
+    if isinstance(item, myro.Color):
+        return f"the color {', '.join(map(str, item.getRGB()))}"
+    text = inspect.getdoc(item) or ""
+    differs = re.search(r"Differs: (.*?)(?:\n\n|\Z)", text, re.DOTALL)
+    first = text.split("\n\n")[0]
+    more = f" Differs: {differs[1]}" if differs and "Differs:" not in first else ""
+    return " ".join((first + more).split())
 
 
 # --- settings -----------------------------------------------------------------------------------------------

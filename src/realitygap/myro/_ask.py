@@ -1,0 +1,111 @@
+"""Questions to whoever runs the program, in the terminal or in a notebook's input line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ._colors import Color
+from ._mistakes import MyroError
+
+_answers: dict[str, str] = {}
+"""What was answered before, for `useCache`."""
+
+
+def ask(
+    item: str | Sequence[str],
+    title: str = "Information Request",
+    useCache: bool = False,
+    useDict: bool = False,
+) -> Any:
+    """Ask for a value, or several.
+
+    Args:
+        item: What to ask for, or a list of it.
+        title: What it is for; shown above several questions.
+        useCache: Whether what was answered before is taken without asking again.
+        useDict: Whether even one answer comes in a dictionary.
+
+    Returns:
+        The answer as text; for several the answers by what was asked for.
+    """
+    items = [item] if isinstance(item, str) else list(item)
+    if len(items) > 1:
+        print(title)
+    answers = {question: _answer(question, reuse=bool(useCache)) for question in items}
+    return answers if len(items) != 1 or useDict else answers[items[0]]
+
+
+def _answer(question: str, *, reuse: bool) -> str:
+    if not (reuse and question in _answers):
+        _answers[question] = input(
+            f"{question} " if question.endswith(("?", ":")) else f"{question}: "
+        ).strip()
+    return _answers[question]
+
+
+def askQuestion(
+    question: str, answers: Sequence[str] = ("Yes", "No"), title: str = "Myro Question", default: int = 0
+) -> str:
+    """Ask a question with given answers, until one of them is chosen by its number or its words.
+
+    Args:
+        question: The question.
+        answers: What may be answered.
+        title: Shown above the question where it is not Myro's own.
+        default: Index of the answer that Enter alone gives.
+
+    Raises:
+        MyroError: There are no answers to choose from.
+    """
+    if not 0 <= default < len(answers):
+        raise MyroError(
+            f"askQuestion: the answers are {list(answers)!r} and the default is number {default}, "
+            "expected one of the answers."
+        )
+    if title != "Myro Question":
+        print(title)
+    print(question)
+    for place, answer in enumerate(answers, 1):
+        print(f"  {place}  {answer}")
+    while True:
+        given = input(f"Number [{default + 1}]: ").strip()
+        if not given:
+            return answers[default]
+        for place, answer in enumerate(answers, 1):
+            if given.lower() in (str(place), answer.lower()):
+                return answer
+        print(f"{given!r} is none of them; enter a number from 1 to {len(answers)}.")
+
+
+def pickAFile() -> str:
+    """Ask for the name of a file, until it is one that exists; Enter alone lists what is in the folder."""
+    while True:
+        given = Path(input("File: ").strip()).expanduser()
+        if given.is_file():
+            return str(given)
+        folder = given if given.is_dir() else Path()
+        names = sorted(
+            entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if entry.name[0] != "."
+        )
+        print(f"In {folder.resolve()}: {', '.join(names) or 'nothing'}")
+
+
+def pickAFolder() -> str:
+    """Ask for the name of a folder, until it is one that exists; Enter alone takes the present one."""
+    while True:
+        given = Path(input("Folder: ").strip() or ".").expanduser()
+        if given.is_dir():
+            return str(given)
+        print(f"There is no folder {str(given)!r}.")
+
+
+def pickAColor() -> Color:
+    """Ask for a color, as "255 128 0" or "#ff8000", until it is one."""
+    while True:
+        given = input("Color (red green blue, each 0 to 255): ").replace(",", " ").strip()
+        try:
+            return Color(given) if given.startswith("#") else Color(*(float(part) for part in given.split()))
+        except (MyroError, ValueError) as error:
+            print(error)

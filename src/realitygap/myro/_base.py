@@ -1,0 +1,78 @@
+"""What all parts of Myro's robot stand on: the driver, its clock, and time that passes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from realitygap.robots import Clock
+    from realitygap.robots.scribbler import Scribbler as Driver
+
+    from ._simulation import Simulation
+
+PLACES = {
+    "left": 0, 0: 0,
+    "center": 1, "middle": 1, 1: 1,
+    "right": 2, 2: 2,
+}  # fmt: skip
+"""Positions of sensors that come in threes."""
+
+_GLANCE_S = 1e-3
+"""What a look at the clock takes where time stands still otherwise [s], so that loops that only wait for it end."""
+
+
+class TimeUp(BaseException):
+    """The time that a program was given is over; no program catches it by mistake."""
+
+
+class Base:
+    """A robot and its clock.
+
+    Attributes:
+        simulation: What an onlooker sees of a simulated robot; None for others.
+        clock: The time that the robot lives in.
+        deadline: When a program has to end, by that clock [s]; None for never.
+    """
+
+    _driver: Driver
+    simulation: Simulation | None
+    clock: Clock
+    deadline: float | None = None
+
+    @property
+    def driver(self) -> Driver:
+        """The robot's driver, to say something to the robot.
+
+        Raises:
+            TimeUp: The program's time is over.
+        """
+        if self.deadline is not None and self.clock.now() >= self.deadline:
+            raise TimeUp
+        if self.simulation is not None:
+            self.simulation.look()
+        return self._driver
+
+    def now(self) -> float:
+        """The time on the robot's clock [s]."""
+        if self.simulation is not None and not self.simulation.is_timed:
+            self.pause(_GLANCE_S)
+        return self.clock.now()
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass on the robot's clock [s]; a robot that moves goes on moving.
+
+        Left before its end (Ctrl-C, a stop button, the program's time is over), it stops the robot.
+        """
+        try:
+            self._pause(seconds)
+        except BaseException:
+            self._driver.stop()
+            raise
+
+    def _pause(self, seconds: float) -> None:
+        rest = seconds if self.deadline is None else min(seconds, self.deadline - self.clock.now())
+        self.clock.sleep(max(0.0, rest))
+        if rest < seconds:
+            raise TimeUp
+        if self.simulation is not None:
+            self.simulation.look()

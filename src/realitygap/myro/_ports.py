@@ -1,0 +1,88 @@
+"""From what a program gives to `initialize` to an open robot."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+from realitygap.errors import RobotError
+from realitygap.robots.scribbler import Scribbler as Driver
+from realitygap.robots.scribbler import find_ports
+
+from ._mistakes import MyroError
+from ._simulation import Simulation, is_simulation, parse_simulation
+
+_forced: str | None = None
+
+
+def force_port(port: str | None) -> None:
+    """From now on every program gets this port, whatever it asks for; None for what it asks for."""
+    global _forced
+    _forced = port
+
+
+def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulation | None]:
+    """Open a robot.
+
+    Args:
+        port: A name, a number of a COM port, "sim", or None to ask in the terminal.
+        options: For "sim".
+
+    Returns:
+        The driver; and the simulation, where there is one.
+
+    Raises:
+        MyroError: It cannot be opened.
+    """
+    name = _forced if _forced is not None else _name(port)
+    if is_simulation(name):
+        simulation = Simulation(**(parse_simulation(name) | options))
+        return simulation.driver, simulation
+    if options:
+        raise MyroError(
+            f'{", ".join(options)}: only a simulated robot has that, as initialize("sim", seed=3).'
+        )
+    if name.startswith("emulator:"):
+        import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
+    try:
+        return Driver(name), None
+    except (RobotError, ValueError, OSError) as error:
+        raise MyroError(f"{error}\n{_advice()}") from error
+
+
+def _name(port: str | int | None) -> str:
+    if isinstance(port, int) and not isinstance(port, bool):
+        return f"COM{port}"
+    if port is None or port == "":
+        return _asked()
+    if not isinstance(port, str):
+        raise MyroError(
+            f'initialize: the port is {port!r}, expected text as "/dev/rfcomm0", "COM3" or "sim".'
+        )
+    windows = port.lower().startswith("com") and port[3:].isdigit()
+    return port.upper() if windows else port
+
+
+def _asked() -> str:
+    ports = find_ports()
+    for found in ports:
+        print(f"  {found.port:20} {found.seems}")
+    try:
+        given = input('Port of the robot ("sim" for a simulated one) [sim]: ').strip().strip("\"'")
+    except EOFError:
+        raise MyroError(
+            'initialize() asks for the port of the robot, and nobody can answer here. Write it down: initialize("sim").'
+        ) from None
+    return given or "sim"
+
+
+def _advice() -> str:
+    ports = ", ".join(found.port for found in find_ports()) or "none"
+    example = (
+        "COM3" if sys.platform == "win32" else "/dev/cu.Fluke" if sys.platform == "darwin" else "/dev/rfcomm0"
+    )
+    text = f"Ports of this computer: {ports}. A robot's port is named like {example}; "
+    if os.name == "posix" and sys.platform != "darwin":
+        text += "on Linux it is there once the robot is paired and bound; "
+    return text + 'initialize("sim") needs no robot.'

@@ -1,0 +1,221 @@
+"""Myro's robot: what programs call `robot`, and what Myro's functions speak to."""
+
+from __future__ import annotations
+
+import contextlib
+from types import TracebackType
+from typing import Any, Self
+
+from realitygap.errors import RobotError
+
+from . import _current
+from ._base import Base
+from ._camera import Camera
+from ._driving import Driving
+from ._fluke import Fluke
+from ._identity import Identity
+from ._lights import Lights
+from ._mistakes import MyroError, choice
+from ._paths import Paths
+from ._ports import open_port
+from ._senses import Senses
+from ._sound import Sound
+
+_HELLO = (784, 880, 698, 349, 523)
+"""The tones of a robot that was just opened [Hz], each of 30 ms: Myro's."""
+
+
+class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, Base):
+    """A Scribbler on a port, in the terms of Myro; Myro's functions speak to the one that was opened last.
+
+    As a context manager it stops and lets go of the robot at the end.
+
+    Args:
+        port: The robot's port ("/dev/rfcomm0", "COM3"), an emulator's ("emulator://s2?fluke=2"), or "sim" for a
+            simulated robot; asked for in the terminal where none is given.
+        options: For "sim", see `simulator`.
+
+    Raises:
+        MyroError: The robot cannot be opened; the text says what to try.
+    """
+
+    def __init__(self, port: str | int | None = None, **options: Any) -> None:
+        before = _current.robot_or_none()
+        if before is not None:
+            with contextlib.suppress(RobotError):  # a robot that is gone shall not keep the next one away
+                before.close()
+        self._port, self._options = port, options
+        self.openConnection()
+        _current.use(self)
+        self.restart()
+
+    def __repr__(self) -> str:
+        info = self._driver.info
+        fluke = "no Fluke" if info.fluke == "none" else f"Fluke {info.fluke}"
+        return f"<Scribbler {info.model or 'unknown'} with {fluke} on {info.port}, {info.label}>"
+
+    def openConnection(self) -> None:
+        """Open the port again after `closeConnection`.
+
+        Raises:
+            MyroError: The robot cannot be opened.
+        """
+        self._driver, self.simulation = open_port(self._port, **self._options)
+        self.clock = self._driver.clock
+        limit = _current.limit()
+        self.deadline = None if limit is None else self.clock.now() + limit
+
+    open = openConnection
+
+    def closeConnection(self) -> None:
+        """Stop the robot and let go of its port."""
+        if self.simulation is not None:
+            self.simulation.close()
+        self._driver.close()
+
+    def close(self) -> None:
+        """As `closeConnection`; Myro's functions then have no robot until `initialize`."""
+        try:
+            self.closeConnection()
+        finally:
+            if _current.robot_or_none() is self:
+                _current.use(None)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def restart(self) -> None:
+        """Stop the robot, switch its lights off, let it play its five tones and greet."""
+        if self._driver.info.model is None:
+            return
+        self.stop()
+        self.setLED("all", "off")
+        for hz in _HELLO:
+            self.beep(0.03, hz)
+        print(f"Hello, I'm {self.getName()}!")
+
+    def reboot(self) -> None:
+        """Let the robot start anew, as its reset button does."""
+        self.driver.reset_robot()
+
+    def update(self) -> None:
+        """Do nothing: readings are always asked for anew. Kept because programs call it."""
+
+    def requestStop(self) -> None:
+        """Stop the robot, from wherever in a program."""
+        self.stop()
+
+    def set(self, item: str, position: Any, value: Any = None) -> None:
+        """Set something by its name: `set("led", "left", "on")` is `setLED("left", "on")`.
+
+        Args:
+            item: "led", "name", "password", "volume", "startsong", "whitebalance", "irpower", "forwardness" or "data".
+            position: What follows in the function that sets it.
+            value: What follows then, for "led" and "data".
+        """
+        setter = choice("set: the item", item, self._setters())
+        if item.lower() in ("led", "data"):
+            setter(position, value)
+        else:
+            setter(position)
+
+    def _setters(self) -> dict[str | int, Any]:
+        return {
+            "led": self.setLED,
+            "name": self.setName,
+            "password": self.setPassword,
+            "volume": self.setVolume,
+            "startsong": self.setStartSong,
+            "whitebalance": self.setWhiteBalance,
+            "irpower": self.setIRPower,
+            "forwardness": self.setForwardness,
+            "data": self.setData,
+        }
+
+    def _getters(self) -> dict[str | int, Any]:
+        return {
+            "all": self.getAll,
+            "light": self.getLight,
+            "ir": self.getIR,
+            "line": self.getLine,
+            "stall": self.getStall,
+            "obstacle": self.getObstacle,
+            "bright": self.getBright,
+            "blob": self.getBlob,
+            "battery": self.getBattery,
+            "distance": self.getDistance,
+            "name": self.getName,
+            "password": self.getPassword,
+            "data": self.getData,
+            "info": self.getInfo,
+            "forwardness": self.getForwardness,
+            "volume": self.getVolume,
+            "startsong": self.getStartSong,
+            "version": self.getVersion,
+            "config": self._config,
+            "picture": self.takePicture,
+        }
+
+
+def initialize(id: str | int | None = None, **options: Any) -> None:
+    """Open a robot, which from now on obeys Myro's functions, and greet.
+
+    Args:
+        id: The robot's port ("/dev/rfcomm0", on Windows "COM3"); "sim" for a simulated robot, in a notebook with a live
+            view; an emulator's port. Asked for in the terminal where none is given.
+        options: For "sim", see `simulator`.
+
+    Raises:
+        MyroError: The robot cannot be opened; the text says what to try.
+    """
+    Scribbler(id, **options)
+
+
+init = initialize
+
+
+def simulator(id: object = None, **options: Any) -> None:
+    """Open a simulated robot: `initialize("sim")`.
+
+    Args:
+        id: Taken and ignored, as in Myro.
+        options: What `initialize("sim?...")` takes: seed, start, speed, model, fluke, arena, view.
+    """
+    Scribbler("sim", **options)
+
+
+def makeRobot(kind: str, port: str | int | None = None) -> Scribbler:
+    """A robot: `robot = makeRobot("Scribbler", "/dev/rfcomm0")`, or `makeRobot("SimScribbler")` for a simulated one.
+
+    Raises:
+        MyroError: It is another kind of robot, or cannot be opened.
+    """
+    simulated = choice(
+        "makeRobot: the kind", kind, {"scribbler": False, "simscribbler": True, "simulator": True}
+    )
+    return Scribbler("sim" if simulated else port)
+
+
+def SimScribbler(id: object = None, **options: Any) -> Scribbler:
+    """A simulated robot as an object: `robot = SimScribbler()`."""
+    return Scribbler("sim", **options)
+
+
+def stop() -> None:
+    """Stop both wheels; without a robot nothing happens, as in Myro."""
+    robot = _current.robot_or_none()
+    if robot is not None:
+        robot.stop()
+
+
+def stop_robot() -> None:
+    """Stop the robot, if there is one and it can be reached: for ways out that must not fail."""
+    try:
+        stop()
+    except (RobotError, MyroError, OSError):
+        return

@@ -1,0 +1,139 @@
+"""Tones and songs, from the robot or from the computer."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from . import _current
+from ._base import Base
+from ._mistakes import MyroError, is_on, number, whole
+from ._songs import Note
+
+WHOLE_NOTE = 0.545
+"""How long a whole note lasts by default [s]."""
+
+_HIGHEST = 65535  # [Hz], a word on the wire
+_HEARD = 10_000  # the highest tone that a Scribbler 2 plays [Hz]; a higher one becomes this
+_PIECE = 5.0  # the longest tone in one command [s]; a longer one is played in pieces: a Scribbler 2 knows up to 8.2 s
+
+
+class Plays:
+    """Whoever can play a tone can play notes and songs."""
+
+    def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
+        raise NotImplementedError
+
+    def beep(self, duration: Any = 0.5, frequency1: Any = None, frequency2: Any = None) -> None:
+        """Play a tone and go on when it has ended.
+
+        Args:
+            duration: How long [s]; a list of frequencies here plays each for half a second.
+            frequency1: [Hz]; 0 is silence; one by chance where none is given; a list plays each in turn.
+            frequency2: Of a second tone at the same time [Hz].
+
+        Raises:
+            MyroError: The duration or a frequency is not a number of at least 0.
+        """
+        if isinstance(duration, Sequence) and not isinstance(duration, str):
+            duration, frequency1, frequency2 = 0.5, duration, frequency1
+        if frequency1 is None:
+            frequency1 = random.randrange(200, 10000)
+        if isinstance(frequency1, Sequence) and not isinstance(frequency1, str):
+            seconds: Sequence[Any] = [None] * len(frequency1) if frequency2 is None else frequency2
+            for hz, hz2 in zip(frequency1, seconds, strict=False):
+                self.beep(duration, hz, hz2)
+            return
+        self._tone(
+            number("beep: the duration", duration, 0, 600),
+            number("beep: the frequency", frequency1, 0, _HIGHEST),
+            None if frequency2 is None else number("beep: the second frequency", frequency2, 0, _HIGHEST),
+        )
+
+    def playNote(self, tup: Note, wholeNoteDuration: float = WHOLE_NOTE) -> None:
+        """Play one note of a song: `(frequency, part)` or `(frequency, frequency, part)`.
+
+        Raises:
+            MyroError: It is not such a note.
+        """
+        if not isinstance(tup, Sequence) or isinstance(tup, str) or len(tup) not in (2, 3):
+            raise MyroError(
+                f"playNote: the note is {tup!r}, expected (frequency, part of a whole note); makeSong() makes a song "
+                "of them from text."
+            )
+        part = number("playNote: the part of a whole note", tup[-1], 0)
+        self.beep(part * number("playNote: the whole note's duration", wholeNoteDuration, 0), *tup[:-1])
+
+    def playSong(self, song: Sequence[Note], wholeNoteDuration: float = WHOLE_NOTE) -> None:
+        """Play a song that `makeSong` or `readSong` made; a whole note lasts `wholeNoteDuration` [s]."""
+        if isinstance(song, str):
+            raise MyroError(
+                "playSong: the song is text, expected what makeSong(text) or readSong(filename) returns."
+            )
+        for note in song:
+            self.playNote(note, wholeNoteDuration)
+
+
+class Sound(Plays, Base):
+    """The robot's speaker."""
+
+    _volume = 1
+    _start_song = "tada"
+
+    def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
+        while duration > 0:
+            piece = min(duration, _PIECE)
+            self.driver.beep(piece, min(hz, _HEARD), None if hz2 is None else min(hz2, _HEARD))
+            duration -= piece
+
+    def setVolume(self, value: str | int) -> None:
+        """Switch the robot's speaker on ("on", 1) or off ("off", 0); the robot remembers it."""
+        self._volume = int(is_on("setVolume: the value", value))
+        self.driver.set_loud(bool(self._volume))
+
+    def getVolume(self) -> int:
+        """1 if the speaker is on, else 0, as last set by `setVolume`."""
+        return self._volume
+
+    def setS2Volume(self, value: int) -> None:
+        """Set how loud the speaker of a Scribbler 2 is, 0 to 100."""
+        self.driver.set_s2_volume(whole("setS2Volume: the value", value, 0, 100))
+
+    def setStartSong(self, songName: str) -> None:
+        """Remember a name for `getStartSong`; as in Myro, the robot itself never learns of it."""
+        self._start_song = songName
+
+    def getStartSong(self) -> str:
+        """The name that `setStartSong` remembered; "tada" before."""
+        return self._start_song
+
+
+class Computer(Plays):
+    """The computer as a player of tones: it rings the terminal's bell and waits as long as the tone lasts."""
+
+    def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
+        if hz:
+            sys.stdout.write("\a")
+            sys.stdout.flush()
+        _current.sleep(duration)
+
+    def speak(self, message: object, async_: bool = False) -> None:
+        """Print what the computer would say."""
+        print(message)
+
+
+computer = Computer()
+
+
+def beepScale(duration: float, start: float, stop: float, factor: float = 2) -> None:
+    """Let the computer play tones from one frequency to another, each so many times the one before."""
+    if number("beepScale: the factor", factor) <= 1 or number("beepScale: the start", start) <= 0:
+        raise MyroError(
+            f"beepScale: starts at {start!r} and grows by {factor!r}, expected a start above 0 and a factor above 1."
+        )
+    hz = start
+    while hz <= stop:
+        computer.beep(duration, hz)
+        hz *= factor

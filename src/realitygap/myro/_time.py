@@ -1,0 +1,75 @@
+"""Waiting and measuring time, on the clock of the robot: a simulated one may run faster than the wall's."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from types import CodeType, FrameType
+
+from . import _current
+from ._mistakes import number
+
+_Site = tuple[CodeType, int]  # a line of a program
+_timers: dict[_Site, tuple[FrameType, float, float]] = {}  # frame, start [s], duration [s]
+
+
+def wait(seconds: float) -> None:
+    """Do nothing for some seconds; a robot that moves keeps moving.
+
+    Raises:
+        MyroError: It is not a number of at least 0.
+    """
+    _current.sleep(number("wait: the seconds", seconds, 0))
+
+
+def currentTime() -> float:
+    """The time [s]; only differences mean something."""
+    return _current.now()
+
+
+def timer(seconds: float = 0) -> Iterator[float]:
+    """For loops: `for t in timer(5):` runs for 5 seconds, t being the seconds since it began.
+
+    Args:
+        seconds: How long; 0 for ever.
+
+    Raises:
+        MyroError: It is not a number of at least 0.
+    """
+    duration = number("timer: the seconds", seconds, 0)
+    start = _current.now()
+    while True:
+        passed = _current.now() - start
+        if duration and passed > duration:
+            return
+        yield round(passed, 3)
+
+
+def timeRemaining(seconds: float = 0) -> bool:
+    """For loops: `while timeRemaining(5):` runs for 5 seconds.
+
+    Each line of a program has a timer of its own, which begins when the line is reached first and anew after it ended.
+
+    Args:
+        seconds: How long; 0 for ever.
+
+    Raises:
+        MyroError: It is not a number of at least 0.
+
+    Differs: In a function that was left before the time was over, the next call begins anew; Myro went on with what
+    remained.
+    """
+    duration = number("timeRemaining: the seconds", seconds, 0)
+    if not duration:
+        return True
+    caller = sys._getframe(1)
+    site = (caller.f_code, caller.f_lineno)  # Python compiles the test of a loop twice, on one line
+    now = _current.now()
+    frame, start, before = _timers.get(site, (None, now, duration))
+    if frame is not caller or before != duration:
+        _timers[site] = (caller, now, duration)
+        return True
+    if now - start > duration:
+        del _timers[site]
+        return False
+    return True

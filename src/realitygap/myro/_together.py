@@ -1,0 +1,68 @@
+"""Functions run in turn, or at the same time."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from inspect import signature
+from typing import Any
+
+from . import _current
+from ._mistakes import MyroError, whole
+
+
+def loop(*functions: Any) -> str:
+    """Call functions one after another, several times: `loop(step, turn, 4)`; then stop the robot.
+
+    Args:
+        functions: Functions, each called with the number of the round where it takes one; last, how many rounds.
+
+    Raises:
+        MyroError: There are no functions, or no number at the end.
+    """
+    *steps, count = functions or (None,)
+    if not steps or not all(callable(step) for step in steps):
+        raise MyroError(
+            "loop() was called without functions, expected loop(step, turn, 4): functions, then how often."
+        )
+    for turn in range(1, whole("loop: how often", count, 0, 10**9) + 1):
+        for step in steps:
+            print(f"   loop #{turn}: running {_name(step)}()... ", end="")
+            result = step(turn) if signature(step).parameters else step()
+            print(f" => {result}" if result else "")
+    robot = _current.robot_or_none()
+    if robot is not None:
+        robot.stop()
+    return "ok"
+
+
+def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
+    """Run two or more functions at the same time: `doTogether(drive, sing)`; goes on when all have ended.
+
+    The robot still does one thing after another: where one function plays a tone, the other waits for the robot. On a
+    simulated robot with `speed="off"` the times of all functions add up.
+
+    Returns:
+        What each returned, or None where none returned anything.
+
+    Raises:
+        MyroError: There are fewer than two functions.
+    """
+    if len(functions) < 2 or not all(callable(function) for function in functions):
+        raise MyroError(
+            f"doTogether() was given {len(functions)} values, expected two or more functions, without "
+            "parentheses behind their names: doTogether(drive, sing)."
+        )
+    with ThreadPoolExecutor(len(functions)) as pool:
+        results = [future.result() for future in [pool.submit(function) for function in functions]]
+    return results if any(result is not None for result in results) else None
+
+
+def getFilenames(pattern: str) -> list[str]:
+    """The names of files that a pattern describes, in order: `getFilenames("picture*.jpg")`."""
+    return sorted(glob.glob(pattern))  # noqa: PTH207  # the pattern may name folders and begin anywhere
+
+
+def _name(function: object) -> str:
+    return getattr(function, "__name__", "function")

@@ -44,12 +44,15 @@ def test_all_commands_are_known():
         "audit-results",
         "bench",
         "digest",
+        "emulate",
         "export",
         "new-study",
         "report",
+        "robot",
         "run",
         "show",
         "simulate",
+        "trials",
     ]
 
 

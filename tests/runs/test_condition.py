@@ -3,7 +3,7 @@
 import pytest
 
 from realitygap.errors import RecordVersionError
-from realitygap.runs import Condition
+from realitygap.runs import Condition, run_replicates
 
 
 def test_settings_give_the_condition_again():
@@ -92,3 +92,30 @@ def test_a_run_that_no_memory_holds_is_refused():
     assert Condition(name="a", neat=many).neat == many
     with pytest.raises(ValueError, match="expected at most 5,000,000"):
         Condition(name="a", neat=many.model_copy(update={"generations": 1001}))
+
+
+def test_simulated_conditions_keep_their_hashes():
+    """Results in people's folders go by them; a platform that is not in use counts for nothing."""
+    assert Condition(name="a").hash() == "88619d669239056ab8f0db6e344ff21f35594cafedf7367f54ba1db22536a7f7"
+    assert "scribbler" not in Condition(name="a").settings()
+    changed = Condition(name="a", scribbler={"steps": 5})
+    assert changed.hash() == Condition(name="a").hash()
+
+
+def test_a_condition_on_a_robot_has_the_robots_settings():
+    condition = Condition(name="a", platform="scribbler")
+    assert condition.is_physical
+    assert (condition.noise, condition.label) == (0.0, "not driven")
+    assert "jyro" not in condition.settings()
+    assert Condition.from_settings("a", condition.settings()) == condition
+    assert condition.hash() != Condition(name="a").hash()
+    assert Condition(name="a", platform="scribbler", scribbler={"wait_s": 0.4}).hash() != condition.hash()
+
+
+def test_what_means_nothing_on_a_robot_is_refused():
+    with pytest.raises(ValueError, match=r"noise is 0\.1, expected none with platform 'scribbler'"):
+        Condition(name="a", platform="scribbler", noise=0.1)
+    with pytest.raises(ValueError, match="expected 'line' with platform 'scribbler'"):
+        Condition(name="a", platform="scribbler", task={"cells": "ends"})
+    with pytest.raises(ValueError, match="is tried on a robot, expected one with platform 'jyro'"):
+        run_replicates(Condition(name="a", platform="scribbler"), 0, 1)

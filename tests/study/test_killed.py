@@ -134,7 +134,7 @@ def check_nothing_was_asked_twice(path: Path) -> None:
 def test_a_study_killed_at_any_point_goes_on_as_if_nothing_had_happened(tmp_path, selection):
     n_points = count_points(tmp_path / "whole", selection)
     wanted = scored(tmp_path / "whole")
-    assert n_points > 100
+    assert n_points > 80
     for number in range(n_points):
         path = tmp_path / f"killed-{number}"
         assert killed_at(number, path, selection), number
@@ -148,13 +148,19 @@ def test_a_study_killed_again_and_again_comes_to_its_end(tmp_path):
     path = tmp_path / "killed"
     rng = random.Random(1)
     sittings = 0
-    while killed_at(rng.randrange(40, 80), path, "coverage"):
+    while killed_at(rng.randrange(20, 45), path, "coverage"):
         sittings += 1
         assert sittings < 100
     assert sittings >= 3
     drive(small_study("coverage", population="2", steps="2"), tmp_path / "whole")
     assert scored(path) == scored(tmp_path / "whole")
     check_nothing_was_asked_twice(path)
+
+
+@pytest.fixture
+def no_waiting_for_the_disk(monkeypatch):
+    """A program that ends leaves what it wrote to the system; waiting for the disk is for a loss of power."""
+    monkeypatch.setattr("realitygap.records._ledger_file.SYNCHRONOUS", "OFF")
 
 
 FAULTS = ("lost", "interrupted", "terminated", "disk full", "foreign error")
@@ -220,11 +226,13 @@ def inject(n_faults: int, folder: Path) -> None:
         check_nothing_was_asked_twice(path)
 
 
+@pytest.mark.usefixtures("no_waiting_for_the_disk")
 def test_no_fault_loses_a_scored_trial_or_leaves_the_motors_running(tmp_path):
     inject(100, tmp_path)
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("no_waiting_for_the_disk")
 def test_ten_thousand_faults_lose_no_scored_trial_and_leave_no_motor_running(tmp_path):
     inject(10_000, tmp_path)
 

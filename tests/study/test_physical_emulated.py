@@ -15,10 +15,12 @@ import pytest
 
 from realitygap.errors import RealityGapError
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
-from realitygap.study import run_study
+from realitygap.report import summarize, write_report
+from realitygap.study import load_study, run_study
 from realitygap.trials import TrialInterrupted, WitnessOperator
 
 from .physical import scored, small_study
+from .test_killed import no_waiting_for_the_disk  # noqa: F401 - a fixture
 
 ROOT = Path(__file__).parents[2]
 PORT = "emulator://s2?fluke=1&speed=off"
@@ -170,18 +172,43 @@ def test_no_fault_on_the_wire_loses_a_scored_trial_or_leaves_the_motors_running(
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("no_waiting_for_the_disk")
 def test_two_thousand_faults_on_the_wire(tmp_path):
     inject(2_000, tmp_path)
 
 
+def test_a_mixed_study_has_simulated_arms_beside_an_emulated_one(tmp_path):
+    study = load_study(ROOT / "examples" / "robot-beside-simulation.toml", replicates=1)
+    result = run_study(study, tmp_path / "mixed", port=PORT)
+    assert (result.n_runs, result.physical.n_runs, result.physical.n_complete) == (2, 2, 2)
+    labels = dict(summarize(result.folder).select("condition", "label").iter_rows())
+    assert labels == {
+        "coverage-10": "SIM",
+        "novelty-10": "SIM",
+        "coverage-robot": "EMULATED",
+        "novelty-robot": "EMULATED",
+    }
+    page = write_report(result.folder).read_text()
+    assert "EMULATED and SIM" in page
+
+
+def test_the_papers_physical_study_runs_unattended(tmp_path):
+    result = run_study("paper-robot", tmp_path / "paper", port=PORT)
+    assert (result.physical.n_complete, result.physical.n_driven) == (6, 240)
+    summary = summarize(result.folder)
+    assert summary["label"].to_list() == ["EMULATED", "EMULATED"]
+    assert summary["line_median"].min() > 0.15
+    assert 'id="figure-8"' in write_report(result.folder).read_text()
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_an_emulator_in_another_program_is_driven_and_witnessed(tmp_path):
-    """The command line on a pseudo-terminal, 50 times as fast as real time."""
+    """The command line on a pseudo-terminal, 5 times as fast as real time."""
     (tmp_path / "small.toml").write_text(SMALL_FILE)
     command = [sys.executable, "-m", "realitygap"]
     emulator = subprocess.Popen(
         [*command, "emulate", "scribbler", "--fluke", "1", "--link", str(tmp_path / "port"), "--witness", "0",
-         "--speed", "50"],
+         "--speed", "5"],
         stdout=subprocess.PIPE, text=True, cwd=ROOT,
     )  # fmt: skip
     try:

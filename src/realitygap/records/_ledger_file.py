@@ -21,6 +21,9 @@ _APPLICATION = 0x52474C31
 _PATIENCE_S = 10.0
 """How long to wait for another program that writes."""
 
+SYNCHRONOUS = "FULL"
+"""When SQLite waits for the disk: at every commit."""
+
 TABLES = """
 CREATE TABLE conditions (  -- a condition on a robot, as resolved
     name TEXT PRIMARY KEY,
@@ -165,7 +168,7 @@ def create_file(path: Path) -> None:
             connection = sqlite3.connect(temporary, isolation_level=None)
             try:
                 connection.executescript(
-                    f"PRAGMA synchronous = FULL; PRAGMA application_id = {_APPLICATION}; "
+                    f"PRAGMA synchronous = {SYNCHRONOUS}; PRAGMA application_id = {_APPLICATION}; "
                     f"PRAGMA user_version = {LEDGER_FORMAT};\nBEGIN;{TABLES}{_NO_DELETING}{_FROZEN}COMMIT;"
                 )
                 connection.execute("PRAGMA journal_mode = WAL")
@@ -196,7 +199,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             connection.row_factory = sqlite3.Row
             _check(connection, path)
             connection.execute("PRAGMA foreign_keys = ON")
-            connection.execute("PRAGMA synchronous = FULL")
+            connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
         except BaseException:
             connection.close()
             raise

@@ -93,7 +93,7 @@ class GridEdit:
             shown.append(f"  {row:2} {cells}")
         shown.append("     " + "".join(f"{column:^3}" for column in range(self.columns)))
         drawing = ", drawing" if self.is_drawing else ""
-        shown.append(f"  {len(self.cells)} cells of {self.columns * self.rows}{drawing}")
+        shown.append(f"  {len(self.cells)} of {self.columns * self.rows} cells{drawing}")
         return shown
 
     def _shown(self, column: int, row: int) -> str:

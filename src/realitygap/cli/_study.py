@@ -212,7 +212,7 @@ class RunsBar:
             return
         if not self._progress.live.is_started:
             if not self._console.is_terminal:
-                self._console.print("Compiling or loading the kernels (the first time takes some 15 s) ...")
+                self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
             self._progress.start()
         if progress.waiting_for and not self._console.is_terminal:
             self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)

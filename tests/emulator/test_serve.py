@@ -180,38 +180,12 @@ def test_a_hang_up_closes_the_connection_of_a_tcp_client():
         talk_on(port)
 
 
-def test_an_idle_emulator_uses_no_processor_time(serve):
+def test_an_idle_emulator_waits_until_something_comes(serve):
     with serve(robot()) as server:
         with open_port(server) as port:
             port.write(packet(65))
             port.read(20)
-            before = time.process_time()
-            time.sleep(1.0)
-            assert time.process_time() - before < 0.1
         assert server._pause() is None
-
-
-def loop_seconds(port, n=200):
-    """Processor time of this process for reading the sensors and setting the motors once [s], client included."""
-    best = 1.0
-    for _ in range(5):
-        before = time.process_time()
-        for _ in range(n):
-            for command in (packet(65), packet(109, 130, 150)):
-                port.write(command)
-                assert len(port.read(20)) == 20
-        best = min(best, (time.process_time() - before) / n)
-    return best
-
-
-def test_a_core_can_carry_two_thousand_sensor_and_motor_loops_a_second(serve):
-    with serve(robot()) as server, open_port(server) as port:
-        assert loop_seconds(port) < 1 / 2000
-
-
-def test_so_it_can_in_the_same_process():
-    with serial.serial_for_url("emulator://s2?fluke=2&timing=off&speed=off", timeout=1.0) as port:
-        assert loop_seconds(port) < 1 / 2000
 
 
 def test_tones_take_their_time_over_the_wire():

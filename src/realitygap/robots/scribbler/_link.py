@@ -150,6 +150,8 @@ def _advice(name: str, error: Exception) -> str:
         return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
     if "lock" in text or "busy" in text:
         return "Another program holds it; close that one."
+    if name.startswith("emulator://") and "not known" in text:
+        return "`import realitygap.emulator` makes such ports known."
     if "://" in name:
         return "Is the address right, and does something listen there?"
     return "Is the robot on, paired and connected? `realitygap robot list` names the ports that are there."

@@ -60,3 +60,13 @@ def test_unknown_models_get_one_clear_message():
         Emulator("s4")
     with pytest.raises(RobotError, match="none, 1, 2"):
         Emulator("s2", "3")
+
+
+@pytest.mark.parametrize("fluke", ["none", "1", "2"])
+def test_a_robot_that_calls_out_its_name_is_switched_on_behind_any_fluke(tmp_path, fluke):
+    file = tmp_path / "robot.json"
+    ask(Emulator("s1", fluke, state=file, timing=False), 98, 1)
+    again = Emulator("s1", fluke, state=file, timing=False)
+    again.advance(1.5)
+    called = b"IPREScribby  \0" * 2
+    assert again.transmit() == (called if fluke == "none" else b""), "a Fluke does not relay before a packet"

@@ -137,6 +137,13 @@ def open_port(name: str) -> Any:
     return port
 
 
+def is_serial_port(port: object) -> bool:
+    """Whether it is one of pyserial's, whose name says what is behind it."""
+    import serial
+
+    return isinstance(port, serial.SerialBase)
+
+
 def serial_devices() -> list[Any]:
     """The serial ports that the system knows of, as pyserial describes them."""
     from serial.tools import list_ports
@@ -150,6 +157,8 @@ def _advice(name: str, error: Exception) -> str:
         return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
     if "lock" in text or "busy" in text:
         return "Another program holds it; close that one."
+    if name.startswith("emulator:"):
+        return "Such ports are known once `import realitygap.emulator` was said."
     if "://" in name:
         return "Is the address right, and does something listen there?"
     return "Is the robot on, paired and connected? `realitygap robot list` names the ports that are there."

@@ -50,9 +50,10 @@ def test_a_file_that_is_no_memory_gets_one_clear_message(tmp_path, text):
 
 
 def test_a_file_that_cannot_be_written_is_said_so(tmp_path):
-    robot = Emulator(state=tmp_path / "missing" / "robot.json", timing=False)
     with pytest.raises(RobotError, match="cannot be kept"):
-        robot.receive(packet(110, *b"Rosie   "))
+        Emulator(state=tmp_path / "missing" / "robot.json")
+    with pytest.raises(RobotError, match=r"cannot be read \(Is a directory\)"):
+        Emulator(state=tmp_path)
 
 
 def test_unknown_models_get_one_clear_message():

@@ -34,7 +34,7 @@ class Memory:
         file: Where it is kept; in memory only when not given.
 
     Raises:
-        RobotError: The file is there and cannot be read.
+        RobotError: The file is there and cannot be read, or cannot be written.
     """
 
     def __init__(self, model: str, file: Path | None = None) -> None:
@@ -46,6 +46,7 @@ class Memory:
         self._file = file
         if file is not None and file.exists():
             self._load(file)
+        self.save()  # a file that cannot be kept is better known now than when a client sets something
 
     def read_page(self, page: int, offset: int) -> int:
         """A byte of the serial memory; addresses beyond its end begin anew."""
@@ -103,7 +104,11 @@ class Memory:
 
     def _load(self, file: Path) -> None:
         try:
-            values = json.loads(file.read_text(encoding="utf-8"))
+            text = file.read_text(encoding="utf-8", errors="replace")
+        except OSError as error:
+            raise RobotError(f"{file}: the robot's memory cannot be read ({error.strerror}).") from error
+        try:
+            values = json.loads(text)
             self.name[:] = _bytes(values["name"], 16)
             self.password[:] = _bytes(values["password"], 16)
             self.data[:] = _bytes(values["data"], 8)
@@ -112,7 +117,7 @@ class Memory:
             )
             for page, data in values["pages"].items():
                 self.pages[int(page) % PAGES] = bytearray(_bytes(data, PAGE_BYTES))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise RobotError(
                 f"{file} is not the memory of an emulated robot ({type(error).__name__}: {error}). Remove it to begin "
                 "with a new robot."

@@ -115,6 +115,7 @@ def test_battery_stop_beep_and_list():
         (("battery", S1), "'battery' needs a Fluke; here is S1"),
         (("info", "/dev/no-such-port"), "cannot be opened"),
         (("info", "emulator://s9"), "s9"),
+        (("sense", "recording:one.jsonl"), "`realitygap robot show-recording` shows it"),
         (("show-recording", "nothing.jsonl"), "Could not read nothing.jsonl"),
     ],
 )

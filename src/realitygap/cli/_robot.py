@@ -45,6 +45,8 @@ def _opened(port: str, record: Path | None) -> Iterator[Scribbler]:
     """The robot on a port, stopped and let go of in the end."""
     from realitygap.robots.scribbler import Scribbler, is_in_this_program
 
+    if port.startswith("recording:"):
+        raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
     if is_in_this_program(port):
         import realitygap.emulator  # noqa: F401  # its ports are known from then on
     try:

@@ -70,6 +70,8 @@ class Watchdog:
 
     def _before_command(self) -> None:
         """Look, and say that the recording failed while only the watchdog spoke."""
+        if self._is_stopping:
+            return
         self.look()
         unsaid, self._unsaid = self._unsaid, None
         if unsaid is not None:

@@ -56,6 +56,17 @@ def test_a_file_that_cannot_be_written_is_said_so(tmp_path):
         Emulator(state=tmp_path)
 
 
+def test_a_robot_lives_on_when_its_file_cannot_be_written_any_more(tmp_path):
+    folder = tmp_path / "robots"
+    folder.mkdir()
+    robot = Emulator("s2", "none", state=folder / "robot.json", timing=False)
+    (folder / "robot.json").unlink()
+    folder.rmdir()
+    with pytest.warns(UserWarning, match="cannot be kept"):
+        assert len(ask(robot, 110, *b"Rosie   ")) == 11
+    assert ask(robot, 78) == b"Rosie   "
+
+
 def test_unknown_models_get_one_clear_message():
     with pytest.raises(RobotError, match="s1 or s2"):
         Emulator("s4")

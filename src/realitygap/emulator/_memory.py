@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ class Memory:
         self._file = file
         if file is not None and file.exists():
             self._load(file)
-        self.save()  # a file that cannot be kept is better known now than when a client sets something
+        self._write()  # a file that cannot be kept is better known now than when a client sets something
 
     def read_page(self, page: int, offset: int) -> int:
         """A byte of the serial memory; addresses beyond its end begin anew."""
@@ -74,11 +75,13 @@ class Memory:
             self.save()
 
     def save(self) -> None:
-        """Write the file, if there is one.
+        """Write the file, if there is one; a robot whose file cannot be written any more lives on, with a warning."""
+        try:
+            self._write()
+        except RobotError as error:
+            warnings.warn(f"{error} It will be forgotten with this emulator.", stacklevel=2)
 
-        Raises:
-            RobotError: It cannot be written.
-        """
+    def _write(self) -> None:
         if self._file is None:
             return
         try:

@@ -82,6 +82,15 @@ def test_a_client_that_sets_dtr_runs_with_exec_and_its_status_comes_back(tmp_pat
     assert (done.returncode, done.stderr) == (7, "")
 
 
+def test_sigterm_removes_the_link_of_a_port_with_exec_too(tmp_path):
+    link = tmp_path / "robot"
+    process, _ = start("--link", str(link), "--exec", "sleep 20")
+    assert link.is_symlink()
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(20) == 128 + signal.SIGTERM
+    assert not link.is_symlink()
+
+
 def test_without_exec_a_pseudo_terminal_refuses_dtr():
     process, name = start("--quiet")
     with serial.Serial(name) as port, pytest.raises(OSError, match="Inappropriate ioctl"):

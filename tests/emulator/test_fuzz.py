@@ -144,3 +144,12 @@ def test_the_path_is_bounded():
         assert robot.cells()
     finally:
         table.MOST_POINTS = before
+
+
+def test_bytes_that_come_while_a_fluke_works_are_bounded():
+    robot = Emulator("s2", "2")
+    for _ in range(60):
+        robot.receive(b"\x55" * 5000)  # an obstacle reading each, which takes 40 ms
+        robot.advance(0.1)
+    assert len(robot.fluke._held) <= 1 << 16
+    assert len(robot.fluke._held) + len(robot._incoming) > 1 << 15

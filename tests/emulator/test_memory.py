@@ -50,9 +50,21 @@ def test_a_file_that_is_no_memory_gets_one_clear_message(tmp_path, text):
 
 
 def test_a_file_that_cannot_be_written_is_said_so(tmp_path):
-    robot = Emulator(state=tmp_path / "missing" / "robot.json", timing=False)
     with pytest.raises(RobotError, match="cannot be kept"):
-        robot.receive(packet(110, *b"Rosie   "))
+        Emulator(state=tmp_path / "missing" / "robot.json")
+    with pytest.raises(RobotError, match=r"cannot be read \(Is a directory\)"):
+        Emulator(state=tmp_path)
+
+
+def test_a_robot_lives_on_when_its_file_cannot_be_written_any_more(tmp_path):
+    folder = tmp_path / "robots"
+    folder.mkdir()
+    robot = Emulator("s2", "none", state=folder / "robot.json", timing=False)
+    (folder / "robot.json").unlink()
+    folder.rmdir()
+    with pytest.warns(UserWarning, match="cannot be kept"):
+        assert len(ask(robot, 110, *b"Rosie   ")) == 11
+    assert ask(robot, 78) == b"Rosie   "
 
 
 def test_unknown_models_get_one_clear_message():
@@ -60,3 +72,13 @@ def test_unknown_models_get_one_clear_message():
         Emulator("s4")
     with pytest.raises(RobotError, match="none, 1, 2"):
         Emulator("s2", "3")
+
+
+@pytest.mark.parametrize("fluke", ["none", "1", "2"])
+def test_a_robot_that_calls_out_its_name_is_switched_on_behind_any_fluke(tmp_path, fluke):
+    file = tmp_path / "robot.json"
+    ask(Emulator("s1", fluke, state=file, timing=False), 98, 1)
+    again = Emulator("s1", fluke, state=file, timing=False)
+    again.advance(1.5)
+    called = b"IPREScribby  \0" * 2
+    assert again.transmit() == (called if fluke == "none" else b""), "a Fluke does not relay before a packet"

@@ -145,6 +145,9 @@ def test_the_witness_of_another_process_sees_and_moves_the_robot():
         b'{"do": "place"}',
         b'{"do": "place", "pose": [1], "seed": 1}',
         b"\xff",
+        b'{"do": "place", "pose": [0, 0, 0], "seed": Infinity}',
+        b'{"do": "place", "pose": [0, 0, 1' + b"0" * 400 + b'], "seed": 1}',
+        b"[" * 50_000,
     ],
 )
 def test_the_witness_answers_nonsense_with_an_error_and_lives(request_):

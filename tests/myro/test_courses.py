@@ -128,12 +128,40 @@ def test_the_same_program_runs_under_the_names_of_other_versions(tmp_path):
     assert "Myro" not in sys.modules
 
 
+@pytest.mark.parametrize(("ending", "code"), [("", 0), ("0", 0), ("3", 1), ("'no light'", 1)])
+def test_a_program_that_ends_itself_has_ended_well_only_with_0(tmp_path, ending, code):
+    program = tmp_path / "program.py"
+    program.write_text(f"import sys\nfrom myro import *\ninit()\nsys.exit({ending})\n")
+    assert run(program, "--seeds", "4", "--json")[0] == code
+
+
+def test_a_signal_ends_all_of_a_grading(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import os, signal, sys\nfrom myro import *\ninit()\nprint('begun', file=sys.stderr)\nforward(1)\n"
+        "os.kill(os.getpid(), signal.SIG{})\nwait(9)\n"
+    )
+    for name, code in (("TERM", 143), ("INT", 130)):
+        one = tmp_path / f"{name}.py"
+        one.write_text(program.read_text().format(name))
+        done = subprocess.run(
+            [sys.executable, "-m", "realitygap.myro", one, "--seeds", "1-3"], capture_output=True, text=True
+        )
+        assert done.returncode == code
+        assert done.stderr.count("begun") == 1
+        assert "Traceback" not in done.stderr
+
+
 def test_mistakes_of_the_command_are_said_plainly(tmp_path, capsys):
     assert main([str(tmp_path / "no.py")]) == 2
     assert "There is no program" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main([str(PROGRAMS / "dance.py"), "--seeds", "one"])
     assert "expected seeds as 1-10" in capsys.readouterr().err
+    for wrong in (("--seeds", "5-1"), ("--limit", "nan"), ("--limit", "0")):
+        with pytest.raises(SystemExit):
+            main([str(PROGRAMS / "dance.py"), *wrong])
+        assert "expected seeds as 1-10" in (said := capsys.readouterr().err) or "expected seconds" in said
     with pytest.raises(SystemExit, match="--seeds needs a simulated robot"):
         main([str(PROGRAMS / "dance.py"), "--seeds", "1", "--port", "com3"])
 

@@ -22,7 +22,7 @@ def test_a_number_may_be_of_any_kind_of_number():
     ]
 
 
-@pytest.mark.parametrize("value", ["fast", None, [1], float("nan")])
+@pytest.mark.parametrize("value", ["fast", None, [1], float("nan"), float("inf")])
 def test_what_is_no_number_is_refused_by_name(value):
     with pytest.raises(MyroError, match=r"^forward: the speed is .*, expected a number"):
         number("forward: the speed", value)

@@ -65,6 +65,17 @@ def test_the_robot_stops_when_a_program_is_interrupted(served, tmp_path, number)
     assert stands_within(served, 2)
 
 
+def test_functions_that_run_together_end_with_ctrl_c(served, tmp_path):
+    together = "def on():\n    while True: forward(0.2, 0.1)\ndoTogether(on, lambda: wait(60))"
+    process = start(tmp_path, served.name, together)
+    while "driving" not in process.stdout.readline():
+        assert process.poll() is None
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=20)
+    assert stands_within(served, 2)
+
+
 def test_a_robot_on_a_tcp_port():
     server = serve_tcp(Emulator("s1", "none"), speed=20.0)
     try:

@@ -90,6 +90,7 @@ def test_noise_on_the_line_ends_in_a_working_link_or_one_error_and_motors_off(se
             with Scribbler(port) as robot:
                 scene(robot)
             n_good += 1
+            assert port.robot.motors == STILL
         except RobotError as error:
             said = str(error)
             assert "motors" in said or "No Scribbler" in said
@@ -175,7 +176,7 @@ def test_a_robot_that_falls_silent_is_one_error_that_says_all_there_is_to_know()
     assert "No answer within 2.0 s" in text
     assert "'distance left' on /dev/test" in text
     assert "step 41" in text
-    assert "the motors may be running: switch the robot off" in text
+    assert "(step 41; the motors may be running: switch the robot off)" in text  # sent once
     assert port.robot.motors == STILL  # it heard all the same
     since = port.clock.now()
     with pytest.raises(RobotTimeout, match="'stop' on /dev/test"):
@@ -191,6 +192,8 @@ def test_a_robot_that_falls_silent_is_one_error_that_says_all_there_is_to_know()
         ("beep", lambda robot: robot.beep(0.5, 440)),
         ("move_by", lambda robot: robot.move_by(10, 0)),
         ("turn_by", lambda robot: robot.turn_by(10)),
+        ("move_to", lambda robot: robot.move_to(10, 0)),
+        ("turn_to", lambda robot: robot.turn_to(10)),
         ("encoders", lambda robot: robot.encoders(zero=True)),
     ],
 )
@@ -209,6 +212,38 @@ def test_what_is_not_safe_to_repeat_is_sent_once_and_said_to_be_in_doubt(name, c
         assert sum(opcodes.count(code) for code in (113, 162, 164, 171)) == 1
         assert port.robot.motors == STILL
         assert robot.light() == (0, 0, 0)  # the link works
+
+
+def test_a_motion_that_a_fault_cut_short_is_said_and_one_that_has_ended_is_not():
+    port = FakePort(FakeScribbler("s2"))
+    with Scribbler(port) as robot:
+        robot.move_by(100, 0)
+        lose_a_byte(port)
+        with pytest.raises(
+            RobotError, match=r"motion that may not have ended .*'light' .*motors stopped.* in step"
+        ):
+            robot.light()
+        assert robot.light() == (0, 0, 0)
+        robot.move_by(100, 0)
+        robot.link.is_in_motion = False  # as `motor_stats` says
+        lose_a_byte(port)
+        assert robot.light() == (0, 0, 0)
+
+
+def test_motor_stats_say_whether_a_motion_has_ended():
+    with Scribbler("emulator://s2?fluke=none&seed=1&speed=off") as robot:
+        robot.move_by(20, 0)
+        assert not robot.motor_stats().ready
+        assert robot.link.is_in_motion
+        robot.clock.sleep(5.0)
+        assert robot.motor_stats().ready
+        assert not robot.link.is_in_motion
+
+
+def lose_a_byte(port: FakePort) -> None:
+    """Of the next answer."""
+    lost = port.wire.n_to_host + 10
+    port.wire.to_host = lambda number, byte: b"" if number == lost else bytes((byte,))
 
 
 def test_a_hang_up_is_survived_when_the_port_comes_back():

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
+import serial
 
 from realitygap.emulator import Emulator, Server, serve_pty
 from realitygap.errors import RobotError
@@ -60,7 +61,7 @@ def test_the_wheels_stand_still_after(way, server):
     ) as process:
         assert process.stdout.readline() == "driving\n"
         if number == signal.SIGKILL:
-            assert process.stdout.readline() or True
+            assert process.stdout.readline() == "gone\n"
             time.sleep(0.3)
         elif number is not None:
             assert server.witness.motors() != (0.0, 0.0)
@@ -78,10 +79,23 @@ def test_a_pseudo_terminal_and_a_loopback_are_emulated_and_a_device_is_real(tmp_
     assert label_of("socket://localhost:7000") == "EMULATED"
     assert label_of("rfc2217://[::1]:7000") == "EMULATED"
     assert label_of("emulator://s2?fluke=2") == "EMULATED"
+    assert label_of("scribbler:socket://127.0.0.1:7000") == "EMULATED"
+    assert label_of("scribbler:emulator://s2") == "EMULATED"
+    assert label_of(f"alt://{server.name}?class=Serial") == "EMULATED"
+    assert label_of("spy:///dev/ttyS0?file=log.txt") == "REAL"
     assert label_of("/dev/ttyS0") == "REAL"
     assert label_of("/dev/rfcomm0") == "REAL"
     assert label_of("COM3") == "REAL"
     assert label_of("socket://192.0.2.1:7000") == "REAL"
+
+
+def test_an_open_port_of_pyserial_is_called_what_its_name_says(server, monkeypatch):
+    with serial.Serial(server.name) as port, Scribbler(port) as robot:
+        assert robot.label == "EMULATED"
+    with serial.Serial(server.name) as port:
+        monkeypatch.setattr(port, "name", "/dev/rfcomm0")
+        with Scribbler(port) as robot:
+            assert robot.label == "REAL"
 
 
 def test_the_driver_works_through_a_link_to_a_pseudo_terminal_with_the_platform_s_name(tmp_path, server):

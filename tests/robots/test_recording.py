@@ -202,6 +202,38 @@ def test_a_full_disk_is_one_error_and_the_motors_stop(tmp_path):
     assert not port.is_open
 
 
+class NoRoom:
+    """A file on a full disk."""
+
+    def write(self, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    def close(self) -> None: ...
+
+
+def test_a_full_disk_does_not_keep_stop_from_stopping(tmp_path):
+    port = FakePort(FakeScribbler("s2"))
+    robot = Scribbler(port, record=tmp_path / "one.jsonl")
+    robot.motors(1, 1)
+    robot._recorder._file = NoRoom()
+    with pytest.raises(RecordError, match="No space left"):
+        robot.stop()
+    assert port.robot.motors == (100, 100)
+    robot.close()
+
+
+def test_a_full_disk_under_the_watchdog_is_said_with_the_next_command(tmp_path):
+    port = FakePort(FakeScribbler("s2"))
+    with Scribbler(port, record=tmp_path / "one.jsonl", watchdog_s=1.0) as robot:
+        robot.motors(1, 1)
+        robot._recorder._file = NoRoom()
+        robot.clock.sleep(2.0)
+        assert port.robot.motors == (100, 100)
+        with pytest.raises(RecordError, match="No space left"):
+            robot.light()
+        assert robot.light()
+
+
 def test_the_mcap_export_has_every_line_with_its_time(tmp_path):
     from mcap.reader import make_reader
 

@@ -130,8 +130,15 @@ def _run(server: Server, command: str) -> int:
     """Serve while a client program runs; its status."""
     from realitygap.emulator._client import run_client
 
-    server.start()
-    return run_client(command, server.name)
+    def end(number: int, frame: FrameType | None) -> None:
+        raise SystemExit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        server.start()
+        return run_client(command, server.name)
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager

@@ -77,7 +77,7 @@ def choose_operator(port: str, witness: str | None, answers: Answers, folder: Pa
         folder: Of the results, in whose ledger notes are kept.
     """
     from realitygap.records import LEDGER_NAME, Ledger
-    from realitygap.study import is_in_this_program
+    from realitygap.robots.scribbler import is_in_this_program
     from realitygap.trials import WitnessOperator
 
     if is_in_this_program(port):

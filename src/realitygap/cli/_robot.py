@@ -37,13 +37,17 @@ Record = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
 
+LONGEST_DRIVE_S = 3600.0
+
 
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[Scribbler]:
     """The robot on a port, stopped and let go of in the end."""
-    from realitygap.robots.scribbler import Scribbler
+    from realitygap.robots.scribbler import Scribbler, is_in_this_program
 
-    if port.removeprefix("scribbler:").startswith("emulator:"):
+    if port.startswith("recording:"):
+        raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
+    if is_in_this_program(port):
         import realitygap.emulator  # noqa: F401  # its ports are known from then on
     try:
         with Scribbler(port, record=record) as opened:
@@ -110,7 +114,7 @@ def drive(
     port: Port,
     move: Annotated[float, typer.Argument(metavar="MOVE", help="-1 (back) to 1 (ahead), of full speed.")],
     turn: Annotated[float, typer.Argument(metavar="TURN", help="-1 (right) to 1 (left).")] = 0.0,
-    seconds: Annotated[float, typer.Option(min=0.0, metavar="S", help="How long.")] = 0.5,
+    seconds: Annotated[float, typer.Option(metavar="S", help="How long, at most 3600.")] = 0.5,
     record: Record = None,
 ) -> None:
     """Drive for a while, then stop. Ctrl-C stops at once.
@@ -123,6 +127,8 @@ def drive(
     """
     from realitygap.robots import Command
 
+    if not 0 <= seconds <= LONGEST_DRIVE_S:
+        raise RobotError(f"--seconds is {seconds:g}, expected 0 to {LONGEST_DRIVE_S:g}.")
     with _opened(port, record) as opened:
         opened.step_s = seconds
         opened.drive(Command(move, turn))

@@ -9,12 +9,13 @@ from ._port import EmulatedPort, EmulatorClock, register
 from ._scene import Lamp, Scene
 from ._scene_file import open_scene
 from ._serve import Server, serve_pty, serve_tcp
-from ._simulated import BoxOnWheels, SimulatedRobot
+from ._simulated import SCRIBBLER_BODY, BoxOnWheels, SimulatedRobot
 from ._witness import DirectWitness, RemoteWitness, Witness, connect_witness
 
 register()
 
 __all__ = [
+    "SCRIBBLER_BODY",
     "BoxOnWheels",
     "DirectWitness",
     "EmulatedPort",

@@ -97,6 +97,7 @@ class Emulator:
         self.battery = Battery(self.faults.sag)
         self.table = Table(body, motors, self.battery, arena)
         self.senses = Senses(body, self.scene, seed)
+        self.fluke: Fluke | None = None
         to_client = self._from_robot if self.fluke_model == "none" else self._through_fluke
         self.robot = Scribbler(
             self.model,
@@ -107,7 +108,6 @@ class Emulator:
             to_client,
             timing=self.timing,
         )
-        self.fluke: Fluke | None = None
         if self.fluke_model != "none":
             camera = Camera(body, self.scene, self.fluke_model)
             self.fluke = Fluke(

@@ -33,7 +33,7 @@ IR_NS = {"1": 5 * MILLISECOND, "2": 40 * MILLISECOND}  # of a reading; the first
 PICTURE_NS = 66 * MILLISECOND  # to take a picture; chosen
 VOLTS = 20.9813  # units of the battery's reading in a volt
 LOG_BYTES = 10_000  # of the Fluke 2's log of errors
-MESSAGE_BYTES = 255
+MOST_HELD = 1 << 16  # bytes that wait while it works; more are lost
 SIZES = {213: (1280, 800), 71: (427, 266)}
 EMITTERS = {
     Op.GET_DONGLE_IR_LEFT: "left",
@@ -127,10 +127,10 @@ class Fluke:
 
     def receive(self, byte: int, at: int) -> None:
         """Take a byte that has arrived at a time; while the board works, it waits."""
-        if self._busy or self._waiting:
-            self._held.append((byte, at))
-        else:
+        if not (self._busy or self._waiting):
             self._take(byte, at)
+        elif len(self._held) < MOST_HELD:
+            self._held.append((byte, at))
 
     def _go_on(self, now: int) -> None:
         """Take what had to wait, until there is work again."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ class Memory:
         file: Where it is kept; in memory only when not given.
 
     Raises:
-        RobotError: The file is there and cannot be read.
+        RobotError: The file is there and cannot be read, or cannot be written.
     """
 
     def __init__(self, model: str, file: Path | None = None) -> None:
@@ -46,6 +47,7 @@ class Memory:
         self._file = file
         if file is not None and file.exists():
             self._load(file)
+        self._write()  # a file that cannot be kept is better known now than when a client sets something
 
     def read_page(self, page: int, offset: int) -> int:
         """A byte of the serial memory; addresses beyond its end begin anew."""
@@ -73,11 +75,13 @@ class Memory:
             self.save()
 
     def save(self) -> None:
-        """Write the file, if there is one.
+        """Write the file, if there is one; a robot whose file cannot be written any more lives on, with a warning."""
+        try:
+            self._write()
+        except RobotError as error:
+            warnings.warn(f"{error} It will be forgotten with this emulator.", stacklevel=2)
 
-        Raises:
-            RobotError: It cannot be written.
-        """
+    def _write(self) -> None:
         if self._file is None:
             return
         try:
@@ -103,7 +107,11 @@ class Memory:
 
     def _load(self, file: Path) -> None:
         try:
-            values = json.loads(file.read_text(encoding="utf-8"))
+            text = file.read_text(encoding="utf-8", errors="replace")
+        except OSError as error:
+            raise RobotError(f"{file}: the robot's memory cannot be read ({error.strerror}).") from error
+        try:
+            values = json.loads(text)
             self.name[:] = _bytes(values["name"], 16)
             self.password[:] = _bytes(values["password"], 16)
             self.data[:] = _bytes(values["data"], 8)
@@ -112,7 +120,7 @@ class Memory:
             )
             for page, data in values["pages"].items():
                 self.pages[int(page) % PAGES] = bytearray(_bytes(data, PAGE_BYTES))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise RobotError(
                 f"{file} is not the memory of an emulated robot ({type(error).__name__}: {error}). Remove it to begin "
                 "with a new robot."

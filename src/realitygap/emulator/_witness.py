@@ -115,7 +115,7 @@ def answer_witness(witness: Witness, line: bytes) -> bytes:
     try:
         request = json.loads(line)
         result = _do(witness, request["do"], request)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         reply: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
     else:
         reply = {"result": result}

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import io
 import json
+import math
 import random
 import runpy
 import sys
@@ -30,6 +31,9 @@ _EXAMPLE = """example:
 _GIVEN = ("myro", "Myro", "graphics", "Graphics")
 """The names of modules under which programs of the courses know these functions."""
 
+_SIGNAL = 128
+"""A status above it says that a signal ended the program; then nothing else is run."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a program; returns 0 when it ended by itself, or as the limit says, on every seed."""
@@ -37,8 +41,14 @@ def main(arguments: list[str] | None = None) -> int:
     if not options.program.is_file():
         print(f"There is no program {str(options.program)!r}.", file=sys.stderr)
         return 2
-    if options.seeds is None:
-        return _once(options)
+    try:
+        return _once(options) if options.seeds is None else _each_seed(options)
+    except KeyboardInterrupt:
+        print("Stopped by Ctrl-C, the program and the robot.", file=sys.stderr)
+        return 130
+
+
+def _each_seed(options: argparse.Namespace) -> int:
     rows = [_graded(options, seed) for seed in options.seeds]
     print(json.dumps(rows, indent=2) if options.json else _table(rows))
     return 0 if all(row["error"] is None for row in rows) else 1
@@ -58,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seeds", type=_seeds, help="run it on a simulated robot once for each seed, as 1-10 or 1,5,7"
     )
-    parser.add_argument("--limit", type=float, help="stop it after so many seconds on the robot's clock")
+    parser.add_argument("--limit", type=_duration, help="stop it after so many seconds on the robot's clock")
     parser.add_argument("--json", action="store_true", help="with --seeds: print the results as JSON")
     return parser
 
@@ -66,11 +76,24 @@ def _parser() -> argparse.ArgumentParser:
 def _seeds(text: str) -> list[int]:
     try:
         ranges = [part.partition("-") for part in text.split(",")]
-        return [
+        seeds = [
             seed for low, dash, high in ranges for seed in range(int(low), int(high if dash else low) + 1)
         ]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}, expected seeds as 1-10 or 1,5,7") from None
+        seeds = []
+    if not seeds:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected seeds as 1-10 or 1,5,7")
+    return seeds
+
+
+def _duration(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not 0 < seconds < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected seconds, more than 0")
+    return seconds
 
 
 def _once(options: argparse.Namespace) -> int:
@@ -116,8 +139,8 @@ def _run(program: Path, limit: float | None) -> str | None:
             runpy.run_path(str(program), run_name="__main__")
         except TimeUp:
             return None
-        except SystemExit:
-            return None
+        except SystemExit as end:
+            return _said_at_exit(end)
         except RealityGapError as error:
             return explanation(error, error.__traceback__)
         except Exception as error:
@@ -125,6 +148,15 @@ def _run(program: Path, limit: float | None) -> str | None:
         finally:
             _end()
     return None
+
+
+def _said_at_exit(end: SystemExit) -> str | None:
+    """Why a program ended itself, as text; None where all was well."""
+    if end.code is None or end.code == 0:
+        return None
+    if isinstance(end.code, int) and end.code > _SIGNAL:
+        raise end
+    return f"The program ended itself: {end.code}"
 
 
 def _end() -> None:

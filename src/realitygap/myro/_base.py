@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from realitygap.robots import Clock
@@ -25,6 +27,30 @@ class TimeUp(BaseException):
     """The time that a program was given is over; no program catches it by mistake."""
 
 
+class Part(threading.Thread):
+    """A function of a program that runs beside others.
+
+    Attributes:
+        result: What it returned.
+        error: What it raised.
+        is_over: Whether it may no longer speak to a robot.
+    """
+
+    def __init__(self, function: Callable[[], Any]) -> None:
+        super().__init__(daemon=True)
+        self._function = function
+        self.result: Any = None
+        self.error: BaseException | None = None
+        self.is_over = False
+
+    def run(self) -> None:
+        """Run the function."""
+        try:
+            self.result = self._function()
+        except BaseException as error:
+            self.error = error
+
+
 class Base:
     """A robot and its clock.
 
@@ -44,9 +70,10 @@ class Base:
         """The robot's driver, to say something to the robot.
 
         Raises:
-            TimeUp: The program's time is over.
+            TimeUp: The time of the program, or of this part of it, is over.
         """
-        if self.deadline is not None and self.clock.now() >= self.deadline:
+        is_late = self.deadline is not None and self.clock.now() >= self.deadline
+        if is_late or getattr(threading.current_thread(), "is_over", False):
             raise TimeUp
         if self.simulation is not None:
             self.simulation.look()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import linecache
+import math
 import numbers
 import sys
 import traceback
@@ -38,7 +39,11 @@ def number(name: str, value: object, least: float | None = None, most: float | N
     if not isinstance(value, numbers.Real):
         raise MyroError(f"{name} is {value!r}, expected a number.{_hint(value)}")
     result = float(value)
-    if result != result or (least is not None and result < least) or (most is not None and result > most):
+    if (
+        not math.isfinite(result)
+        or (least is not None and result < least)
+        or (most is not None and result > most)
+    ):
         above = "" if least is None else f" from {least:g}" if most is not None else f" of at least {least:g}"
         below = "" if most is None else f" to {most:g}" if least is not None else f" of at most {most:g}"
         raise MyroError(f"{name} is {value!r}, expected a number{above}{below}.")

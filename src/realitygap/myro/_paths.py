@@ -127,4 +127,5 @@ def _far(name: str, value: object) -> int:
 
 def _degrees(name: str, angle: object, unit: object) -> int:
     per_unit = choice(f"{name}: the unit", unit, _ANGLES)
-    return round(number(f"{name}: the angle", angle) * per_unit)
+    most = _FURTHEST / per_unit
+    return round(number(f"{name}: the angle", angle, -most, most) * per_unit)

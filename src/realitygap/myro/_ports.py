@@ -8,7 +8,7 @@ from typing import Any
 
 from realitygap.errors import RobotError
 from realitygap.robots.scribbler import Scribbler as Driver
-from realitygap.robots.scribbler import find_ports
+from realitygap.robots.scribbler import find_ports, is_in_this_program
 
 from ._mistakes import MyroError
 from ._simulation import Simulation, is_simulation, parse_simulation
@@ -43,7 +43,7 @@ def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulatio
         raise MyroError(
             f'{", ".join(options)}: only a simulated robot has that, as initialize("sim", seed=3).'
         )
-    if name.startswith("emulator:"):
+    if is_in_this_program(name):
         import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
     try:
         return Driver(name), None

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from inspect import signature
 from typing import Any
 
 from . import _current
+from ._base import Part
 from ._mistakes import MyroError, whole
+from ._robot import stop_robot
+
+_GRACE_S = 0.2
+"""How long a function that has to end may take for what it has just begun to say to the robot."""
 
 
 def loop(*functions: Any) -> str:
@@ -54,8 +58,23 @@ def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
             f"doTogether() was given {len(functions)} values, expected two or more functions, without "
             "parentheses behind their names: doTogether(drive, sing)."
         )
-    with ThreadPoolExecutor(len(functions)) as pool:
-        results = [future.result() for future in [pool.submit(function) for function in functions]]
+    parts = [Part(function) for function in functions]
+    try:
+        for part in parts:
+            part.start()
+        for part in parts:
+            part.join()
+    except BaseException:  # Ctrl-C: nobody waits for functions that may never end
+        for part in parts:
+            part.is_over = True
+        for part in parts:
+            part.join(_GRACE_S)
+        stop_robot()
+        raise
+    for part in parts:
+        if part.error is not None:
+            raise part.error
+    results = [part.result for part in parts]
     return results if any(result is not None for result in results) else None
 
 

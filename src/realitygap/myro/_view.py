@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape
 from realitygap.errors import RealityGapError
-from realitygap.world import Body, Pose
+from realitygap.world import Pose
 
 from ._mistakes import choice, notebook_shell
 
 if TYPE_CHECKING:
     from ._simulation import Simulation
-
-BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0.089, 0.0795)))
-"""The robot's outline [m] around its pen."""
 
 _PERIOD_S = 0.1  # between two pictures
 _APART = 0.01  # [m] between points of the line that are drawn
@@ -134,6 +131,8 @@ def _screen(svg: str) -> Any:
 
 def to_svg(simulation: Simulation) -> str:
     """The arena, the line that the pen drew, and the robot, as SVG."""
+    from realitygap.emulator import SCRIBBLER_BODY
+
     arena, grid = simulation.arena, simulation.arena.grid
     left, bottom, right, top = _bounds(simulation)
     cell = grid.cell
@@ -155,7 +154,9 @@ def to_svg(simulation: Simulation) -> str:
     if len(line) > 1:
         shapes.append(Line(tuple(line), Ink.OURS, 1.4))
     pose = simulation.pose()
-    shapes.append(Line(tuple(_placed(pose, *corner) for corner in BODY.corners), Ink.BODY, 1.6, closed=True))
+    shapes.append(
+        Line(tuple(_placed(pose, *corner) for corner in SCRIBBLER_BODY.corners), Ink.BODY, 1.6, closed=True)
+    )
     nose = (_placed(pose, 0.06, 0.03), _placed(pose, 0.089, 0.0), _placed(pose, 0.06, -0.03))
     shapes += [Line(nose, Ink.BODY, 1.6), Disc(pose.x, pose.y, 2.4, fill=Ink.OURS)]
     seen = (

@@ -4,7 +4,7 @@ from ._bench import measure_speed
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._physical import PhysicalResult, PhysicalStudy
-from ._robot import connect_robot, is_in_this_program
+from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
 from ._task import measure_task, task_settings
@@ -24,7 +24,6 @@ __all__ = [
     "TrialsSection",
     "connect_robot",
     "drive_study",
-    "is_in_this_program",
     "load_study",
     "machine_facts",
     "measure_speed",

@@ -6,6 +6,7 @@ from importlib import import_module
 
 from realitygap.errors import StudyError
 from realitygap.robots import Robot, ScribblerPlatform
+from realitygap.robots.scribbler import is_in_this_program
 from realitygap.trials import Operator, WitnessOperator
 
 from ._physical import OpenRobot
@@ -38,11 +39,6 @@ def connect_robot(port: str) -> OpenRobot:
         return robot
 
     return open_robot
-
-
-def is_in_this_program(port: str) -> bool:
-    """Whether a port names an emulator that is to run in this program."""
-    return port.removeprefix("scribbler:").startswith("emulator:")
 
 
 def default_operator(port: str) -> Operator:

@@ -217,7 +217,7 @@ def light_words(answer: bytes) -> tuple[int, int, int]:
 
 
 def word(answer: bytes) -> int:
-    """Two bytes, high one first."""
+    """A whole number of one to three bytes, high one first."""
     return int.from_bytes(answer, "big")
 
 

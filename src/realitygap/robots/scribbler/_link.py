@@ -67,6 +67,7 @@ except ImportError:  # Windows
 
 _MOVING = frozenset((Op.SET_MOTORS, Op.PATH, Op.MOVE, Op.ARC, Op.TURN))
 _STEERING = _MOVING | {Op.SET_MOTORS_OFF}
+_BY_DISTANCE = _MOVING - {Op.SET_MOTORS}
 
 
 @dataclass
@@ -137,6 +138,13 @@ def open_port(name: str) -> Any:
     return port
 
 
+def is_serial_port(port: object) -> bool:
+    """Whether it is one of pyserial's, whose name says what is behind it."""
+    import serial
+
+    return isinstance(port, serial.SerialBase)
+
+
 def serial_devices() -> list[Any]:
     """The serial ports that the system knows of, as pyserial describes them."""
     from serial.tools import list_ports
@@ -168,6 +176,7 @@ class Link:
         has_robot, fluke: Who is there, known after `greet`.
         where: What the caller is at, for messages.
         motors_off: Whether the motors are known to be off; None before anything is known.
+        is_in_motion: Whether a motion of an S2 by distance may not have ended.
         tell: Is given each exchange, as it is over.
         watch: Is called before each command.
         spoken_s: When the last command was carried out, by the clock [s].
@@ -183,6 +192,7 @@ class Link:
         self.faults = Faults()
         self.where = ""
         self.motors_off: bool | None = None
+        self.is_in_motion = False
         self.tell: Callable[[Exchange], None] | None = None
         self.watch: Callable[[], None] | None = None
         self.spoken_s = self.clock.now()
@@ -218,14 +228,15 @@ class Link:
                 raise RobotError(f"{self.name} is closed: open the robot anew before '{request.name}'.")
             if self.watch is not None:
                 self.watch()
-            fault, lost = None, False
+            fault, lost, n_sent = None, False, 0
             for attempt in range(ATTEMPTS):
                 try:
                     if not self._in_step:
-                        self._find_step()
+                        self._find_step_for(request)
                     if attempt:
                         self.faults.retries += 1
                         self._move_on(request)
+                    n_sent += 1
                     return self._exchange(request, decode)
                 except _LostStep as happened:
                     fault, lost = happened.fault, True
@@ -234,7 +245,7 @@ class Link:
                     fault = happened
                     if not request.repeatable:
                         break
-            raise self._failure(request, fault, attempt + 1, lost=lost) from fault
+            raise self._failure(request, fault, n_sent, lost=lost) from fault
 
     def _exchange(self, request: Request, decode: Callable[[bytes], T]) -> T:
         """Send a command once; where what is due does not come, raise `Fault`."""
@@ -244,6 +255,7 @@ class Link:
         self._in_step, self._fault = False, None
         if request.data[0] in _MOVING:
             self.motors_off = False
+            self.is_in_motion = request.data[0] in _BY_DISTANCE
         got = b""
         try:
             try:
@@ -279,7 +291,7 @@ class Link:
         """Keep what the motors were told last."""
         standing = request.data[0] == Op.SET_MOTORS and request.data[1:3] == b"dd"  # 100, 100
         if request.data[0] == Op.SET_MOTORS_OFF or standing:
-            self.motors_off, self._motors = True, None
+            self.motors_off, self._motors, self.is_in_motion = True, None, False
         else:
             self._motors = request if request.data[0] == Op.SET_MOTORS else None
 
@@ -308,6 +320,18 @@ class Link:
         return n_bytes
 
     # --- finding the same step again --------------------------------------------------------------------------
+
+    def _find_step_for(self, request: Request) -> None:
+        """Make both sides agree before a command.
+
+        Raises:
+            _LostStep: in vain, or a motion by distance was cut short by it, which nobody would notice.
+        """
+        was_in_motion = self.is_in_motion
+        self._find_step()
+        if was_in_motion and request.data[0] not in _STEERING:
+            text = "The link was disturbed, and a motion that may not have ended was stopped"
+            raise _LostStep(Fault(text, RobotError))
 
     def _find_step(self) -> None:
         """Make both sides count from the same byte again; the motors are off afterwards.
@@ -506,7 +530,9 @@ class Link:
         state = "motors stopped" if self.motors_off else "the motors may be running: switch the robot off"
         details = [part for part in (self.where, f"sent {n_sent} times" if n_sent > 1 else "", state) if part]
         again = (
-            "" if request.repeatable else f" It is not safe to repeat '{request.name}': was it carried out?"
+            ""
+            if request.repeatable or not n_sent
+            else f" It is not safe to repeat '{request.name}': was it carried out?"
         )
         kind = fault.kind if fault is not None else RobotError
         return kind(

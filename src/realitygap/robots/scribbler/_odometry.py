@@ -21,8 +21,8 @@ MOTION_WAIT_S = 30.0
 """How long a motion may have to wait for the one before it [s]."""
 
 
-def _motion(name: str, op: Op, arguments: bytes, *, repeatable: bool = False) -> Request:
-    return robot_request(name, op, arguments, repeatable=repeatable, wait_s=MOTION_WAIT_S, may_stay_out=True)
+def _motion(name: str, op: Op, arguments: bytes) -> Request:
+    return robot_request(name, op, arguments, repeatable=False, wait_s=MOTION_WAIT_S, may_stay_out=True)
 
 
 def _shorts(**values: float) -> bytes:
@@ -47,7 +47,9 @@ class Odometry(Device):
 
     Position and heading are 0 as it is switched on: x ahead, heading counter-clockwise. `motors` does not change them.
     A motion returns when the robot has accepted it, not when it has arrived; `motor_stats` says whether it moves. A
-    relative motion whose answer is lost is an error and not repeated: it may have been carried out.
+    motion whose answer is lost is an error and not repeated, one to a place neither: an S2 takes itself to be there as
+    soon as it has been told, and would not move. So is a fault of the link before `motor_stats` says that a motion has
+    ended: finding the same step again stops it.
     """
 
     @property
@@ -96,7 +98,7 @@ class Odometry(Device):
     def _move(self, name: str, how: int, x: int, y: int, unit: Length) -> None:
         self.need_s2(name)
         arguments = _type(how, unit, "mm", "half-mm") + _shorts(x=x, y=y)
-        self._set_late(_motion(name, Op.MOVE, arguments, repeatable=how == TO))
+        self._set_late(_motion(name, Op.MOVE, arguments))
 
     def turn_to(self, angle: int, unit: Angle = "deg") -> None:
         """Turn on the spot to a heading, the shorter way round; in degrees or units of 1/955 turn."""
@@ -109,7 +111,7 @@ class Odometry(Device):
     def _turn(self, name: str, how: int, angle: int, unit: Angle) -> None:
         self.need_s2(name)
         arguments = _type(how, unit, "deg", "units") + _shorts(angle=angle)
-        self._set_late(_motion(name, Op.TURN, arguments, repeatable=how == TO))
+        self._set_late(_motion(name, Op.TURN, arguments))
 
     def arc_to(self, x: int, y: int, radius: int, unit: Length = "mm") -> None:
         """Drive to a place on an arc; a positive radius is counter-clockwise."""
@@ -138,4 +140,7 @@ class Odometry(Device):
     def motor_stats(self) -> MotorStats:
         """How the wheels turn right now."""
         self.need_s2("motor_stats")
-        return self._get(robot_request("motor_stats", Op.GET_MOTOR_STATS), codec.motor_stats)
+        stats = self._get(robot_request("motor_stats", Op.GET_MOTOR_STATS), codec.motor_stats)
+        if stats.ready:
+            self.link.is_in_motion = False
+        return stats

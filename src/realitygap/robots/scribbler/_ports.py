@@ -38,12 +38,20 @@ def port_name(name: str) -> str:
     return name.removeprefix("scribbler:")
 
 
+def is_in_this_program(name: str) -> bool:
+    """Whether a port is that of an emulator in this program, which pyserial knows once it was imported."""
+    return port_name(name).startswith("emulator:")
+
+
 def label_of(name: str) -> Label:
     """What figures say of a robot on this port: EMULATED where it cannot be one of flesh and wire."""
-    scheme, _, _ = name.partition(":")
+    name = port_name(name)
+    scheme, _, inner = name.partition("://")
     if scheme in ("emulator", "loop"):
         return "EMULATED"
-    if "://" in name:
+    if scheme in ("spy", "alt"):  # pyserial's ways to open another port
+        return label_of(inner.partition("?")[0])
+    if inner:
         return "EMULATED" if _is_loopback(name) else "REAL"
     return "EMULATED" if _PSEUDO_TERMINAL.match(str(Path(name).resolve())) else "REAL"
 

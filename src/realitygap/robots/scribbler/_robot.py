@@ -22,7 +22,7 @@ from ._device import RobotInfo
 from ._driving import Driving
 from ._exits import EXITS
 from ._identity import Identity
-from ._link import Link, open_port
+from ._link import Link, is_serial_port, open_port
 from ._odometry import Odometry
 from ._ports import label_of, port_name
 from ._senses import Senses
@@ -79,7 +79,7 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         name = (
             port_name(port) if isinstance(port, str) else str(getattr(port, "name", None) or "a given port")
         )
-        label = label_of(name) if isinstance(port, str) else "EMULATED"
+        label = label_of(name) if isinstance(port, str) or is_serial_port(port) else "EMULATED"
         self.link = Link(open_port(name) if isinstance(port, str) else port, name)
         self._recorder = None if record is None else self._record_into(record)
         EXITS.hold()
@@ -182,9 +182,11 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
 
     def stop(self) -> None:
         """Stop the motors; safe to call at any moment, and twice."""
-        if self._recorder is not None and self.link.is_open:
-            self._recorder.call("stop")
-        super().stop()
+        try:
+            if self._recorder is not None and self.link.is_open:
+                self._recorder.call("stop")
+        finally:  # also where the recording fails
+            super().stop()
 
     def close(self) -> None:
         """Stop the motors and let go of the port; safe to call twice.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 import weakref
 
-from realitygap.errors import RobotError
+from realitygap.errors import RecordError, RobotError
 from realitygap.robots._clock import Clock, SystemClock
 
 from . import _codec as codec
@@ -36,7 +35,8 @@ class Watchdog:
         self._excused_until = link.clock.now()
         self._is_stopping = False
         self._ended = threading.Event()
-        link.watch = self.look
+        self._unsaid: RecordError | None = None
+        link.watch = self._before_command
         if _passes_by_itself(link.clock):
             threading.Thread(target=_keep_looking, args=(weakref.ref(self), self._ended), daemon=True).start()
 
@@ -60,10 +60,22 @@ class Watchdog:
             self._is_stopping = True
             link.faults.watchdog_stops += 1
             try:
-                with contextlib.suppress(RobotError):  # whoever speaks next will hear of it
-                    link.ask(codec.STOP, codec.sensor_block)
+                link.ask(codec.STOP, codec.sensor_block)
+            except RobotError:
+                pass  # whoever speaks next will meet it too
+            except RecordError as error:
+                self._unsaid = error
             finally:
                 self._is_stopping = False
+
+    def _before_command(self) -> None:
+        """Look, and say that the recording failed while only the watchdog spoke."""
+        if self._is_stopping:
+            return
+        self.look()
+        unsaid, self._unsaid = self._unsaid, None
+        if unsaid is not None:
+            raise unsaid
 
     def end(self) -> None:
         """Look no more."""

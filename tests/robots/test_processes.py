@@ -123,3 +123,9 @@ def test_two_programs_on_one_port_are_told_apart_by_an_error(server):
 def test_a_port_that_cannot_be_opened_is_one_message_with_advice(port, message):
     with pytest.raises(RobotError, match=message):
         Scribbler(port)
+
+
+def test_a_program_that_does_not_know_the_emulator_is_told_what_to_import():
+    code = "from realitygap.robots.scribbler import Scribbler; Scribbler('emulator://s2')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "`import realitygap.emulator` makes such ports known" in done.stderr

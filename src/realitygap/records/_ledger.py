@@ -161,7 +161,6 @@ class Ledger:
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection = connection
-        self._depth = 0
 
     @classmethod
     def create(cls, path: str | Path) -> Self:
@@ -262,6 +261,13 @@ class Ledger:
             for row in rows
         ]
 
+    def robots(self) -> list[dict[str, str]]:
+        """What each robot that drove a trial was told by, every one once, oldest first."""
+        rows = self._all(
+            "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
+        )
+        return [json.loads(text) for text in dict.fromkeys(row["robot"] for row in rows)]
+
     # generations
 
     def plan(self, generations: Sequence[Generation], turns: Sequence[Turn]) -> None:
@@ -308,11 +314,19 @@ class Ledger:
         generation: int,
         fitness: Sequence[float],
         novelty: Sequence[float | None],
+        *,
+        cells: Sequence[Sequence[int]] | None = None,
     ) -> None:
         """Freeze the scores of a generation, with what selection made of them.
 
+        Args:
+            condition, replicate, generation: which.
+            fitness: (n,) in the order of individuals.
+            novelty: (n,) likewise; None where selection is something else.
+            cells: of which fitness and novelty were made; somebody may have entered others meanwhile.
+
         Raises:
-            LedgerError: a trial of it is not scored, or it is closed.
+            LedgerError: a trial of it is not scored, or scored otherwise, or it is closed.
         """
         run = (condition, replicate, generation)
         with self._writing():
@@ -322,6 +336,16 @@ class Ledger:
                 raise LedgerError(
                     f"Generation {generation} of {condition!r}, run {replicate}, cannot be closed: individuals "
                     f"{unscored} are not scored."
+                )
+            others = [
+                each.trial
+                for each in trials
+                if cells is not None and each.cells != tuple(cells[each.individual])
+            ]
+            if others:
+                raise LedgerError(
+                    f"Other cells of trials {others} were entered while the generation was being closed; it stays "
+                    "open, and all that was entered is kept. Run the same command again."
                 )
             changed = self._count(
                 "UPDATE generations SET closed = ? WHERE condition = ? AND replicate = ? AND generation = ? AND "
@@ -420,8 +444,13 @@ class Ledger:
 
     def score(self, number: int, score: Score, role: ScoreRole = "score") -> None:
         """Enter cells: what selection counts, what a second person counts, or a correction once that is frozen."""
+        self.score_all({number: score}, role)
+
+    def score_all(self, scores: Mapping[int, Score], role: ScoreRole = "score") -> None:
+        """Enter the cells of several trials, by their numbers: all of them, or none where one is refused."""
         with self._writing():
-            self._score(number, score, role)
+            for number, score in scores.items():
+                self._score(number, score, role)
 
     def undo(self, number: int) -> None:
         """Take back the score of a trial whose generation is not closed, so that it can be entered anew."""
@@ -592,6 +621,11 @@ class Ledger:
                 raise LedgerError(
                     f"The generation of trial {number} is not closed yet: take its score back (undo) and enter it anew."
                 )
+            if role == "second" and score.who in self._counters(number):
+                raise LedgerError(
+                    f"{score.who!r} has counted the cells of trial {number} already, and a second count is another "
+                    "person's. Say who that is (--who NAME). Nothing was entered."
+                )
         self._run(
             "INSERT INTO scores (trial, cells, n_ends, path, role, who, time) VALUES (?, ?, ?, ?, ?, ?, ?)",
             *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
@@ -600,6 +634,13 @@ class Ledger:
         self._note_event(
             number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)}
         )
+
+    def _counters(self, number: int) -> set[str]:
+        """Who entered the score that counts."""
+        rows = self._all(
+            "SELECT who FROM scores WHERE trial = ? AND role = 'score' AND undone IS NULL", number
+        )
+        return {row["who"] for row in rows}
 
     def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
         """Cells of a trial, each at most once, all within its grid, and at least the one it starts in."""

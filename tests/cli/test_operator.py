@@ -243,7 +243,7 @@ def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path,
     assert second.returncode == 0, second.stderr
     agreement = no_terminal("trials", "agreement", str(out))
     assert (
-        "1 trials counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
+        "1 trial counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
         in agreement.stdout
     )
     assert no_terminal(*run).returncode == 0

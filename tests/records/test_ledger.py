@@ -225,10 +225,17 @@ def test_what_cannot_be_done_changes_nothing(ledger, do, said):
     assert (ledger.trials(), ledger.events()) == before
 
 
-def test_the_label_is_that_of_the_first_sitting(ledger):
-    sit(ledger)
-    with pytest.raises(LedgerError, match="never mixed"):
-        sit(ledger, "REAL")
+def test_the_label_is_that_of_the_first_trial(ledger):
+    emulated, real = sit(ledger), sit(ledger, "REAL")
+    assert ledger.conditions()["a"]["label"] is None, "nothing was driven yet"
+    ledger.start(1, real)
+    assert ledger.conditions()["a"]["label"] == "REAL"
+    for mixing in (lambda: sit(ledger), lambda: ledger.start(2, emulated)):
+        with pytest.raises(
+            LedgerError, match="are REAL, and this robot's would be EMULATED; the two are never mixed"
+        ):
+            mixing()
+    assert ledger.trial(2).state == "planned"
 
 
 # --- files --------------------------------------------------------------------------------------------------

@@ -310,6 +310,26 @@ def test_shuffled_blocks_mix_conditions_and_change_no_result(tmp_path):
     assert [pen for _, pen, *_ in titles[:6]] == ["red", "blue", "green", "black", "red", "blue"]
 
 
+def test_pens_stay_while_a_sheet_is_begun(tmp_path):
+    with pytest.raises(RobotError):
+        drive(small_study(), tmp_path / "r", operator=Blind())
+    fewer = small_study(more='[trials]\npens = ["red", "blue"]\n')
+    with pytest.raises(StudyError, match="names 2 pens, and a sheet that is begun needs 3"):
+        drive(fewer, tmp_path / "r")
+    drive(small_study(), tmp_path / "r")
+    assert (
+        drive(
+            small_study(more='[trials]\npens = ["red", "blue"]\n', replicates="2"), tmp_path / "r"
+        ).n_complete
+        == 2
+    )
+
+
+def test_two_pens_of_a_color_are_refused():
+    with pytest.raises(StudyError, match=r"trials\.pens.*'red' stands there twice"):
+        small_study(more='[trials]\npens = ["red", "blue", "red"]\n')
+
+
 def test_replicates_extend_a_physical_study(tmp_path):
     drive(small_study(), tmp_path / "r")
     before = scored(tmp_path / "r")

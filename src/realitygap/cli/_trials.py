@@ -190,7 +190,7 @@ def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> I
         seconded = {row["trial"] for row in ledger.scores() if row["role"] == role and row["undone"] is None}
         states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
         waiting = [each for each in ledger.trials(states=states) if each.trial not in seconded]
-    shows = _titles(folder)
+    shows = _Titles(folder)
     for each in waiting:
         typer.echo(
             f"\nTrial {each.trial}, {each.code if shows.blind else each.name}, sheet {each.sheet}, {shows.pen(each)}"
@@ -201,7 +201,7 @@ def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> I
         yield {each.trial: cells}
 
 
-class _titles:  # noqa: N801 - a few words on how trials of a folder are shown
+class _Titles:
     """How the trials of a folder are shown."""
 
     def __init__(self, folder: Path) -> None:
@@ -225,10 +225,10 @@ class _titles:  # noqa: N801 - a few words on how trials of a folder are shown
 def _list(ledger: Ledger, *, as_json: bool) -> None:
     found = ledger.trials()
     if as_json:
-        hidden = {"condition", "replicate", "generation", "individual"} if _is_blind(ledger) else set()
+        blinded = {"condition", "replicate", "generation", "individual"} if _is_blind(ledger) else set()
         rows = [
             {
-                name: None if name in hidden and not each.is_closed else value
+                name: None if name in blinded and not each.is_closed else value
                 for name, value in vars(each).items()
             }
             | {"notes": [note["text"] for note in ledger.notes(each.trial)]}
@@ -262,7 +262,7 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
 
 def _is_blind(ledger: Ledger) -> bool:
     path = ledger.path.parent / "study.json"
-    return path.exists() and _titles(ledger.path.parent).blind
+    return path.exists() and _Titles(ledger.path.parent).blind
 
 
 def _agreement(folder: Path, *, as_json: bool) -> None:

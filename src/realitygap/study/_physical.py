@@ -120,6 +120,7 @@ class PhysicalStudy:
             return ""
         for each in open_ones:
             self._check_planned(*each)
+        self._check_pens(open_ones)
         while True:
             if waiting := self._drive_and_enter(open_ones):
                 return waiting
@@ -181,6 +182,15 @@ class PhysicalStudy:
         rows = self._ledger.individuals(condition.name, replicate, generation)
         if [row["genome"] for row in rows] != [asked.record for asked in evolution.ask()]:
             raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
+
+    def _check_pens(self, generations: Sequence[tuple[Condition, int, int]]) -> None:
+        """Refuse fewer pens than the sheets of these generations were planned for: two lines would look alike."""
+        needed = 1 + max(trial.pen for trial in self._trials(generations))
+        if needed > len(self._study.trials.pens):
+            raise StudyError(
+                f"trials.pens names {len(self._study.trials.pens)} pens, and a sheet that is begun needs {needed}. "
+                "Give as many until its generation is closed."
+            )
 
     def _is_closed(self, condition: Condition, replicate: int, generation: int) -> bool:
         return (generation, True) in self._ledger.generations(condition.name, replicate)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
 import os
+import re
 import select
 import signal
 import subprocess
@@ -86,6 +88,10 @@ class Terminal:
         """What Ctrl-C does."""
         self._process.send_signal(signal.SIGINT)
 
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait(PATIENCE_S)
+
     def end(self) -> int:
         while self._read():
             pass
@@ -160,6 +166,39 @@ def test_a_key_aborts_a_trial_and_the_operator_says_what_becomes_of_it(tmp_path,
         assert states == [(0, 0, "void"), (0, 1, "planned"), (1, 0, "planned")]
 
 
+@pty_only
+@pytest.mark.parametrize("when", ["trial", "sheet"])
+def test_a_line_that_was_entered_is_kept_when_the_program_is_killed_at_the_next(tmp_path, study, when):
+    out = tmp_path / "out"
+    run = ("run", str(study), "--port", "real", "--out", str(out), "--no-wait", "--score", when)
+    terminal = Terminal(*run)
+    terminal.answer("Escape: later", "dl\r")
+    terminal.wait_for("Escape: later")
+    terminal.kill()
+    with Ledger.open(out / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["scored", "driven"]
+        assert len(ledger.steps(2)) == 3
+    again = Terminal(*run)
+    again.answer("Escape: later", "dll\r")
+    again.answer("Enter closes it", "\n")
+    assert again.end() == 0
+    assert "was cut off" not in again.seen
+    assert again.seen.count("Escape: later") == 1, "what was scored is not asked again"
+
+
+@pty_only
+def test_lines_picked_one_after_the_other_are_kept_one_by_one(driven):
+    terminal = Terminal("trials", "score", str(driven), "--who", "anna")
+    terminal.answer("Escape: later", "dl\r")
+    terminal.wait_for("Trial 1: 2 cells")
+    terminal.wait_for("Escape: later")
+    terminal.interrupt()
+    terminal.end()
+    assert "Traceback" not in terminal.seen
+    with Ledger.open(driven / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["scored", "driven"]
+
+
 @dataclass
 class Done:
     returncode: int
@@ -204,7 +243,7 @@ def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path,
     assert second.returncode == 0, second.stderr
     agreement = no_terminal("trials", "agreement", str(out))
     assert (
-        "1 trials counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
+        "1 trial counted by two people, 72 cells: 98.6 % judged alike. Cohen's kappa 0.793"
         in agreement.stdout
     )
     assert no_terminal(*run).returncode == 0
@@ -234,6 +273,13 @@ def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path,
         (("note", "--text", " "), "A note without a word was not taken"),
         (("lst",), "Did you mean 'list'?"),
         (("agreement",), "no trial was counted by two people yet"),
+        (
+            ("score", "1", "--cells", "1", "--second", "--correct"),
+            "--second and --correct exclude each other",
+        ),
+        (("list", "--cells", "1"), "go with score, not with list"),
+        (("score", "1", "--file", "none.txt"), "--file names its trials itself"),
+        (("score", "--file", "none.txt"), "none.txt cannot be read"),
     ],
 )
 def test_wrong_input_gets_one_clear_message(driven, arguments, said, no_terminal):
@@ -242,6 +288,91 @@ def test_wrong_input_gets_one_clear_message(driven, arguments, said, no_terminal
     assert done.returncode == 1
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_file_of_cells_is_entered_as_a_whole_or_not_at_all(driven, tmp_path, no_terminal):
+    """Else its first lines were entered, and the file put right would be refused for them."""
+    sheet = tmp_path / "sheet.txt"
+    sheet.write_text("1: 13 14\n2: 13 99\n")
+    refused = no_terminal("trials", "score", str(driven), "--file", str(sheet))
+    assert refused.returncode == 1
+    assert "Cell 99 is outside the grid" in refused.stderr
+    assert refused.stdout == ""
+    sheet.write_text("1: 13 14\n2: 13 9\n")
+    assert no_terminal("trials", "score", str(driven), "--file", str(sheet)).returncode == 0
+
+
+def test_a_second_count_is_another_persons(driven, no_terminal):
+    for options in (("--who", "anna"), ("--who", "ben", "--second")):
+        done = no_terminal("trials", "score", str(driven), "1", "--cells", "13", *options)
+        assert done.returncode == 0, done.stderr
+    again = no_terminal("trials", "score", str(driven), "1", "--cells", "13", "--who", "anna", "--second")
+    assert again.returncode == 1
+    assert "'anna' has counted the cells of trial 1 already" in again.stderr
+
+
+def test_blind_trials_are_listed_without_their_conditions(tmp_path, study, no_terminal):
+    study.write_text(study.read_text().replace("[trials]", "[trials]\nblind = true"))
+    out = tmp_path / "out"
+    no_terminal("run", str(study), "--port", "real", "--out", str(out), "--no-wait")
+    rows = json.loads(no_terminal("trials", "list", str(out), "--json").stdout)
+    assert [row["condition"] for row in rows] == [None, None]
+    assert "robot" not in no_terminal("trials", "list", str(out)).stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--no-wait",), "--who go with --port"),
+        (("--witness", "127.0.0.1:1"), "--who go with --port"),
+        (("--port", "real", "--in-flight", "maybe"), "--in-flight is 'maybe', expected void or driven"),
+        (("--port", "real", "--score", "never"), "--score is 'never', expected trial, sheet or later"),
+    ],
+)
+def test_wrong_options_of_a_run_are_refused_before_anything_is_done(
+    tmp_path, study, no_terminal, options, said
+):
+    out = tmp_path / "out"
+    done = no_terminal("run", str(study), "--out", str(out), *options)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert not out.exists()
+
+
+def test_a_port_without_a_condition_for_it_is_refused_before_anything_is_computed(tmp_path, no_terminal):
+    done = no_terminal("run", "paper", "--out", str(tmp_path / "out"), "--port", "real")
+    assert done.returncode == 1
+    assert "study 'paper' has no condition with platform 'scribbler'" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_person_is_not_spoken_to_where_the_json_goes(tmp_path, study, no_terminal):
+    done = no_terminal(
+        "run", str(study), "--out", str(tmp_path / "out"), "--port", "real", "--no-wait", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["physical"]["n_driven"] == 2
+    assert "pen: red" in done.stderr
+
+
+def test_an_unattended_run_tells_of_each_generation(tmp_path, study, monkeypatch, capsys):
+    def run(*options):
+        monkeypatch.setattr(
+            sys,
+            "argv",
+            ["realitygap", "run", str(study), "--port", "emulator://s2?fluke=1&speed=off", *options],
+        )
+        with pytest.raises(SystemExit) as ended:
+            main()
+        assert not ended.value.code
+        return capsys.readouterr()
+
+    told = run("--out", str(tmp_path / "told"))
+    assert re.search(r"^robot, run 0, generation 0: 2 trials, at most \d+ cells\.$", told.err, re.MULTILINE)
+    quiet = run("--out", str(tmp_path / "quiet"), "--json")
+    assert quiet.err == "1 of 1 runs on a robot are complete. 2 trials were driven just now.\n"
+    monkeypatch.setattr("realitygap.cli._telling._SILENCE_S", 0.0)
+    assert "Trial 2, robot, run 0, generation 0, individual 1: " in run("--out", str(tmp_path / "slow")).err
 
 
 @pytest.fixture

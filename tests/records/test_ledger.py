@@ -127,6 +127,43 @@ def test_closing_freezes_the_scores(ledger):
     assert frame["connections"].to_list() == [1, 1]
 
 
+def test_closing_refuses_fitness_of_other_cells(ledger):
+    for number in (1, 2):
+        drive(ledger, number)
+    with pytest.raises(LedgerError, match=r"Other cells of trials \[2\]"):
+        ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None], cells=[[13, 14], [13]])
+    assert ledger.generations("a", 0) == [(0, False)]
+    ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None], cells=[[13, 14], [13, 14]])
+
+
+def test_scores_of_a_sheet_are_entered_together_or_not_at_all(ledger):
+    for number in (1, 2):
+        ledger.start(number, sit(ledger))
+        ledger.finish(number, "step limit", [STEP], stalls=0)
+    with pytest.raises(LedgerError, match="Cell 72 is outside"):
+        ledger.score_all({1: Score([1], "anna"), 2: Score([72], "anna")})
+    assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
+    ledger.score_all({1: Score([1], "anna"), 2: Score([71], "anna")})
+    assert [trial.cells for trial in ledger.trials()] == [(1,), (71,)]
+
+
+def test_nobody_is_their_own_second_counter(ledger):
+    drive(ledger, 1)
+    with pytest.raises(LedgerError, match="'witness' has counted the cells of trial 1 already"):
+        ledger.score(1, Score([1], "witness"), "second")
+    ledger.score(1, Score([1], "ben"), "second")
+    ledger.undo(1)
+    ledger.score(1, Score([1, 2], "anna"))
+    ledger.score(1, Score([1], "witness"), "second")
+
+
+def test_the_robots_are_those_that_drove(ledger):
+    ledger.start(1, sit(ledger))
+    ledger.begin_sitting("EMULATED", "port", {"name": "Idle"}, {}, ["a"])
+    ledger.start(2, ledger.begin_sitting("EMULATED", "port", {"name": "Other"}, {}, ["a"]))
+    assert ledger.robots() == [{"name": "Fake"}, {"name": "Other"}]
+
+
 def test_a_generation_with_an_unscored_trial_is_not_closed(ledger):
     drive(ledger, 1)
     with pytest.raises(LedgerError, match=r"individuals \[1\] are not scored"):
@@ -188,10 +225,17 @@ def test_what_cannot_be_done_changes_nothing(ledger, do, said):
     assert (ledger.trials(), ledger.events()) == before
 
 
-def test_the_label_is_that_of_the_first_sitting(ledger):
-    sit(ledger)
-    with pytest.raises(LedgerError, match="never mixed"):
-        sit(ledger, "REAL")
+def test_the_label_is_that_of_the_first_trial(ledger):
+    emulated, real = sit(ledger), sit(ledger, "REAL")
+    assert ledger.conditions()["a"]["label"] is None, "nothing was driven yet"
+    ledger.start(1, real)
+    assert ledger.conditions()["a"]["label"] == "REAL"
+    for mixing in (lambda: sit(ledger), lambda: ledger.start(2, emulated)):
+        with pytest.raises(
+            LedgerError, match="are REAL, and this robot's would be EMULATED; the two are never mixed"
+        ):
+            mixing()
+    assert ledger.trial(2).state == "planned"
 
 
 # --- files --------------------------------------------------------------------------------------------------

@@ -91,9 +91,11 @@ def test_the_report_shows_the_robots_arm_beside_the_simulated_ones(folder, tmp_p
     assert "driven over the robot’s own protocol, with a simulated robot behind it" in page
     for figure in ("figure-4", "figure-5", "figure-8"):
         assert f'id="{figure}"' in page
-    assert "The paths are what the emulator’s witness saw" in page
-    assert "driven by a robot, and cannot be computed again" in page
-    assert "Figure 2 is missing" not in page
+    for figure, condition in (("5", "robot"), ("8", "searching")):
+        drawn = page.partition(f'id="figure-{figure}"')[2].partition("</figure>")[0]
+        assert f"Condition {condition}, run 0" in drawn, (
+            "as in the paper, whose Figures 5 and 8 the robot drew"
+        )
 
 
 def test_figures_of_a_robots_arm(folder):

@@ -4,7 +4,7 @@ import polars as pl
 import pytest
 
 from realitygap.errors import LedgerError, RobotError, StudyError
-from realitygap.records import LEDGER_NAME, SCHEMA, Ledger, ResultsFolder
+from realitygap.records import LEDGER_NAME, SCHEMA, Ledger, ResultsFolder, Score
 from realitygap.runs import _evolution as evolution
 from realitygap.study import load_study, run_study
 from realitygap.trials import WitnessOperator
@@ -89,14 +89,136 @@ def test_emulated_and_real_trials_are_not_mixed(tmp_path):
     real = FakeRobot()
     real.label = "REAL"
     with pytest.raises(LedgerError, match="are EMULATED, and this robot's would be REAL"):
-        drive(small_study(replicates="2"), tmp_path / "r", robot=real)
+        drive(small_study(replicates="2"), tmp_path / "r", robot=real, operator=Anybody())
     assert not real.is_open
+
+
+class Anybody(WitnessOperator):
+    """Takes any robot, whatever is found."""
+
+    def meet(self, robot):
+        self._witness = robot
+
+    def accept(self, preflight):
+        return True
+
+
+def test_a_witness_does_not_score_what_counts_as_real(tmp_path):
+    real = FakeRobot()
+    real.label = "REAL"
+    with pytest.raises(RobotError, match="counts as REAL, and a witness sees an emulated one"):
+        drive(small_study(), tmp_path / "r", robot=real)
+    assert not real.is_open
+    with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
+        assert ledger.sittings() == []
 
 
 def test_another_robot_is_noticed(tmp_path):
     drive(small_study(), tmp_path / "r")
     with pytest.raises(StudyError, match="another robot than before: name is 'Other', before 'Fake'"):
         drive(small_study(replicates="2"), tmp_path / "r", robot=FakeRobot(name="Other"))
+
+
+def test_a_robot_that_was_accepted_once_is_still_another(tmp_path):
+    drive(small_study(), tmp_path / "r")
+    drive(small_study(replicates="2"), tmp_path / "r", robot=FakeRobot(name="Other"), operator=Anybody())
+    for name, before in (("Other", "Fake"), ("Fake", "Other")):
+        with pytest.raises(StudyError, match=f"name is '{name}', before '{before}'"):
+            drive(small_study(replicates="3"), tmp_path / "r", robot=FakeRobot(name=name))
+
+
+class Meanwhile(WitnessOperator):
+    """Somebody else writes to the ledger while the operator is asked whether to close a generation."""
+
+    def __init__(self, path, do):
+        super().__init__()
+        self._path = path
+        self._do = do
+        self.n_asked = 0
+
+    def close(self, cards):
+        self.n_asked += 1
+        if self.n_asked == 1:
+            with Ledger.open(self._path / LEDGER_NAME) as ledger:
+                self._do(ledger)
+        return super().close(cards)
+
+
+def test_a_trial_void_while_the_generation_is_closed_is_driven_again(tmp_path):
+    path = tmp_path / "r"
+    operator = Meanwhile(path, lambda ledger: ledger.void(2, "the paper had slipped"))
+    result = drive(small_study(), path, operator=operator)
+    assert (result.n_complete, result.n_driven, operator.n_asked) == (1, 7, 3)
+    drive(small_study(), tmp_path / "whole")
+    assert scored(path) == scored(tmp_path / "whole")
+
+
+def test_a_score_taken_back_while_the_generation_is_closed_is_waited_for(tmp_path):
+    path = tmp_path / "r"
+    result = drive(small_study(), path, operator=Meanwhile(path, lambda ledger: ledger.undo(2)))
+    assert "1 driven trials wait for their scores" in result.waiting
+    with Ledger.open(path / LEDGER_NAME) as ledger:
+        ledger.score(2, Score([13, 14], "anna"))
+    assert drive(small_study(), path).n_complete == 1
+    assert scored(path)[1][-1] == [13, 14]
+
+
+def test_cells_entered_while_the_generation_is_closed_do_not_breed_what_they_were_not_asked_for(
+    tmp_path, monkeypatch
+):
+    """Else fitness and frozen cells would differ, and the study could never be gone on with."""
+    path = tmp_path / "r"
+    tell = evolution.Evolution.tell
+
+    def told_late(self, cells):
+        monkeypatch.setattr(evolution.Evolution, "tell", tell)
+        with Ledger.open(path / LEDGER_NAME) as ledger:
+            ledger.undo(1)
+            ledger.score(1, Score(range(30), "anna"))
+        return tell(self, cells)
+
+    monkeypatch.setattr(evolution.Evolution, "tell", told_late)
+    with pytest.raises(LedgerError, match=r"Other cells of trials \[1\] were entered"):
+        drive(small_study(), path)
+    assert drive(small_study(), path).n_complete == 1
+    assert scored(path)[0][-1] == list(range(30))
+
+
+class Stops(WitnessOperator):
+    """Counts cells of a sheet afterwards, and is stopped at the second."""
+
+    def drawn(self, card, driven):
+        return None
+
+    def enter(self, cards, *, is_full):
+        if is_full:
+            yield cards[0].trial.trial, Score([13], "anna")
+            raise KeyboardInterrupt
+
+
+def test_what_was_entered_of_a_sheet_is_kept_when_the_program_is_stopped(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        drive(small_study(), tmp_path / "r", operator=Stops())
+    with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["scored", "driven", "driven"]
+
+
+class Blind(WitnessOperator):
+    """Its connection is gone when the first trial has ended."""
+
+    def drawn(self, card, driven):
+        raise RobotError("The witness has gone.")
+
+
+def test_a_trial_that_the_witness_could_not_tell_of_keeps_its_steps_and_is_driven_again(tmp_path):
+    with pytest.raises(RobotError, match="The witness has gone"):
+        drive(small_study(), tmp_path / "r", operator=Blind())
+    with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["running", "planned", "planned"]
+        assert len(ledger.steps(1)) == 4
+    drive(small_study(), tmp_path / "r")
+    drive(small_study(), tmp_path / "whole")
+    assert scored(tmp_path / "r") == scored(tmp_path / "whole")
 
 
 def test_a_weak_battery_is_noticed(tmp_path):
@@ -115,6 +237,9 @@ def test_changed_settings_are_refused_and_fresh_keeps_the_ledger(tmp_path):
     with pytest.raises(Exception, match="ledger of physical trials"):
         run_study(small_study(steps="5"), tmp_path / "small", fresh=True)
     assert (tmp_path / "small" / LEDGER_NAME).exists()
+    with pytest.raises(StudyError, match="holds trials of a robot, which are never deleted") as refused:
+        run_study(small_study(steps="5"), tmp_path / "small")
+    assert "--fresh" not in str(refused.value), "it would be refused, too"
 
 
 MIXED = """
@@ -183,6 +308,26 @@ def test_shuffled_blocks_mix_conditions_and_change_no_result(tmp_path):
     assert len({title for title, *_ in titles}) == 12
     assert all(len(title) == 4 and title.isupper() for title, *_ in titles)
     assert [pen for _, pen, *_ in titles[:6]] == ["red", "blue", "green", "black", "red", "blue"]
+
+
+def test_pens_stay_while_a_sheet_is_begun(tmp_path):
+    with pytest.raises(RobotError):
+        drive(small_study(), tmp_path / "r", operator=Blind())
+    fewer = small_study(more='[trials]\npens = ["red", "blue"]\n')
+    with pytest.raises(StudyError, match="names 2 pens, and a sheet that is begun needs 3"):
+        drive(fewer, tmp_path / "r")
+    drive(small_study(), tmp_path / "r")
+    assert (
+        drive(
+            small_study(more='[trials]\npens = ["red", "blue"]\n', replicates="2"), tmp_path / "r"
+        ).n_complete
+        == 2
+    )
+
+
+def test_two_pens_of_a_color_are_refused():
+    with pytest.raises(StudyError, match=r"trials\.pens.*'red' stands there twice"):
+        small_study(more='[trials]\npens = ["red", "blue", "red"]\n')
 
 
 def test_replicates_extend_a_physical_study(tmp_path):

@@ -19,7 +19,7 @@ _REST_S = 0.05
 """How long the rest of an arrow key's letters may take."""
 
 
-def read_line(prompt: str) -> str:
+def read_line() -> str:
     """A line that somebody types, without blanks around it.
 
     Ctrl-C ends it at once: a plain `input` goes on reading, because polars has signals restart what they interrupt,
@@ -28,8 +28,6 @@ def read_line(prompt: str) -> str:
     Raises:
         KeyboardInterrupt: Ctrl-C, or the terminal is gone.
     """
-    sys.stdout.write(prompt)
-    sys.stdout.flush()
     if sys.platform != "win32":
         select.select([sys.stdin], [], [])
     line = sys.stdin.readline()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import getpass
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,7 +67,9 @@ class Answers:
         return "void" if self.in_flight == "void" else "driven" if self.in_flight == "driven" else None
 
 
-def choose_operator(port: str, witness: str | None, answers: Answers, folder: Path) -> Operator:
+def choose_operator(
+    port: str, witness: str | None, answers: Answers, folder: Path, *, quiet: bool = False
+) -> Operator:
     """The witness of an emulator, in this program or in another, or else a person.
 
     Args:
@@ -75,23 +77,25 @@ def choose_operator(port: str, witness: str | None, answers: Answers, folder: Pa
         witness: HOST:PORT of an emulator's witness.
         answers: What was answered in advance.
         folder: Of the results, in whose ledger notes are kept.
+        quiet: Whether standard output is for something else: a person is spoken to on standard error, and a witness's
+            trials are not told of.
     """
     from realitygap.records import LEDGER_NAME, Ledger
     from realitygap.robots.scribbler import is_in_this_program
-    from realitygap.trials import WitnessOperator
 
-    if is_in_this_program(port):
-        return WitnessOperator(in_flight=answers.verdict or "void")
-    if witness is not None:
+    if is_in_this_program(port) or witness is not None:
         from realitygap.emulator import connect_witness
 
-        return WitnessOperator(connect_witness(witness), in_flight=answers.verdict or "void")
+        from ._telling import telling_witness
+
+        remote = None if witness is None or is_in_this_program(port) else connect_witness(witness)
+        return telling_witness(remote, answers.verdict or "void", quiet=quiet)
 
     def note(text: str, who: str, trial: int | None) -> None:
         with Ledger.open(folder / LEDGER_NAME) as ledger:
             ledger.note(text, who, trial)
 
-    return PersonOperator(answers, note)
+    return PersonOperator(answers, note, to_stderr=quiet)
 
 
 Note = Callable[[str, str, int | None], None]
@@ -101,31 +105,31 @@ Note = Callable[[str, str, int | None], None]
 class PersonOperator:
     """Somebody who places the robot, watches it and counts cells; asked in the terminal what no option has answered."""
 
-    def __init__(self, answers: Answers, note: Note) -> None:
+    def __init__(self, answers: Answers, note: Note, *, to_stderr: bool = False) -> None:
         self._answers = answers
         self._note = note
-        self._is_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+        self._to_stderr = to_stderr
+        out = sys.stderr if to_stderr else sys.stdout
+        self._is_terminal = sys.stdin is not None and sys.stdin.isatty() and out.isatty()
         self._is_first = True
 
     # the robot
 
     def meet(self, robot: Robot) -> None:
         """Say that the robot will turn."""
-        typer.echo(
-            f"The robot answers ({robot.label}). For the pre-flight it turns on the spot for a moment."
-        )
+        self._say(f"The robot answers ({robot.label}). For the pre-flight it turns on the spot for a moment.")
         if self._answers.wait:
             self._ask("Stand it free, then press Enter: ", "--no-wait drives without waiting")
 
     def accept(self, preflight: Preflight) -> bool:
         """Show what was found; ask where there is something against it."""
         for name, value in preflight.facts.items():
-            typer.echo(f"  {name}: {value}")
+            self._say(f"  {name}: {value}")
         if not preflight.problems:
-            typer.echo("Nothing speaks against driving.")
+            self._say("Nothing speaks against driving.")
             return True
         for problem in preflight.problems:
-            typer.echo(f"  against driving: {problem}")
+            self._say(f"  against driving: {problem}")
         if self._answers.despite_preflight:
             return True
         if not self._is_terminal:
@@ -136,7 +140,7 @@ class PersonOperator:
 
     def settle(self, card: Card, problem: str) -> Verdict:
         """Ask whether a trial that was cut off counts."""
-        typer.echo(f"\nTrial {card.trial.trial}, {card.title}, was cut off: {problem}.")
+        self._say(f"\nTrial {card.trial.trial}, {card.title}, was cut off: {problem}.")
         if self._answers.verdict is not None:
             return self._answers.verdict
         while True:
@@ -149,10 +153,10 @@ class PersonOperator:
 
     def place(self, card: Card) -> None:
         """Ask for the robot at its start, with the pen."""
-        typer.echo(f"\nTrial {card.trial.trial}: {card.title}. {card.n_left} left in this generation.")
-        typer.echo(f"Sheet {card.trial.sheet}, pen: {card.pen}.")
+        self._say(f"\nTrial {card.trial.trial}: {card.title}. {card.n_left} left in this generation.")
+        self._say(f"Sheet {card.trial.sheet}, pen: {card.pen}.")
         if self._is_first:
-            typer.echo(sketch(card.arena))
+            self._say(sketch(card.arena))
             self._is_first = False
         if not self._answers.wait:
             return
@@ -174,37 +178,35 @@ class PersonOperator:
         stalled = "  stalled" if seen.stalled else "         "
         told = f"move {command.move:+.2f} turn {command.turn:+.2f}"
         text = f"step {step + 1:3}/{card.n_steps}  sees {raw}  {told}{stalled}"
-        typer.echo(f"\r{text}  space aborts", nl=step + 1 == card.n_steps)
+        self._say(f"\r{text}  space aborts", nl=step + 1 == card.n_steps)
         with single_keys() as keys:
             return keys.read(0.0) in _ABORTING
 
     def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
-        """Ask now, where each trial is scored by itself."""
-        typer.echo("Done; the motors are stopped.")
-        if self._answers.score != "trial" or not self._is_terminal:
-            return None
-        return self._pick(card)
+        """Nothing yet: somebody has to look first."""
+        self._say("Done; the motors are stopped.")
+        return None
 
     # a sheet
 
-    def enter(self, cards: Sequence[Card]) -> Mapping[int, Score]:
-        """Ask what was drawn on a sheet."""
-        if self._answers.score == "later" or not self._is_terminal:
-            return {}
-        typer.echo(f"\nSheet {cards[0].trial.sheet} is full. Which cells does each line cross?")
-        found = {}
+    def enter(self, cards: Sequence[Card], *, is_full: bool) -> Iterator[tuple[int, Score]]:
+        """Ask what was drawn, by one trial or on a full sheet."""
+        wanted = self._answers.score == "trial" or (self._answers.score == "sheet" and is_full)
+        if not wanted or not self._is_terminal:
+            return
+        if is_full:
+            self._say(f"\nSheet {cards[0].trial.sheet} is full. Which cells does each line cross?")
         for card in cards:
             score = self._pick(card)
             if score is not None:
-                found[card.trial.trial] = score
-        return found
+                yield card.trial.trial, score
 
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
         """Show the scores; ask which are taken back before they breed the next generation."""
-        typer.echo("\nThe generation is scored:")
+        self._say("\nThe generation is scored:")
         for card in cards:
             n_cells = len(card.trial.cells or ())
-            typer.echo(f"  {card.trial.trial:4}  {card.pen:8} {card.title}: {n_cells} cells")
+            self._say(f"  {card.trial.trial:4}  {card.pen:8} {card.title}: {n_cells} cells")
         if not self._is_terminal:
             return ()
         numbers = {str(card.trial.trial): card.trial.trial for card in cards}
@@ -220,15 +222,15 @@ class PersonOperator:
             elif answer in numbers:
                 return [numbers[answer]]
             else:
-                typer.echo(f"There is no trial {answer} in this generation.")
+                self._say(f"There is no trial {answer} in this generation.")
 
     # inside
 
     def _pick(self, card: Card) -> Score | None:
         from realitygap.records import Score
 
-        typer.echo(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
-        cells = pick_cells(card.arena)
+        self._say(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
+        cells = pick_cells(card.arena, write=lambda text: self._say(text, nl=False))
         return None if cells is None else Score(cells, self._answers.name)
 
     def _ask(self, prompt: str, option: str) -> str:
@@ -241,13 +243,23 @@ class PersonOperator:
         if not self._is_terminal:
             answered = f" {option}." if option else ""
             raise StudyError(f"There is no terminal in which to ask '{prompt.strip(': ')}'.{answered}")
-        return read_line(prompt)
+        self._say(prompt, nl=False)
+        return read_line()
+
+    def _say(self, text: str, *, nl: bool = True) -> None:
+        typer.echo(text, nl=nl, err=self._to_stderr)
 
 
-def pick_cells(arena: Arena, cells: Sequence[int] = ()) -> list[int] | None:
+def pick_cells(
+    arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
+) -> list[int] | None:
     """Cells picked in the terminal; None for later."""
+
+    def to_stdout(text: str) -> None:
+        typer.echo(text, nl=False)
+
     with single_keys() as keys:
-        return edit_cells(arena.grid, arena.start, keys.read, lambda text: typer.echo(text, nl=False), cells)
+        return edit_cells(arena.grid, arena.start, keys.read, write or to_stdout, cells)
 
 
 def sketch(arena: Arena) -> str:

@@ -108,16 +108,22 @@ def run(
 
     In Python: realitygap.run_study("paper", replicates=1000)
     """
-    from realitygap.study import load_study, run_study
+    from realitygap.study import load_study, refuse_port_without_robot, run_study
 
     if threads is not None and cluster is not None:
         raise StudyError(
             "--threads and --cluster exclude each other. How many threads a worker of a cluster has is said where it "
             "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
-    if witness is not None and port is None:
-        raise StudyError("--witness goes with --port: it is the witness of the robot there.")
+    answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
+    if port is None and (witness is not None or answers != Answers()):
+        raise StudyError(
+            "--witness, --in-flight, --score, --no-wait, --despite-preflight and --who go with --port: they are about "
+            "the robot there."
+        )
     resolved = load_study(study, seed=seed, replicates=replicates)
+    if port is not None:
+        refuse_port_without_robot(resolved)
     try:
         with RunsBar(quiet=as_json) as bar:
             result = run_study(
@@ -125,8 +131,7 @@ def run(
             )
         if port is not None:
             path = result.folder.path
-            answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
-            operator = choose_operator(port, witness, answers, path)
+            operator = choose_operator(port, witness, answers, path, quiet=as_json)
             driven = run_study(resolved, path, port=port, operator=operator)
             result = dataclasses.replace(result, physical=driven.physical)
     except KeyboardInterrupt:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -73,6 +74,12 @@ def trials(
         raise StudyError(f"Cannot {what!r} trials. {did_you_mean(what, _WHAT)}")
     if cells is not None and file is not None:
         raise StudyError("--cells and --file exclude each other: a file has the cells of many trials.")
+    if second and correct:
+        raise StudyError("--second and --correct exclude each other: a correction replaces the first count.")
+    if what != "score" and (cells is not None or file is not None or second or correct):
+        raise StudyError(f"--cells, --file, --second and --correct go with score, not with {what}.")
+    if file is not None and trial is not None:
+        raise StudyError("--file names its trials itself. Leave the trial out.")
     name = who or getpass.getuser()
     with Ledger.open(folder / LEDGER_NAME, writable=what not in ("list", "agreement")) as ledger:
         if what == "list":
@@ -125,15 +132,18 @@ def _score(
     from realitygap.records import Score
 
     if file is not None:
-        given = _read_file(ledger, file)
+        entries: Iterable[dict[int, list[int]]] = [_read_file(ledger, file)]
     elif cells is not None:
-        given = {_number(ledger, _needed(trial, "a trial")): _cells(cells, "--cells")}
+        entries = [{_number(ledger, _needed(trial, "a trial")): _cells(cells, "--cells")}]
     else:
-        given = _pick(ledger, folder, trial, role)
-    for number, found in given.items():
-        ledger.score(number, Score(found, who), role)
-        typer.echo(f"Trial {number}: {len(set(found))} cells.")
-    if not given:
+        entries = _pick(ledger, folder, trial, role)
+    n_entered = 0
+    for given in entries:  # each as a whole or not at all
+        ledger.score_all({number: Score(found, who) for number, found in given.items()}, role)
+        n_entered += len(given)
+        for number, found in given.items():
+            typer.echo(f"Trial {number}: {len(set(found))} cells.")
+    if not n_entered:
         typer.echo("Nothing was entered.")
 
 
@@ -166,34 +176,32 @@ def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
     return found
 
 
-def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> dict[int, list[int]]:
-    """Cells picked in the terminal, of one trial or of all that wait."""
+def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
+    """Cells picked in the terminal, of one trial or, one after the other, of all that wait."""
     import sys
 
     from ._operator import pick_cells
 
     if not sys.stdin.isatty():
         raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
-    if trial is not None:
-        waiting = [ledger.trial(_number(ledger, trial))]
+    if trial is not None or role == "correction":
+        waiting = [ledger.trial(_number(ledger, _needed(trial, "a trial")))]
     else:
         seconded = {row["trial"] for row in ledger.scores() if row["role"] == role and row["undone"] is None}
         states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
         waiting = [each for each in ledger.trials(states=states) if each.trial not in seconded]
-    found: dict[int, list[int]] = {}
-    shows = _titles(folder)
+    shows = _Titles(folder)
     for each in waiting:
         typer.echo(
             f"\nTrial {each.trial}, {each.code if shows.blind else each.name}, sheet {each.sheet}, {shows.pen(each)}"
         )
         cells = pick_cells(shows.arena(each), each.cells or () if role == "correction" else ())
         if cells is None:
-            break
-        found[each.trial] = cells
-    return found
+            return
+        yield {each.trial: cells}
 
 
-class _titles:  # noqa: N801 - a few words on how trials of a folder are shown
+class _Titles:
     """How the trials of a folder are shown."""
 
     def __init__(self, folder: Path) -> None:
@@ -217,8 +225,14 @@ class _titles:  # noqa: N801 - a few words on how trials of a folder are shown
 def _list(ledger: Ledger, *, as_json: bool) -> None:
     found = ledger.trials()
     if as_json:
+        blinded = {"condition", "replicate", "generation", "individual"} if _is_blind(ledger) else set()
         rows = [
-            {**vars(each), "notes": [note["text"] for note in ledger.notes(each.trial)]} for each in found
+            {
+                name: None if name in blinded and not each.is_closed else value
+                for name, value in vars(each).items()
+            }
+            | {"notes": [note["text"] for note in ledger.notes(each.trial)]}
+            for each in found
         ]
         typer.echo(json.dumps(rows, indent=2))
         return
@@ -248,7 +262,7 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
 
 def _is_blind(ledger: Ledger) -> bool:
     path = ledger.path.parent / "study.json"
-    return path.exists() and _titles(ledger.path.parent).blind
+    return path.exists() and _Titles(ledger.path.parent).blind
 
 
 def _agreement(folder: Path, *, as_json: bool) -> None:

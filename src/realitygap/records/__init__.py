@@ -12,10 +12,11 @@ from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_ta
 from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
-from realitygap.records._ledger import (
+from realitygap.records._ledger import Ledger
+from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
+from realitygap.records._ledger_kinds import (
     Generation,
     Individual,
-    Ledger,
     Score,
     ScoreRole,
     Step,
@@ -23,7 +24,6 @@ from realitygap.records._ledger import (
     TrialState,
     Turn,
 )
-from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._output import is_special, refuse_results, write_whole

@@ -7,137 +7,22 @@ import datetime
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, create_file, speaking
+from realitygap.records._ledger_kinds import (
+    Generation,
+    Score,
+    ScoreRole,
+    Step,
+    Trial,
+    TrialState,
+    Turn,
+)
 from realitygap.records._version import RESULTS_VERSION
-
-TrialState = Literal["planned", "running", "driven", "scored", "void"]
-ScoreRole = Literal["score", "second", "correction"]
-
-
-@dataclass(frozen=True)
-class Individual:
-    """One of a generation, as it is planned.
-
-    Attributes:
-        individual: its number in the generation.
-        species: its species.
-        parents: individuals of the generation before.
-        nodes: of its genome.
-        genome: the fields of the records' genome, as lists.
-        key: of the random numbers.
-    """
-
-    individual: int
-    species: int
-    parents: Sequence[int]
-    nodes: int
-    genome: Mapping[str, Any]
-    key: int
-
-
-@dataclass(frozen=True)
-class Generation:
-    """A generation of a run, as it is planned."""
-
-    condition: str
-    replicate: int
-    generation: int
-    individuals: Sequence[Individual]
-
-
-@dataclass(frozen=True)
-class Turn:
-    """When and with which pen an individual is driven; `code` is what an operator knows it by when scoring is blind."""
-
-    condition: str
-    replicate: int
-    generation: int
-    individual: int
-    sheet: int
-    pen: int
-    code: str
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A trial as the ledger has it; `trial` is its number.
-
-    Attributes:
-        place: when its turn comes, ascending.
-        attempt: 0, and one more for each trial of the individual that was void.
-        cells: as entered and not undone; None before.
-        is_closed: whether its generation is closed, so that its score is frozen.
-    """
-
-    trial: int
-    condition: str
-    replicate: int
-    generation: int
-    individual: int
-    attempt: int
-    place: int
-    sheet: int
-    pen: int
-    code: str
-    state: TrialState
-    reason: str | None
-    end: str | None
-    problem: str | None
-    n_steps: int | None
-    stalls: int | None
-    cells: tuple[int, ...] | None
-    is_closed: bool
-
-    @property
-    def name(self) -> str:
-        """Which trial it is, in words."""
-        again = f" (attempt {self.attempt + 1})" if self.attempt else ""
-        run = f"{self.condition}, run {self.replicate}"
-        return f"{run}, generation {self.generation}, individual {self.individual}{again}"
-
-
-@dataclass(frozen=True)
-class Step:
-    """One command of a trial.
-
-    Attributes:
-        time: since the trial began [s].
-        raw: (s,) the robot's readings as they came.
-        readings: (s,) the same, 0 to 1.
-        stalled: whether it was blocked.
-        move, turn: what the network answered, -1 to 1.
-    """
-
-    time: float
-    raw: tuple[float, ...]
-    readings: tuple[float, ...]
-    stalled: bool
-    move: float
-    turn: float
-
-
-@dataclass(frozen=True)
-class Score:
-    """Cells as somebody entered them, or as an emulator's witness saw them.
-
-    Attributes:
-        cells: crossed by the line, columns * row + column.
-        who: entered them.
-        n_ends: cells in which steps end; None where nobody saw it.
-        path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.
-    """
-
-    cells: Sequence[int]
-    who: str
-    n_ends: int | None = None
-    path: Sequence[Sequence[float]] | None = None
-
 
 _TRIALS = """
 SELECT trials.*, generations.closed IS NOT NULL AS is_closed, (
@@ -161,7 +46,6 @@ class Ledger:
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection = connection
-        self._depth = 0
 
     @classmethod
     def create(cls, path: str | Path) -> Self:
@@ -216,7 +100,7 @@ class Ledger:
                 )
 
     def conditions(self) -> dict[str, dict[str, Any]]:
-        """Hash, label (None before the first sitting) and sizes of each condition, by name."""
+        """Hash, label (None before the first trial) and sizes of each condition, by name."""
         return {row["name"]: dict(row) for row in self._all("SELECT * FROM conditions ORDER BY rowid")}
 
     def begin_sitting(
@@ -237,13 +121,7 @@ class Ledger:
         """
         with self._writing():
             for name in names:
-                known = self._one("SELECT label FROM conditions WHERE name = ?", name)
-                if known is not None and known["label"] not in (None, label):
-                    raise LedgerError(
-                        f"The trials of condition {name!r} in {self.path} are {known['label']}, and this robot's would "
-                        f"be {label}; the two are never mixed. Name another folder (--out DIR)."
-                    )
-                self._run("UPDATE conditions SET label = ? WHERE name = ? AND label IS NULL", label, name)
+                self._refuse_mixing(name, label)
             return self._run(
                 "INSERT INTO sittings (began, label, port, robot, preflight) VALUES (?, ?, ?, ?, ?)",
                 *(_now(), label, port, _json(robot), _json(preflight)),
@@ -261,6 +139,13 @@ class Ledger:
             {**dict(row), "robot": json.loads(row["robot"]), "preflight": json.loads(row["preflight"])}
             for row in rows
         ]
+
+    def robots(self) -> list[dict[str, str]]:
+        """What each robot that drove a trial was told by, every one once, oldest first."""
+        rows = self._all(
+            "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
+        )
+        return [json.loads(text) for text in dict.fromkeys(row["robot"] for row in rows)]
 
     # generations
 
@@ -308,11 +193,19 @@ class Ledger:
         generation: int,
         fitness: Sequence[float],
         novelty: Sequence[float | None],
+        *,
+        cells: Sequence[Sequence[int]] | None = None,
     ) -> None:
         """Freeze the scores of a generation, with what selection made of them.
 
+        Args:
+            condition, replicate, generation: which.
+            fitness: (n,) in the order of individuals.
+            novelty: (n,) likewise; None where selection is something else.
+            cells: of which fitness and novelty were made; somebody may have entered others meanwhile.
+
         Raises:
-            LedgerError: a trial of it is not scored, or it is closed.
+            LedgerError: a trial of it is not scored, or scored otherwise, or it is closed.
         """
         run = (condition, replicate, generation)
         with self._writing():
@@ -322,6 +215,16 @@ class Ledger:
                 raise LedgerError(
                     f"Generation {generation} of {condition!r}, run {replicate}, cannot be closed: individuals "
                     f"{unscored} are not scored."
+                )
+            others = [
+                each.trial
+                for each in trials
+                if cells is not None and each.cells != tuple(cells[each.individual])
+            ]
+            if others:
+                raise LedgerError(
+                    f"Other cells of trials {others} were entered while the generation was being closed; it stays "
+                    "open, and all that was entered is kept. Run the same command again."
                 )
             changed = self._count(
                 "UPDATE generations SET closed = ? WHERE condition = ? AND replicate = ? AND generation = ? AND "
@@ -377,9 +280,16 @@ class Ledger:
         return _trial(row)
 
     def start(self, number: int, sitting: int) -> None:
-        """A planned trial begins; call before its robot moves."""
+        """A planned trial begins; call before its robot moves. The first one gives its condition its label.
+
+        Raises:
+            LedgerError: the condition was driven by the other of an emulated and a real robot.
+        """
         with self._writing():
-            self._require(number, "planned")
+            name = self._require(number, "planned").condition
+            (label,) = self._one("SELECT label FROM sittings WHERE id = ?", sitting) or (None,)
+            self._refuse_mixing(name, label)
+            self._run("UPDATE conditions SET label = ? WHERE name = ? AND label IS NULL", label, name)
             self._run(
                 "UPDATE trials SET state = 'running', sitting = ?, started = ? WHERE id = ?",
                 *(sitting, _now(), number),
@@ -420,8 +330,13 @@ class Ledger:
 
     def score(self, number: int, score: Score, role: ScoreRole = "score") -> None:
         """Enter cells: what selection counts, what a second person counts, or a correction once that is frozen."""
+        self.score_all({number: score}, role)
+
+    def score_all(self, scores: Mapping[int, Score], role: ScoreRole = "score") -> None:
+        """Enter the cells of several trials, by their numbers: all of them, or none where one is refused."""
         with self._writing():
-            self._score(number, score, role)
+            for number, score in scores.items():
+                self._score(number, score, role)
 
     def undo(self, number: int) -> None:
         """Take back the score of a trial whose generation is not closed, so that it can be entered anew."""
@@ -592,6 +507,11 @@ class Ledger:
                 raise LedgerError(
                     f"The generation of trial {number} is not closed yet: take its score back (undo) and enter it anew."
                 )
+            if role == "second" and score.who in self._counters(number):
+                raise LedgerError(
+                    f"{score.who!r} has counted the cells of trial {number} already, and a second count is another "
+                    "person's. Say who that is (--who NAME). Nothing was entered."
+                )
         self._run(
             "INSERT INTO scores (trial, cells, n_ends, path, role, who, time) VALUES (?, ?, ?, ?, ?, ?, ?)",
             *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
@@ -600,6 +520,21 @@ class Ledger:
         self._note_event(
             number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)}
         )
+
+    def _refuse_mixing(self, condition: str, label: str | None) -> None:
+        known = self._one("SELECT label FROM conditions WHERE name = ?", condition)
+        if known is not None and known["label"] not in (None, label):
+            raise LedgerError(
+                f"The trials of condition {condition!r} in {self.path} are {known['label']}, and this robot's would "
+                f"be {label}; the two are never mixed. Name another folder (--out DIR)."
+            )
+
+    def _counters(self, number: int) -> set[str]:
+        """Who entered the score that counts."""
+        rows = self._all(
+            "SELECT who FROM scores WHERE trial = ? AND role = 'score' AND undone IS NULL", number
+        )
+        return {row["who"] for row in rows}
 
     def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
         """Cells of a trial, each at most once, all within its grid, and at least the one it starts in."""

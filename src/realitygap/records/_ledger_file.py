@@ -32,7 +32,7 @@ CREATE TABLE conditions (  -- a condition on a robot, as resolved
     settings TEXT NOT NULL,  -- JSON
     n_generations INTEGER NOT NULL,  -- of a whole run
     n_cells INTEGER NOT NULL,  -- reachable ones
-    label TEXT  -- EMULATED or REAL, from its first sitting on
+    label TEXT  -- EMULATED or REAL, from its first trial on
 );
 CREATE TABLE sittings (  -- from opening a robot's port to closing it
     id INTEGER PRIMARY KEY,

@@ -41,7 +41,8 @@ class Agreement:
     @property
     def sentence(self) -> str:
         """The same in words."""
-        counted = f"{self.n_trials} trials counted by two people, {self.n_cells:,} cells"
+        trials = "1 trial" if self.n_trials == 1 else f"{self.n_trials} trials"
+        counted = f"{trials} counted by two people, {self.n_cells:,} cells"
         if self.kappa is None:
             return f"{counted}: all judged alike, and no kappa without both kinds of cells."
         interval = (

@@ -21,7 +21,7 @@ class Driven:
     """What the ledger says of one condition.
 
     Attributes:
-        label: EMULATED or REAL; None before its first sitting.
+        label: EMULATED or REAL; None before its first trial.
         n_driven: trials that count, those of unfinished runs among them.
         n_void: trials that were driven, or begun, and do not count.
         unfinished: replicate of each run that is begun and not complete, and how many of its generations are closed.

@@ -39,8 +39,8 @@ def content(
     }
     objective, novelty = _first(tally, "coverage"), _first(tally, "novelty", noise=0.5)
     for number, condition, draw in (
-        ("5", objective, draw_tally_individuals),
-        ("8", novelty, draw_tally_individuals),
+        ("5", _first(tally, "coverage", driven=True), draw_tally_individuals),
+        ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_tally_individuals),
         ("9", novelty, draw_tally_better),
     ):
         if condition is not None:
@@ -64,14 +64,15 @@ def content(
     return found
 
 
-def _first(tally: Tally, selection: str, noise: float | None = None) -> str | None:
-    """The first condition with runs and this selection, if there is one with this noise."""
+def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: bool = False) -> str | None:
+    """The first condition with runs and this selection; rather one that a robot drove (or not), and with this noise."""
     with_runs = set(tally.runs["condition"])
     there = [
         each
         for each in tally.conditions
         if each["name"] in with_runs and settings_of(each).get("selection") == selection
     ]
+    there = [each for each in there if (each["name"] in tally.driven) == driven] or there
     wanted = [each for each in there if settings_of(each).get("noise") == noise]
     return str((wanted or there)[0]["name"]) if there else None
 

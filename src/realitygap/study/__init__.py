@@ -5,7 +5,7 @@ from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._physical import PhysicalResult, PhysicalStudy
 from ._robot import connect_robot
-from ._run import Progress, StudyResult, drive_study, machine_facts, run_study
+from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
 from ._task import measure_task, task_settings
 from ._template import study_template
@@ -30,6 +30,7 @@ __all__ = [
     "measure_task",
     "named_studies",
     "parse_study",
+    "refuse_port_without_robot",
     "run_study",
     "study_template",
     "task_settings",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from realitygap.errors import LedgerError, RobotError, StudyError
 from realitygap.records import Generation, Individual, Ledger, Trial, complete_runs
@@ -120,13 +120,15 @@ class PhysicalStudy:
             return ""
         for each in open_ones:
             self._check_planned(*each)
+        self._check_pens(open_ones)
         while True:
             if waiting := self._drive_and_enter(open_ones):
                 return waiting
             taken_back = self._operator.close(self._cards(self._trials(open_ones)))
             for number in taken_back:
                 self._ledger.undo(number)
-            if not taken_back:
+            # another program may have taken a score back, or declared a trial void, while the operator was asked
+            if all(trial.state == "scored" for trial in self._trials(open_ones)):
                 break
         for each in open_ones:
             self._close(*each)
@@ -181,6 +183,15 @@ class PhysicalStudy:
         if [row["genome"] for row in rows] != [asked.record for asked in evolution.ask()]:
             raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
 
+    def _check_pens(self, generations: Sequence[tuple[Condition, int, int]]) -> None:
+        """Refuse fewer pens than the sheets of these generations were planned for: two lines would look alike."""
+        needed = 1 + max(trial.pen for trial in self._trials(generations))
+        if needed > len(self._study.trials.pens):
+            raise StudyError(
+                f"trials.pens names {len(self._study.trials.pens)} pens, and a sheet that is begun needs {needed}. "
+                "Give as many until its generation is closed."
+            )
+
     def _is_closed(self, condition: Condition, replicate: int, generation: int) -> bool:
         return (generation, True) in self._ledger.generations(condition.name, replicate)
 
@@ -191,9 +202,16 @@ class PhysicalStudy:
             for each in self._ledger.trials(condition.name, replicate, generation)
             if each.state == "scored"
         ]
-        cells = {each.individual: each.cells or () for each in trials}
-        told = evolution.tell([cells[k] for k in range(condition.neat.population)])
-        self._ledger.close_generation(condition.name, replicate, generation, told.fitness, told.novelty)
+        cells = [each.cells or () for each in sorted(trials, key=lambda trial: trial.individual)]
+        if len(cells) != condition.neat.population:
+            raise LedgerError(
+                f"{self._ledger.path}: a score was taken back while its generation was being closed. Run the same "
+                "command again."
+            )
+        told = evolution.tell(cells)
+        self._ledger.close_generation(
+            condition.name, replicate, generation, told.fitness, told.novelty, cells=cells
+        )
 
     # trials
 
@@ -217,7 +235,7 @@ class PhysicalStudy:
                 self._settle(running[0])
             elif planned:
                 self._drive(planned[0], len(planned))
-                self._enter(planned[0].sheet, generations)
+                self._enter(planned[0].sheet, generations, just_driven=planned[0].trial)
             else:
                 break
         for sheet in dict.fromkeys(trial.sheet for trial in trials):
@@ -227,17 +245,20 @@ class PhysicalStudy:
             return ""
         return (
             f"{len(left)} driven trials wait for their scores. `realitygap trials list` shows them and `realitygap "
-            "trials score` takes what was drawn; then run the same command again."
+            "trials score` takes what was drawn, or `void` has a trial driven again; then run the same command again."
         )
 
-    def _enter(self, sheet: int, generations: Sequence[tuple[Condition, int, int]]) -> None:
-        """Ask what was drawn, once all lines of a sheet are drawn."""
+    def _enter(
+        self, sheet: int, generations: Sequence[tuple[Condition, int, int]], just_driven: int | None = None
+    ) -> None:
+        """Ask what was drawn: of a sheet once all its lines are drawn, before that of the trial just driven."""
         trials = [trial for trial in self._trials(generations) if trial.sheet == sheet]
-        if any(trial.state in ("planned", "running") for trial in trials):
-            return
-        driven = [trial for trial in trials if trial.state == "driven"]
+        is_full = not any(trial.state in ("planned", "running") for trial in trials)
+        driven = [
+            trial for trial in trials if trial.state == "driven" and (is_full or trial.trial == just_driven)
+        ]
         if driven:
-            for number, score in self._operator.enter(self._cards(driven)).items():
+            for number, score in self._operator.enter(self._cards(driven), is_full=is_full):
                 self._ledger.score(number, score)
 
     def _settle(self, trial: Trial) -> None:
@@ -264,7 +285,11 @@ class PhysicalStudy:
             raise
         self.n_driven += 1
         if driven.end is EndReason.STEP_LIMIT:
-            score = self._operator.drawn(card, driven)
+            try:
+                score = self._operator.drawn(card, driven)
+            except BaseException:
+                self._interrupt(trial, replace(driven, problem="it was driven, and nobody said what it drew"))
+                raise
             self._ledger.finish(trial.trial, driven.end, driven.steps, stalls=driven.stalls, score=score)
             return
         self._interrupt(trial, driven)
@@ -311,11 +336,9 @@ class PhysicalStudy:
         return self._robot
 
     def _begin_sitting(self, robot: Robot) -> None:
-        before = self._ledger.sittings()
-        remembered = before[-1]["robot"] if before else None
         self._operator.meet(robot)
-        found = preflight(robot, remembered)
-        if not self._is_looked_at and not self._operator.accept(found):
+        found = preflight(robot, self._ledger.robots())
+        if (found.problems or not self._is_looked_at) and not self._operator.accept(found):
             said = "; ".join(found.problems) or "the operator stopped there"
             raise StudyError(f"The pre-flight was not accepted, and nothing was driven: {said}.")
         self._is_looked_at = True

@@ -118,10 +118,8 @@ def run_study(
         study = load_study(study, seed=seed, replicates=replicates)
     elif seed is not None or replicates is not None:
         raise ValueError("seed and replicates go with a study's name or path; this study has its own.")
-    if port is not None and not study.n_physical:
-        raise StudyError(
-            f"A port is given, and study {study.about.name!r} has no condition with platform 'scribbler'. Leave it out."
-        )
+    if port is not None:
+        refuse_port_without_robot(study)
     path = Path(out) if out is not None else Path("results") / study.about.name
     with _executor(threads, cluster) as executor:
         folder = _open_folder(path, study, fresh=fresh)
@@ -130,6 +128,18 @@ def run_study(
             progress = _carry_out(study, folder, executor, chunk, tell)
             physical = _drive(study, folder, port, operator) if study.n_physical else None
     return StudyResult(folder, progress.n_runs, progress.n_computed, progress.seconds, physical)
+
+
+def refuse_port_without_robot(study: Study) -> None:
+    """Refuse a robot's port for a study that drives none.
+
+    Raises:
+        StudyError: The study has no condition on the platform `scribbler`.
+    """
+    if not study.n_physical:
+        raise StudyError(
+            f"A port is given, and study {study.about.name!r} has no condition with platform 'scribbler'. Leave it out."
+        )
 
 
 def _drive(
@@ -289,7 +299,7 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
                 [
                     f"{folder.path} holds results of other settings; nothing was run and nothing is lost.",
                     *shown,
-                    "Use another folder (--out DIR), or --fresh to delete what is there and start anew.",
+                    _ways_out(folder),
                 ]
             )
         )
@@ -297,6 +307,12 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
     new["replicates"] = max(new["replicates"], old["replicates"])
     if new != old:
         folder.update_description(new)
+
+
+def _ways_out(folder: ResultsFolder) -> str:
+    if (folder.path / LEDGER_NAME).exists():
+        return "Use another folder (--out DIR); this one holds trials of a robot, which are never deleted."
+    return "Use another folder (--out DIR), or --fresh to delete what is there and start anew."
 
 
 def _differences(old: Any, new: Any, place: str = "") -> list[str]:

@@ -53,6 +53,13 @@ class ReportSection(Settings):
     )
 
 
+def _told_apart(pens: list[str]) -> list[str]:
+    twice = [pen for k, pen in enumerate(pens) if pen in pens[:k]]
+    if twice:
+        raise ValueError(f"{twice[0]!r} stands there twice; lines on a sheet are told apart by their pens")
+    return pens
+
+
 class TrialsSection(Settings):
     """How trials on a robot are led through; changes no simulated result."""
 
@@ -66,7 +73,9 @@ class TrialsSection(Settings):
         False,
         description="Show trials under codes, so that nobody who counts cells knows of which condition they are.",
     )
-    pens: list[Annotated[Line, Field(min_length=1, max_length=20)]] = Field(
+    pens: Annotated[
+        list[Annotated[Line, Field(min_length=1, max_length=20)]], AfterValidator(_told_apart)
+    ] = Field(
         ["black", "red", "blue", "green", "orange", "purple", "brown", "pink"],
         min_length=1,
         max_length=64,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
@@ -74,8 +74,11 @@ class Operator(Protocol):
         """What was drawn, where that is known as soon as the robot stands; else None, and `enter` will ask."""
         ...
 
-    def enter(self, cards: Sequence[Card]) -> Mapping[int, Score]:
-        """What was drawn on a sheet, by the number of the trial; what is left out is asked for later."""
+    def enter(self, cards: Sequence[Card], *, is_full: bool) -> Iterable[tuple[int, Score]]:
+        """Number and cells of each of these trials, kept one by one; what is left out is asked for later.
+
+        Called with the trial just driven, and once the sheet is full with all of its trials that are not scored.
+        """
         ...
 
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
@@ -122,7 +125,16 @@ class WitnessOperator:
         return self._witness
 
     def meet(self, robot: Robot) -> None:
-        """Take the witness that comes with the robot's port, unless there is one."""
+        """Take the witness that comes with the robot's port, unless there is one.
+
+        Raises:
+            RobotError: The robot would count as REAL; what a witness sees is an emulated one.
+        """
+        if robot.label != "EMULATED":
+            raise RobotError(
+                f"A robot on this port counts as {robot.label}, and a witness sees an emulated one: its cells would "
+                "be taken for a robot's. Use a pseudo-terminal or a port of this machine, or leave --witness out."
+            )
         own = getattr(getattr(robot, "port", None), "witness", None) or getattr(robot, "witness", None)
         self._witness = own or self._witness
         self.witness.place(PREFLIGHT_POSE, 0)
@@ -160,9 +172,9 @@ class WitnessOperator:
             path=path[np.maximum(rows, 0), 1:4].tolist(),
         )
 
-    def enter(self, cards: Sequence[Card]) -> Mapping[int, Score]:
+    def enter(self, cards: Sequence[Card], *, is_full: bool) -> Iterable[tuple[int, Score]]:
         """Nothing: what was not seen when it was driven is not known any more."""
-        return {}
+        return ()
 
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
         """Close it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import statistics
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,12 +41,12 @@ class Preflight:
         return {"facts": self.facts, "problems": list(self.problems)}
 
 
-def preflight(robot: Robot, remembered: Mapping[str, str] | None = None) -> Preflight:
+def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Preflight:
     """Look at a robot that is free to turn on the spot for one command.
 
     Args:
         robot: Connected.
-        remembered: What the robot of earlier sittings was told by; None before the first.
+        known: What the robots of earlier sittings were told by.
 
     Raises:
         RobotError: It does not answer.
@@ -56,7 +56,8 @@ def preflight(robot: Robot, remembered: Mapping[str, str] | None = None) -> Pref
     problems: list[str] = []
     identity = identity_of(robot)
     facts |= identity
-    problems += _other_robot(identity, remembered)
+    for before in known:
+        problems += _other_robot(identity, before)
     times, raws = [], []
     for _ in range(N_READS):
         began = clock.now()
@@ -88,10 +89,10 @@ def identity_of(robot: Robot) -> dict[str, str]:
     return {name: str(value).strip() for name, value in found.items() if value is not None}
 
 
-def _other_robot(identity: Mapping[str, str], remembered: Mapping[str, str] | None) -> list[str]:
+def _other_robot(identity: Mapping[str, str], before: Mapping[str, str]) -> list[str]:
     differing = [
         f"{name} is {identity.get(name, 'not told')!r}, before {value!r}"
-        for name, value in (remembered or {}).items()
+        for name, value in before.items()
         if identity.get(name) != value
     ]
     return [f"this is another robot than before: {', '.join(differing)}"] if differing else []

@@ -1,0 +1,61 @@
+"""How far trials are that nobody leads through: some lines on standard error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import typer
+
+from realitygap.trials import Card, DrivenTrial, Verdict, WitnessOperator
+
+if TYPE_CHECKING:
+    from realitygap.emulator import Witness
+    from realitygap.records import Score, Trial
+
+_SILENCE_S = 10.0
+"""After so long a silence the next trial is told of, too."""
+
+
+def telling_witness(witness: Witness | None, in_flight: Verdict, *, quiet: bool) -> WitnessOperator:
+    """The witness of an emulated robot, which tells of each generation unless it is to be quiet."""
+    return (WitnessOperator if quiet else _TellingWitness)(witness, in_flight=in_flight)
+
+
+class _TellingWitness(WitnessOperator):
+    """Tells of each generation that is closed, and of a trial where that takes long."""
+
+    _told = 0.0
+
+    def place(self, card: Card) -> None:
+        """Put the robot at the start."""
+        self._told = self._told or time.monotonic()
+        super().place(card)
+
+    def drawn(self, card: Card, driven: DrivenTrial) -> Score:
+        """The cells along the driven line."""
+        score = super().drawn(card, driven)
+        if time.monotonic() - self._told > _SILENCE_S:
+            self._say(f"Trial {card.trial.trial}, {card.title}: {len(set(score.cells))} cells.")
+        return score
+
+    def close(self, cards: Sequence[Card]) -> Sequence[int]:
+        """Close it."""
+        trials = sorted((card.trial for card in cards), key=_run)
+        for (condition, replicate, generation), group in groupby(trials, key=_run):
+            counts = [len(trial.cells or ()) for trial in group]
+            self._say(
+                f"{condition}, run {replicate}, generation {generation}: {len(counts)} trials, at most {max(counts)} "
+                "cells."
+            )
+        return super().close(cards)
+
+    def _say(self, text: str) -> None:
+        typer.echo(text, err=True)
+        self._told = time.monotonic()
+
+
+def _run(trial: Trial) -> tuple[str, int, int]:
+    return trial.condition, trial.replicate, trial.generation

@@ -56,6 +56,29 @@ def test_a_study_runs_unattended_and_comes_out_the_same_again(tmp_path, selectio
         assert len(ledger.scores()[0]["path"]) == 4 * 12 + 1
 
 
+OTHER_ARENA = """
+walls = [[0, 0, 2, 0], [2, 0, 2, 1], [2, 1, 0, 1], [0, 1, 0, 0]]
+start = [0.5, 0.5, 0.0]
+[grid]
+x = 0.0
+y = 0.0
+cell = 0.1
+columns = 20
+rows = 10
+"""
+
+
+def test_a_robot_in_another_arena_than_the_study_s_is_refused(tmp_path):
+    # its cells would have been counted in another grid
+    file = tmp_path / "other.toml"
+    file.write_text(OTHER_ARENA)
+    study = small_study("coverage", **LONGER)
+    with pytest.raises(RealityGapError, match=r"drives in the arena 'other', and the study is about 'paper'"):
+        run_study(study, tmp_path / "out", port=f"{PORT}&arena={file}")
+    assert {trial.state for trial in trials_of(tmp_path / "out")} == {"planned"}
+    assert run_study(study, tmp_path / "out", port=PORT).physical.n_complete == 1
+
+
 def killed_after(n_trials: int, path: Path, study) -> bool:
     """Carry out the study in a process that is killed in the middle of a trial; whether it was."""
     child = os.fork()

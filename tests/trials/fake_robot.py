@@ -11,7 +11,7 @@ import numpy as np
 from realitygap.errors import RobotError
 from realitygap.robots import Command, Observation, check_command
 from realitygap.trials import cell_at
-from realitygap.world import Pose, paper_arena
+from realitygap.world import Arena, Pose, paper_arena
 
 SPEED = 0.14  # [m/s]
 TURN_RATE = 1.8  # [rad/s]
@@ -103,6 +103,9 @@ class FakeRobot:
 
     def now(self) -> float:
         return self.clock.now()
+
+    def arena(self) -> Arena:
+        return paper_arena()
 
     def path(self) -> np.ndarray:
         return np.array([(time, *pose) for time, pose in self._line])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.world import Grid, Pose
+from realitygap.world import Arena, Grid, Pose
 
 from ._emulator import Emulator
 
@@ -29,6 +29,10 @@ class Witness(Protocol):
 
     def place(self, pose: Pose, seed: int) -> None:
         """Put the robot somewhere, motors off; pen path and sensor noise begin anew."""
+        ...
+
+    def arena(self) -> Arena:
+        """Where it drives, and whose cells are counted."""
         ...
 
     def pose(self) -> Pose:
@@ -72,6 +76,10 @@ class DirectWitness:
         """Put the robot somewhere, motors off."""
         with self._lock:
             self._emulator.place(Pose(*pose), seed)
+
+    def arena(self) -> Arena:
+        """Where it drives."""
+        return self._emulator.scene.arena
 
     def pose(self) -> Pose:
         """Where it is."""
@@ -129,6 +137,8 @@ def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
         return witness.cells_at([float(time) for time in request["times"]])
     if what == "path":
         return witness.path().tolist()
+    if what == "arena":
+        return witness.arena().to_dict()
     if what in ("now", "pose", "motors", "cells"):
         return getattr(witness, what)()
     raise ValueError(f"cannot do {what!r}")
@@ -176,6 +186,10 @@ class RemoteWitness:
     def place(self, pose: Pose, seed: int) -> None:
         """Put the robot somewhere, motors off."""
         self._ask("place", pose=list(pose), seed=seed)
+
+    def arena(self) -> Arena:
+        """Where it drives."""
+        return Arena.from_dict(self._ask("arena"))
 
     def pose(self) -> Pose:
         """Where it is."""

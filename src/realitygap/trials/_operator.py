@@ -148,7 +148,17 @@ class WitnessOperator:
         return self._in_flight
 
     def place(self, card: Card) -> None:
-        """Put the robot at the start."""
+        """Put the robot at the start.
+
+        Raises:
+            RobotError: It drives in another arena than the study's.
+        """
+        there, wanted = self.witness.arena(), card.arena
+        if there.grid != wanted.grid or set(there.walls) != set(wanted.walls):
+            raise RobotError(
+                f"The emulated robot drives in the arena {there.name!r}, and the study is about {wanted.name!r}: other "
+                "walls or cells. Start the emulator with the study's arena (--arena, or arena= in its port)."
+            )
         self.witness.place(card.arena.start, trial_seed(card))
         self._times = []
 

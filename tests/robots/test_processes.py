@@ -50,6 +50,10 @@ def server() -> Iterator[Server]:
         yield server
 
 
+def _hear_hang_ups() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # tests that run under nohup hand down that it is ignored
+
+
 @pytest.mark.parametrize("way", WAYS_OUT)
 def test_the_wheels_stand_still_after(way, server):
     program, number, status = WAYS_OUT[way]
@@ -58,6 +62,7 @@ def test_the_wheels_stand_still_after(way, server):
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
+        preexec_fn=_hear_hang_ups,
     ) as process:
         assert process.stdout.readline() == "driving\n"
         if number == signal.SIGKILL:

@@ -112,6 +112,8 @@ def _serve(
         if sys.stdout.isatty() and not quiet and command is None:
             view = LiveView(f"{emulator.model}, Fluke {emulator.fluke_model}: {channel.name}")
         server = Server(emulator, channel, speed=speed, witness=witness, watch=view.show if view else None)
+        if command is not None:
+            stack.enter_context(_exit_on_sigterm())
         stack.enter_context(server)
         if command is None:
             stack.enter_context(_ended_by_signals(server))
@@ -130,13 +132,20 @@ def _run(server: Server, command: str) -> int:
     """Serve while a client program runs; its status."""
     from realitygap.emulator._client import run_client
 
-    def end(number: int, frame: FrameType | None) -> None:
+    server.start()
+    return run_client(command, server.name)
+
+
+@contextmanager
+def _exit_on_sigterm() -> Iterator[None]:
+    """Let SIGTERM leave the program as an exception does, so that the link is removed."""
+
+    def leave(number: int, frame: FrameType | None) -> None:
         raise SystemExit(128 + number)
 
-    before = signal.signal(signal.SIGTERM, end)
+    before = signal.signal(signal.SIGTERM, leave)
     try:
-        server.start()
-        return run_client(command, server.name)
+        yield
     finally:
         signal.signal(signal.SIGTERM, before)
 

@@ -27,10 +27,10 @@ from realitygap.report._drawing import (
 from realitygap.report._path_figure import (
     TracedPath,
     arena_extent,
-    body_outline,
     draw_arena,
     draw_path,
     draw_path_legend,
+    draw_visited,
     no_such_run,
     say_origin,
     trace_paths,
@@ -279,25 +279,7 @@ def _draw_generations(
 
 
 def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *, small: bool) -> None:
-    from matplotlib.patches import Rectangle
-
-    grid = arena.grid
-    for cell in sorted({cell for path in paths for cell in path.cells}):
-        row, column = divmod(cell, grid.columns)
-        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
-    outline = body_outline(body, arena.start)
-    draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
-    draw_line(
-        axes,
-        [arena.start.x],
-        [arena.start.y],
-        marker="o",
-        linestyle="",
-        color=Ink.TEXT,
-        markersize=3.4,
-        zorder=7,
-    )
+    draw_visited(axes, sorted({cell for path in paths for cell in path.cells}), arena, body)
     drawn = [path for path in paths if path.poses is not None]
     for path in paths:
         if path.poses is not None:

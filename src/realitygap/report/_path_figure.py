@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -268,12 +268,12 @@ def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: 
         )
 
 
-def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
-    """One trial: cells, path, start, end, and where it was blocked."""
+def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> None:
+    """What lies under paths: visited cells, the robot's outline at the start, and the start."""
     from matplotlib.patches import Rectangle
 
     grid = arena.grid
-    for cell in path.cells:
+    for cell in cells:
         row, column = divmod(cell, grid.columns)
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
@@ -289,6 +289,11 @@ def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
         markersize=3.4,
         zorder=7,
     )
+
+
+def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
+    """One trial: cells, path, start, end, and where it was blocked."""
+    draw_visited(axes, path.cells, arena, body)
     if path.poses is None or path.stalled is None:
         return
     draw_line(

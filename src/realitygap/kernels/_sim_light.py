@@ -83,7 +83,7 @@ def add_light(ahead, left, distance, strength, cosine, sine, edge, scale, lit, r
 
 @stage
 def answer_light(gain, noise, word, reading):
-    """gain * reading + noise * N(0, 1), limited to 0..1, by a word a lane."""
+    """Gain * reading + noise * N(0, 1), limited to 0..1, by a word a lane."""
     real = reading.dtype.type
     for lane in range(LANES):
         one = gain[lane] * reading[lane] + noise[lane] * normal(word[lane], noise[lane])

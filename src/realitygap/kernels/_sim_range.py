@@ -14,6 +14,8 @@ from ._compile import inlined, stage
 from ._lanes import LANES, fill
 from ._math import LOG2_E, exp2
 
+STEEP = 1e30  # [1/m]: any distance times it is beyond the limits of `exp2`
+
 
 @inlined
 def unit_of(word, like):
@@ -24,7 +26,7 @@ def unit_of(word, like):
 
 @stage
 def rate_of(width, rate):
-    """log2(e) / width: what `exp2` wants for e^(d / width); 0 where the width is 0.
+    """log2(e) / width: what `exp2` wants for e^(d / width). A width of 0 makes a step of it.
 
     Args:
         width: (LANES,) [m].
@@ -35,7 +37,7 @@ def rate_of(width, rate):
         one = width[lane]
         none = one == real(0.0)
         divisor = real(1.0) if none else one
-        rate[lane] = real(0.0) if none else real(LOG2_E) / divisor
+        rate[lane] = real(STEEP) if none else real(LOG2_E) / divisor
 
 
 @stage

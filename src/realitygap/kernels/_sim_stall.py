@@ -63,7 +63,9 @@ def idler_stall(was, now, wheels, before, idler, share, keep, driven, rolled, st
         new_rolled = kept * rolled[lane] + (real(1.0) - kept) * way
         driven[lane] = new_driven
         rolled[lane] = new_rolled
-        stalled[lane] = real(1.0) if new_rolled < share[lane] * new_driven else real(0.0)
+        turning = (left[lane] != before_left[lane]) | (right[lane] != before_right[lane])
+        slow = new_rolled < share[lane] * new_driven
+        stalled[lane] = real(1.0) if slow & turning else real(0.0)
     for lane in range(LANES):
         was_sine[lane] = sine[lane]
         was_cosine[lane] = cosine[lane]

@@ -94,7 +94,7 @@ def test_light_noise_has_the_stated_spread() -> None:
     answers = []
     for _ in range(cases(1_000, 20)):
         reading = row(0.25, np.float64)
-        _sim_light.answer_light(row(2.0, np.float64), row(0.05, np.float64), random_words(rng, 1)[0], reading)
+        _sim_light.answer_light(row(2.0, np.float64), row(0.1, np.float64), random_words(rng, 1)[0], reading)
         answers.append(reading)
     seen = np.concatenate(answers)
     assert seen.mean() == pytest.approx(0.5, abs=4 * 0.05 / np.sqrt(seen.size))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap.errors import whole_number
 from realitygap.evolution import Genome
+from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import Networks
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
 from realitygap.tasks import TraceArrays
@@ -19,8 +20,10 @@ from realitygap.world import Pose
 
 REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
-PAPER_INPUTS = ("obstacle", "stall", "time")
-"""What the paper's networks see, the constant input aside."""
+
+def paper_inputs(rules: NeatRules) -> tuple[str, ...]:
+    """What the paper's networks see, with the constant input where they have one."""
+    return ("obstacle", "stall", "time", *(("bias",) if rules.bias_input >= 0 else ()))
 
 
 def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:
@@ -192,8 +195,8 @@ class PlatformTrials(Protocol):
         ...
 
 
-def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str]) -> None:
-    """Refuse genomes that cannot be tried together, or not with these inputs (the constant one aside).
+def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> None:
+    """Refuse genomes that cannot be tried together, or not with these inputs (the paper's when not given).
 
     Raises:
         ValueError: No genome, one with other inputs or outputs, or genomes of several kinds.
@@ -201,8 +204,10 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str]) -> None:
     if not genomes:
         raise ValueError("No genome to try, expected at least one.")
     first = _kind(genomes[0])
-    expected = len(inputs)
-    names = "largest reading, stall, time" if tuple(inputs) == PAPER_INPUTS else ", ".join(inputs)
+    names = ["largest reading", "stall", "time"]
+    if inputs is not None:
+        names = [name for name in inputs if name != "bias"]
+    expected = len(names)
     # Genomes of one population share their rules: few kinds need a look.
     kinds = {(id(genome.rules), genome.bias_value): k for k, genome in reversed(list(enumerate(genomes)))}
     for k in sorted(kinds.values()):
@@ -210,8 +215,8 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str]) -> None:
         given = rules.n_inputs - (rules.bias_input >= 0)
         if given != expected or rules.n_outputs != 2:
             raise ValueError(
-                f"A genome has {given} inputs and {rules.n_outputs} outputs, expected {expected} inputs ({names}; "
-                "a constant one is extra) and 2 outputs (move, turn)."
+                f"A genome has {given} inputs and {rules.n_outputs} outputs, expected {expected} inputs "
+                f"({', '.join(names)}; a constant one is extra) and 2 outputs (move, turn)."
             )
     for k in sorted(kinds.values()):
         for name, value in _kind(genomes[k]).items():

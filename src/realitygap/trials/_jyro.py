@@ -152,6 +152,7 @@ class JyroTrials:
         self.reach = np.full(len(self.sensors), platform.sensor_range)
         self._rules = rules
         self._n_cells = arena.grid.n_cells
+        self._hidden_room = -1
         self._scene = jyro_scene(platform, arena)
         self._trial = jyro_rules(
             platform, noise=noise, bias_input=rules.bias_input >= 0, bias_value=bias_value
@@ -179,7 +180,11 @@ class JyroTrials:
         cells = np.zeros((n, self._n_cells), np.uint8)
         end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
         counts = np.zeros((n, 3), np.int32)
-        lanes, wiring = make_block(scene, self._rules, networks.place.shape[1])
+        hidden_room = networks.place.shape[1]
+        if hidden_room != self._hidden_room:
+            self._hidden_room = hidden_room
+            self._block = make_block(scene, self._rules, hidden_room)
+        lanes, wiring = self._block
         run_trials(
             scene,
             self._trial,

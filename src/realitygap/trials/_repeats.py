@@ -11,7 +11,7 @@ from realitygap.evolution import Genome
 from realitygap.kernels._philox import MAX_REPEATS
 from realitygap.world import Arena
 
-from ._batch import PAPER_INPUTS, NoiseKey, TrialBatch, check_genomes, counters_of
+from ._batch import NoiseKey, TrialBatch, check_genomes, counters_of
 from ._try import Platform, try_all
 
 
@@ -23,7 +23,7 @@ def retry_genomes(
     noise: float,
     noise_keys: Sequence[NoiseKey],
     repeats: range,
-    inputs: Sequence[str] = PAPER_INPUTS,
+    inputs: Sequence[str] | None = None,
 ) -> TrialBatch:
     """Try each of n genomes once for each number in `repeats`, r in all.
 
@@ -34,7 +34,7 @@ def retry_genomes(
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
-        inputs: What the networks see, the constant input aside.
+        inputs: What the networks see, as in `try_genomes`.
 
     Returns:
         n * r trials, those of a genome together: `coverage_line.reshape(n, r)` has a row per genome.

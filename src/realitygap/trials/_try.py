@@ -15,7 +15,6 @@ from realitygap.tasks import Trajectories
 from realitygap.world import Arena
 
 from ._batch import (
-    PAPER_INPUTS,
     NoiseKey,
     PlatformTrials,
     Trajectory,
@@ -23,6 +22,7 @@ from ._batch import (
     Tried,
     check_genomes,
     counters_of,
+    paper_inputs,
     poses_of,
 )
 from ._jyro import JyroTrials
@@ -35,7 +35,7 @@ def open_trials(
     arena: Arena,
     rules: NeatRules,
     *,
-    inputs: Sequence[str] = PAPER_INPUTS,
+    inputs: Sequence[str] | None = None,
     noise: float,
     bias_value: float,
 ) -> PlatformTrials:
@@ -45,17 +45,18 @@ def open_trials(
         platform: The robot as simulated.
         arena: Where.
         rules: NEAT's, of which only the network's kind counts.
-        inputs: What the networks see, the constant input aside.
+        inputs: Names of what the networks see, in order; the paper's when not given.
         noise: Level a: each reading is moved by a * U(-1, 1).
         bias_value: Of the constant input.
 
     Raises:
         ValueError: The platform cannot give such inputs, or the noise is not a finite number from 0 on.
     """
-    if tuple(inputs) != PAPER_INPUTS:
+    names = paper_inputs(rules) if inputs is None else tuple(inputs)
+    if names != paper_inputs(rules):
         raise ValueError(
-            f"The networks see {', '.join(inputs)}, expected {', '.join(PAPER_INPUTS)} on platform 'jyro', the "
-            "paper's simulation: choose platform 'sim'."
+            f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform 'jyro', the "
+            "paper's simulation. Choose platform 'sim'."
         )
     return JyroTrials(platform, arena, rules, noise=noise, bias_value=bias_value)
 
@@ -68,7 +69,7 @@ def try_all(
     key: int,
     counters: NDArray[np.uint32],
     *,
-    inputs: Sequence[str],
+    inputs: Sequence[str] | None,
     noise: float,
     trace: bool = False,
 ) -> tuple[PlatformTrials, Tried]:
@@ -88,18 +89,19 @@ def try_genomes(
     *,
     noise: float,
     noise_key: NoiseKey,
-    inputs: Sequence[str] = PAPER_INPUTS,
+    inputs: Sequence[str] | None = None,
 ) -> TrialBatch:
     """Try each of n genomes of one population once.
 
     Args:
         platform: The robot as simulated.
         arena: Where.
-        genomes: With the inputs named, or one more, constant, and 2 outputs; all of one kind: constant input,
-            activation, recurrence and biases of nodes are the same.
+        genomes: With these inputs and 2 outputs; all of one kind: constant input, activation, recurrence and biases of
+            nodes are the same.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
-        inputs: What the networks see, the constant input aside; the paper's largest reading, stall and time.
+        inputs: Names of what the networks see, in order (`Task.inputs`); the paper's obstacle, stall and time when not
+            given, and `bias` where the genomes have a constant input.
 
     Raises:
         ValueError: No genome, one with other inputs or outputs, genomes of several kinds, noise that is not a
@@ -116,11 +118,11 @@ def trace_genomes(
     *,
     noise: float,
     noise_key: NoiseKey,
-    inputs: Sequence[str] = PAPER_INPUTS,
+    inputs: Sequence[str] | None = None,
 ) -> Trajectories:
     """Try each of n genomes once and keep every step; arguments and errors as in `try_genomes`."""
     trials, tried = _try_in_order(platform, arena, genomes, noise, noise_key, inputs, trace=True)
-    names = (*inputs, *(("bias",) if genomes[0].rules.bias_input >= 0 else ()))
+    names = paper_inputs(genomes[0].rules) if inputs is None else tuple(inputs)
     return trajectories_of(trials, tried, arena, names)
 
 
@@ -148,7 +150,7 @@ def trace_genome(
     *,
     noise: float,
     noise_key: NoiseKey,
-    inputs: Sequence[str] = PAPER_INPUTS,
+    inputs: Sequence[str] | None = None,
 ) -> Trajectory:
     """Try one genome once and keep every step; arguments and errors as in `try_genomes`."""
     trials, tried = _try_in_order(platform, arena, [genome], noise, noise_key, inputs, trace=True)
@@ -172,7 +174,7 @@ def _try_in_order(
     genomes: Sequence[Genome],
     noise: float,
     noise_key: NoiseKey,
-    inputs: Sequence[str],
+    inputs: Sequence[str] | None,
     *,
     trace: bool = False,
 ) -> tuple[PlatformTrials, Tried]:

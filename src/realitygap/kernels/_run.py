@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import inlined, kernel
+from ._distances import Behaviors, Measure, describe, make_behaviors, make_measure
 from ._evolve import next_generation
 from ._genome import Genomes, first_genomes, make_genomes
 from ._lanes import LANES, Lanes
@@ -17,12 +18,9 @@ from ._mutation import Innovations, clear_innovations
 from ._network import Networks, decode, make_networks
 from ._novelty import (
     Archive,
-    CellTable,
     NearestRoom,
-    make_cell_table,
     nearest_archive_step,
     paper_archive_step,
-    sort_cells,
 )
 from ._philox import FIRST, PURPOSE_NOISE, make_stream
 from ._species import SpeciesTable, clear_species, speciate
@@ -45,6 +43,7 @@ class RunRules(NamedTuple):
     archive_size: int
     above_all: bool  # whether a newcomer must be more novel than everyone in the paper's archive
     by_column: bool  # whether behaviors are sorted by x first
+    distance: int  # of behaviors, as in `_distances`
     neighbors: int
     archive_threshold: float
     archive_patience: int
@@ -100,9 +99,9 @@ class RunRoom(NamedTuple):
     cells: NDArray[np.uint8]  # (t, k)
     ends: NDArray[np.uint8]  # (t, k)
     counts: NDArray[np.int32]  # (t, 3)
-    places: NDArray[np.int32]  # (n, k)
-    n_places: NDArray[np.int32]  # (n,)
-    table: CellTable
+    ended: NDArray[np.float64]  # (t, 2) where trials ended [m from the start]
+    behaviors: Behaviors  # n
+    measure: Measure
     nearest: NearestRoom
 
 
@@ -157,8 +156,9 @@ def _species_of_run(species, run):
 @inlined
 def _archive_of(archive, run):
     return Archive(
-        archive.places[run],
-        archive.n_places[run],
+        Behaviors(
+            archive.behaviors.marks[run], archive.behaviors.n_cells[run], archive.behaviors.points[run]
+        ),
         archive.among[run],
         archive.state[run],
         archive.place_of,
@@ -198,8 +198,11 @@ def _make_runs(rules, cells, n_runs):
             np.zeros((4, n)),
         ),
         archive=Archive(
-            np.zeros((n_runs, archive_room, cells), np.int32),
-            np.zeros((n_runs, archive_room), np.int32),
+            Behaviors(
+                np.zeros((n_runs, archive_room, cells), np.int32),
+                np.zeros((n_runs, archive_room), np.int32),
+                np.zeros((n_runs, archive_room, 2)),
+            ),
             np.zeros((n_runs, rules.archive_size, rules.archive_size)),
             np.zeros((n_runs, 2), np.int64),
             np.zeros(n, np.int64),
@@ -298,22 +301,20 @@ def _score(room, run, rules, scene, rows, to_run, generation):
         runs.fitness[run, row] = counted / n_cells
         if is_novelty:
             visited = room.ends[trial] if rules.count_ends else room.cells[trial]
-            sort_cells(visited, counted, room.table, room.places[row])
-            room.n_places[row] = counted
+            x, y = room.ended[trial, 0], room.ended[trial, 1]
+            describe(room.measure, visited, counted, x, y, room.behaviors, row)
     if not is_novelty:
         return
     archive = _archive_of(runs.archive, run)
     novelty = runs.novelty[run]
     if rules.selection == NOVELTY:
-        paper_archive_step(room.places, room.n_places, room.table.span, archive, rules.above_all, novelty)
+        paper_archive_step(room.behaviors, room.measure, archive, rules.above_all, novelty)
     else:
         nearest_archive_step(
-            room.places,
-            room.n_places,
-            room.table.span,
+            room.behaviors,
+            room.measure,
             rules.archive_patience,
-            archive.places,
-            archive.n_places,
+            archive.behaviors,
             archive.state,
             runs.archive_counters[run],
             runs.archive_threshold[run],
@@ -353,9 +354,9 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
         cells=np.zeros((trials, n_cells), np.uint8),
         ends=np.zeros((trials, n_cells), np.uint8),
         counts=np.zeros((trials, 3), np.int32),
-        places=np.zeros((n, n_cells), np.int32),
-        n_places=np.zeros(n, np.int32),
-        table=make_cell_table(scene.columns, scene.rows, rules.by_column),
+        ended=np.zeros((trials, 2)),
+        behaviors=make_behaviors(n, n_cells),
+        measure=make_measure(rules.distance, scene.columns, scene.rows, rules.by_column),
         nearest=NearestRoom(np.zeros(n + archive_room), np.zeros(rules.neighbors), np.zeros(n, np.bool_)),
     )
 
@@ -415,6 +416,9 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
                     room.counts,
                     room.trace,
                 )
+                for lane in range(n_lanes):
+                    room.ended[first + lane, 0] = room.lanes.pose.x[lane]
+                    room.ended[first + lane, 1] = room.lanes.pose.y[lane]
                 if rules.count_ends:
                     for lane in range(n_lanes):
                         list_cells(room.lanes.ends, lane, scene.columns, scene.rows, room.ends[first + lane])

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from realitygap.errors import OutgrownError, whole_number
 from realitygap.evolution import distance_kind
-from realitygap.kernels import _run
-from realitygap.kernels._run import RunRows, RunRules
+from realitygap.kernels import _block, _run
+from realitygap.kernels._block import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
 from realitygap.trials import jyro_rules, jyro_scene
 
@@ -32,11 +32,11 @@ MAX_REPLICATES = 1 << 32
 def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
     novelty = condition.novelty
-    selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[
+    selection = {"coverage": _block.COVERAGE, "novelty": _block.NOVELTY, "random": _block.RANDOM}[
         condition.selection
     ]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
-        selection = _run.NEAREST_NOVELTY
+        selection = _block.NEAREST_NOVELTY
     return RunRules(
         n_generations=condition.neat.generations,
         population=condition.neat.population,

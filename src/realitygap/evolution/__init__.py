@@ -1,5 +1,6 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
+from ._archive import NoveltyArchive
 from ._distances import DISTANCES, BehaviorDistance, behavior_distance, distance_kind
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
@@ -27,6 +28,7 @@ __all__ = [
     "NeatSettings",
     "Network",
     "NodeGene",
+    "NoveltyArchive",
     "NoveltySettings",
     "PaperArchive",
     "Population",

@@ -47,9 +47,7 @@ def least_cost(one: Sequence[Point], other: Sequence[Point], cost: Callable[[Poi
 
 
 def edit(one: Cells, other: Cells, columns: int, rows: int) -> float:
-    return least_cost(
-        in_order(one, columns), in_order(other, columns), lambda a, b: 0.0 if a == b else 1.0
-    )
+    return least_cost(in_order(one, columns), in_order(other, columns), lambda a, b: 0.0 if a == b else 1.0)
 
 
 def alignment(one: Cells, other: Cells, columns: int, rows: int) -> float:

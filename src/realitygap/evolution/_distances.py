@@ -132,7 +132,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             unit="m",
             cost="1",
             description="How far apart the two ended, in a straight line.",
-            source="Lehman & Stanley (2011), section 4.1: where a trial ends.",
+            source="Lehman & Stanley (2011): where a trial in a maze ends.",
         ),
         BehaviorDistance(
             "edit",

@@ -9,19 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import inlined, kernel
+from ._distances import Behaviors, Measure, describe, make_behaviors, make_measure
 from ._evolve import next_generation
 from ._genome import Genomes, first_genomes
 from ._mutation import Innovations, clear_innovations
 from ._network import decode
-from ._novelty import (
-    Archive,
-    CellTable,
-    NearestRoom,
-    make_cell_table,
-    nearest_archive_step,
-    paper_archive_step,
-    sort_cells,
-)
+from ._novelty import Archive, NearestRoom, nearest_archive_step, paper_archive_step
 from ._philox import FIRST, PURPOSE_NOISE, make_stream
 from ._species import SpeciesTable, clear_species, speciate
 
@@ -41,6 +34,7 @@ class RunRules(NamedTuple):
     archive_size: int
     above_all: bool  # whether a newcomer must be more novel than everyone in the paper's archive
     by_column: bool  # whether behaviors are sorted by x first
+    distance: int  # of behaviors: a kind of `_distances`
     neighbors: int
     archive_threshold: float
     archive_patience: int
@@ -84,9 +78,8 @@ class Runs(NamedTuple):
 class NoveltyRoom(NamedTuple):
     """Room for the novelty of a generation of n individuals in an arena of k cells."""
 
-    places: NDArray[np.int32]  # (n, k)
-    n_places: NDArray[np.int32]  # (n,)
-    table: CellTable
+    behaviors: Behaviors  # n
+    measure: Measure
     nearest: NearestRoom
 
 
@@ -141,8 +134,9 @@ def _species_of_run(species, run):
 @inlined
 def _archive_of(archive, run):
     return Archive(
-        archive.places[run],
-        archive.n_places[run],
+        Behaviors(
+            archive.behaviors.marks[run], archive.behaviors.n_cells[run], archive.behaviors.points[run]
+        ),
         archive.among[run],
         archive.state[run],
         archive.place_of,
@@ -182,8 +176,11 @@ def make_runs(rules, cells, n_runs):
             np.zeros((4, n)),
         ),
         archive=Archive(
-            np.zeros((n_runs, archive_room, cells), np.int32),
-            np.zeros((n_runs, archive_room), np.int32),
+            Behaviors(
+                np.zeros((n_runs, archive_room, cells), np.int32),
+                np.zeros((n_runs, archive_room), np.int32),
+                np.zeros((n_runs, archive_room, 2)),
+            ),
             np.zeros((n_runs, rules.archive_size, rules.archive_size)),
             np.zeros((n_runs, 2), np.int64),
             np.zeros(n, np.int64),
@@ -271,33 +268,30 @@ def make_novelty_room(rules, columns, rows):
     n = rules.population
     archive_room = n * rules.n_generations if rules.selection == NEAREST_NOVELTY else 0
     return NoveltyRoom(
-        places=np.zeros((n, columns * rows), np.int32),
-        n_places=np.zeros(n, np.int32),
-        table=make_cell_table(columns, rows, rules.by_column),
+        behaviors=make_behaviors(n, columns * rows),
+        measure=make_measure(rules.distance, columns, rows, rules.by_column),
         nearest=NearestRoom(np.zeros(n + archive_room), np.zeros(rules.neighbors), np.zeros(n, np.bool_)),
     )
 
 
 @kernel
-def _select_novel(runs, run, visited, counts, rules, room):
+def _select_novel(runs, run, visited, counts, ended, rules, room):
     """Make the novelty of a run's generation what selection uses."""
     for row in range(rules.population):
         trial = run * rules.population + row
         counted = counts[trial, 1] if rules.count_ends else counts[trial, 0]
-        sort_cells(visited[trial], counted, room.table, room.places[row])
-        room.n_places[row] = counted
+        x, y = ended[trial, 0], ended[trial, 1]
+        describe(room.measure, visited[trial], counted, x, y, room.behaviors, row)
     archive = _archive_of(runs.archive, run)
     novelty = runs.novelty[run]
     if rules.selection == NOVELTY:
-        paper_archive_step(room.places, room.n_places, room.table.span, archive, rules.above_all, novelty)
+        paper_archive_step(room.behaviors, room.measure, archive, rules.above_all, novelty)
     else:
         nearest_archive_step(
-            room.places,
-            room.n_places,
-            room.table.span,
+            room.behaviors,
+            room.measure,
             rules.archive_patience,
-            archive.places,
-            archive.n_places,
+            archive.behaviors,
             archive.state,
             runs.archive_counters[run],
             runs.archive_threshold[run],
@@ -348,15 +342,17 @@ def cover_runs(runs, n_runs, counts, rules, n_cells):
 
 
 @kernel
-def select_novel(runs, n_runs, visited, counts, rules, room):
-    """Make novelty by the paper's distance what selection uses, and bring the archives up to date.
+def select_novel(runs, n_runs, visited, counts, ended, rules, room):
+    """Make novelty by the distance of the rules what selection uses, and bring the archives up to date.
 
     Args:
-        visited: (t, c) uint8 the cells that count of each trial, run by run.
+        visited: (t, c) uint8 the cells that count of each trial, run by run; in order of first visit where the
+            distance looks at it.
         counts: (t, 3) as in `cover_runs`.
+        ended: (t, 2) where each trial ended [m].
     """
     for run in range(n_runs):
-        _select_novel(runs, run, visited, counts, rules, room)
+        _select_novel(runs, run, visited, counts, ended, rules, room)
 
 
 @kernel

@@ -45,6 +45,7 @@ class RunRoom(NamedTuple):
     cells: NDArray[np.uint8]  # (t, k)
     ends: NDArray[np.uint8]  # (t, k)
     counts: NDArray[np.int32]  # (t, 3)
+    ended: NDArray[np.float64]  # (t, 2) where trials ended [m from the start]
     novelty: NoveltyRoom
 
 
@@ -76,6 +77,7 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
         cells=np.zeros((trials, n_cells), np.uint8),
         ends=np.zeros((trials, n_cells), np.uint8),
         counts=np.zeros((trials, 3), np.int32),
+        ended=np.zeros((trials, 2)),
         novelty=make_novelty_room(rules, scene.columns, scene.rows),
     )
 
@@ -127,6 +129,9 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
                     room.counts,
                     room.trace,
                 )
+                for lane in range(n_lanes):
+                    room.ended[first_trial + lane, 0] = room.lanes.pose.x[lane]
+                    room.ended[first_trial + lane, 1] = room.lanes.pose.y[lane]
                 if rules.count_ends:
                     for lane in range(n_lanes):
                         list_cells(
@@ -135,7 +140,7 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
             cover_runs(runs, n_runs, room.counts, rules, scene.columns * scene.rows)
             if novelty:
                 visited = room.ends if rules.count_ends else room.cells
-                select_novel(runs, n_runs, visited, room.counts, rules, room.novelty)
+                select_novel(runs, n_runs, visited, room.counts, room.ended, rules, room.novelty)
             keep_runs(runs, genomes, n_runs, room.cells, room.counts, rows, first_run, generation)
             if generation + 1 < rules.n_generations:
                 breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)

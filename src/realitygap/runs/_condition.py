@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
-from realitygap.evolution import NeatSettings, NoveltySettings, random_key
+from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.settings import Settings, mistakes
@@ -84,6 +84,24 @@ class Condition(Settings):
             raise ValueError(
                 "task.cells is 'ends', expected 'line' with platform 'scribbler': on paper stands the line that was "
                 "driven, and not where steps end."
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _the_distance_can_be_told(self) -> Self:
+        distance = DISTANCES[self.novelty.distance]
+        if self.selection != "novelty":
+            return self
+        if self.is_physical and (distance.needs_order or distance.compares != "cells"):
+            what = "their order" if distance.needs_order else "where the trial ended"
+            raise ValueError(
+                f"novelty.distance is {distance.name!r}, expected 'paper', 'jaccard' or 'hamming' with platform "
+                f"'scribbler': an operator enters the visited squares, and not {what}."
+            )
+        if distance.needs_order and self.task.cells != "line":
+            raise ValueError(
+                f"novelty.distance is {distance.name!r}, which looks at the order of visits, expected task.cells "
+                f"'line' with it: of the cells at the ends of steps no order is kept."
             )
         return self
 

@@ -9,6 +9,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from realitygap.errors import OutgrownError, whole_number
+from realitygap.evolution import distance_kind
 from realitygap.kernels import _block, _run
 from realitygap.kernels._block import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
@@ -45,6 +46,7 @@ def run_rules(condition: Condition) -> RunRules:
         archive_size=novelty.archive_size,
         above_all=novelty.enter == "above-all",
         by_column=novelty.sort == "x-then-y",
+        distance=distance_kind(novelty.distance),
         neighbors=novelty.neighbors,
         archive_threshold=float(novelty.threshold),
         archive_patience=novelty.patience,

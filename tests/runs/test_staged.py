@@ -20,6 +20,8 @@ VARIANTS: list[dict[str, Any]] = [
     {"selection": "novelty", "task": {"cells": "ends"}},
     {"selection": "coverage", "task": {"cells": "ends", "bias_input": "always"}},
     {"selection": "novelty", "novelty": {"kind": "lehman-stanley"}, "task": {"cells": "ends"}},
+    {"selection": "novelty", "novelty": {"distance": "final"}},
+    {"selection": "novelty", "novelty": {"distance": "alignment"}},
     {"neat": {"add_node": 0.9, "add_link": 0.9, "generations": 12, "node_bias": True, "recurrent": True}},
     {"jyro": {"precision": "double", "turn_per_step": 0.9}, "neat": {"population": 5, "start_hidden": 2}},
 ]

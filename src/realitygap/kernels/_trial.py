@@ -368,7 +368,9 @@ def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, 
 
 
 @kernel
-def run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, ends, counts, trace):
+def run_trials(
+    scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, ends, ended, counts, trace
+):
     """Carry out n trials, a block after the other.
 
     Args:
@@ -377,12 +379,16 @@ def run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring,
         rows: (n,) int32, which network each trial is of.
         lanes, wiring: Room.
         ends: (n, c) uint8, written: cells at the ends of steps, in ascending order; (0, c) keeps none.
+        ended: (n, 2) float64, written: where trials ended [m from the start].
         key, counters, cells, counts, trace: As in `run_block`.
     """
     for first in range(0, rows.size, LANES):
         n_lanes = min(LANES, rows.size - first)
         wire(networks, rows, first, n_lanes, neat, wiring)
         run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, cells, counts, trace)
+        for lane in range(n_lanes):
+            ended[first + lane, 0] = lanes.pose.x[lane]
+            ended[first + lane, 1] = lanes.pose.y[lane]
         if ends.shape[0] > 0:
             for lane in range(n_lanes):
                 list_cells(lanes.ends, lane, scene.columns, scene.rows, ends[first + lane])

@@ -130,7 +130,7 @@ def _run_block(
         _block.cover_runs(runs, n_runs, counts, rules, n_cells)
         if is_novelty:
             visited = tried.ends if rules.count_ends else batch.cells
-            _block.select_novel(runs, n_runs, visited, counts, rules, block.novelty)
+            _block.select_novel(runs, n_runs, visited, counts, tried.ended, rules, block.novelty)
         _block.keep_runs(runs, genomes, n_runs, batch.cells, counts, rows, first_row, generation)
         if generation + 1 < rules.n_generations:
             _block.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)

@@ -127,11 +127,25 @@ def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
     def work(call: int) -> int:
         cells = np.zeros((TRIALS_PER_CALL, scene.columns * scene.rows), np.uint8)
         counts = np.zeros((TRIALS_PER_CALL, 3), np.int32)
+        ended = np.zeros((TRIALS_PER_CALL, 2))
         lanes, wiring = make_block(scene, neat, networks.place.shape[1])
         counters = counters_of(NoiseKey(0, replicate=call), TRIALS_PER_CALL)
         key = np.uint64(condition.key)
         run_trials(
-            scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, no_ends, counts, nothing
+            scene,
+            rules,
+            neat,
+            networks,
+            rows,
+            key,
+            counters,
+            lanes,
+            wiring,
+            cells,
+            no_ends,
+            ended,
+            counts,
+            nothing,
         )
         return TRIALS_PER_CALL * condition.jyro.steps
 

@@ -143,12 +143,14 @@ class Tried(NamedTuple):
     Attributes:
         batch: Of all of them.
         ends: (n, c) uint8 the cells in which steps end, in ascending order; no rows where they were not asked for.
+        ended: (n, 2) x and y at the end, from the arena's start [m].
         trace: Every step; its arrays have no rows where it was not asked for.
         distances: (t + 1, s, n) what the range sensors measure as parts of their reach, without noise; likewise.
     """
 
     batch: TrialBatch
     ends: NDArray[np.uint8]
+    ended: NDArray[np.float64]
     trace: TraceArrays
     distances: NDArray[np.floating]
 

@@ -179,6 +179,7 @@ class JyroTrials:
         )
         cells = np.zeros((n, self._n_cells), np.uint8)
         end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
+        ended = np.zeros((n, 2))
         counts = np.zeros((n, 3), np.int32)
         hidden_room = networks.place.shape[1]
         if hidden_room != self._hidden_room:
@@ -197,11 +198,12 @@ class JyroTrials:
             wiring,
             cells,
             end_cells,
+            ended,
             counts,
             steps,
         )
         batch = TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2])
-        return Tried(batch, end_cells, _as_arrays(steps), steps.readings)
+        return Tried(batch, end_cells, ended, _as_arrays(steps), steps.readings)
 
 
 def _as_arrays(trace: Trace) -> TraceArrays:

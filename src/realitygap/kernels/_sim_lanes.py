@@ -11,6 +11,7 @@ from ._compile import kernel, stage
 from ._lanes import LANES, Line, Poses, Row, Rows, Words, fill
 from ._math import sin_cos_of_turns
 from ._philox import PURPOSE_DRIVE
+from ._sim_senses import Senses, make_senses, start_senses
 from ._wiring import Wiring, make_wiring
 
 N_SPARE = 24  # rows for what stages work out on the way
@@ -45,6 +46,7 @@ class SimLanes(NamedTuple):
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
     readings: Rows  # (n_readings,) 0..1, 1 is near
+    senses: Senses
     counters: Words  # (3,) the fixed words of each trial's random numbers
     drive_counters: Words  # (3,) likewise, for another purpose
     words: Words  # (4,) random
@@ -121,6 +123,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         distances=rows(n_rays),
         rates=rows(n_rays),
         readings=rows(shape.n_readings),
+        senses=make_senses(shape, dtype),
         counters=bits(3),
         drive_counters=bits(3),
         words=bits(4),
@@ -254,3 +257,4 @@ def start_block(shape, rules, table, counters, first, n_lanes, lanes):
     for word in range(lanes.visited.shape[0]):
         fill(lanes.visited[word], np.uint32(0))
         fill(lanes.ends[word], np.uint32(0))
+    start_senses(shape, rules, lanes)

@@ -1,0 +1,99 @@
+"""What is on the floor: dark tape, or an image."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._obstacle import TAPE_WIDTH, Segment, distance_to_segment
+
+MOST_PIXELS = 512  # across or up: a larger image is more than line sensors see, and would fill records
+
+
+@dataclass(frozen=True)
+class FloorImage:
+    """How dark the floor is, pixel by pixel.
+
+    Attributes:
+        x, y: Lower left corner [m].
+        width, height: How large it lies there [m].
+        columns, rows: Of its pixels.
+        pixels: (rows * columns) bytes, 0 dark to 255 light, the top row first, compressed and in letters.
+    """
+
+    x: float
+    y: float
+    width: float
+    height: float
+    columns: int
+    rows: int
+    pixels: str
+
+    @classmethod
+    def of(cls, x: float, y: float, width: float, height: float, gray: NDArray[np.uint8]) -> FloorImage:
+        """The image of (rows, columns) bytes, 0 dark to 255 light, the top row first."""
+        rows, columns = gray.shape
+        packed = base64.b85encode(zlib.compress(np.ascontiguousarray(gray, np.uint8).tobytes(), 9))
+        return cls(x, y, width, height, columns, rows, packed.decode())
+
+    @cached_property
+    def gray(self) -> NDArray[np.uint8]:
+        """(rows, columns) 0 dark to 255 light, the top row first."""
+        unpacker = zlib.decompressobj()
+        data = unpacker.decompress(base64.b85decode(self.pixels), self.rows * self.columns)
+        return np.frombuffer(data, np.uint8).reshape(self.rows, self.columns)
+
+    def darkness(self, x: float, y: float) -> float:
+        """How dark the floor is at a point [m]: 0 light, 1 dark, and 0 beside the image."""
+        column = int(np.floor((x - self.x) / self.width * self.columns))
+        row = int(np.floor((self.y + self.height - y) / self.height * self.rows))
+        if not (0 <= column < self.columns and 0 <= row < self.rows):
+            return 0.0
+        return 1.0 - float(self.gray[row, column]) / 255
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A light floor with dark tape on it, or an image.
+
+    Attributes:
+        tape: (k, 4) x1, y1, x2, y2 along the middle of each strip [m].
+        tape_width: Of the strips [m].
+        image: What it is printed with.
+    """
+
+    tape: tuple[Segment, ...] = ()
+    tape_width: float = TAPE_WIDTH
+    image: FloorImage | None = None
+
+    def darkness(self, x: float, y: float) -> float:
+        """How dark the floor is at a point [m]: 0 light, 1 dark."""
+        if any(distance_to_segment(x, y, strip) <= self.tape_width / 2 for strip in self.tape):
+            return 1.0
+        return 0.0 if self.image is None else self.image.darkness(x, y)
+
+    def to_dict(self) -> dict[str, Any]:
+        """It as plain values, without what is not there."""
+        values: dict[str, Any] = {}
+        if self.tape:
+            values |= {"tape": [list(strip) for strip in self.tape], "tape_width": self.tape_width}
+        if self.image is not None:
+            names = ("x", "y", "width", "height", "columns", "rows", "pixels")
+            values["image"] = {name: getattr(self.image, name) for name in names}
+        return values
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Floor:
+        """The floor that `to_dict` described."""
+        tape = tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in values.get("tape", ()))
+        image = FloorImage(**values["image"]) if "image" in values else None
+        return cls(tape, values.get("tape_width", TAPE_WIDTH), image)
+
+
+BARE_FLOOR = Floor()

@@ -2,5 +2,6 @@
 
 from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
+from ._mazes import MAZE_TASKS, MazeAgent, MazeTask
 
-__all__ = ["CLASSICAL_TASKS", "ClassicalTask", "CoverageTask"]
+__all__ = ["CLASSICAL_TASKS", "MAZE_TASKS", "ClassicalTask", "CoverageTask", "MazeAgent", "MazeTask"]

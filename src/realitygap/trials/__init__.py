@@ -12,13 +12,14 @@ from ._jyro import (
     try_genomes,
 )
 from ._jyro_robot import JyroRobot
-from ._operator import Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
+from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 
 __all__ = [
+    "PATH_PARTS",
     "Card",
     "DrivenTrial",
     "EndReason",

@@ -20,15 +20,15 @@ def show(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="A folder of results; or network, species, lineage, movie, arena or robot.",
+            help="A folder of results; or network, species, lineage, divergence, movie, arena or robot.",
         ),
     ],
     names: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="NAME",
-            help="After network, species and lineage, the folder; after movie, one or more; after arena, paper; after "
-            "robot, jyro.",
+            help="After network, species, lineage and divergence, the folder; after movie, one or more; after arena, "
+            "paper; after robot, jyro.",
         ),
     ] = None,
     out: Annotated[
@@ -51,12 +51,22 @@ def show(
     speed: Annotated[
         float | None, typer.Option(help="Of a movie: 2 is twice as fast as it was. [default: 1]")
     ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Of a divergence: another condition, or a platform, to try the network on."
+        ),
+    ] = None,
+    repeats: Annotated[
+        int | None, typer.Option(help="Of a divergence: trials on each of the two. [default: 30]")
+    ] = None,
 ) -> None:
     """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file, or trials in motion.
 
     A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
-    commands. FILE.gif shows a trial in motion (without --generation, the run's best), movie several of them. Trials are
-    recomputed from their rows. A file that is there gives way once the new one is complete.
+    commands. FILE.gif and FILE.mp4 show a trial in motion (without --generation, the run's best), movie several of
+    them. divergence tries a trial's network on two platforms, and shows how far they come apart. Trials are recomputed
+    from their rows. A file that is there gives way once the new one is complete.
 
     Example: realitygap show results/paper --condition coverage-50 --replicate 3 -o run.svg
 
@@ -70,6 +80,8 @@ def show(
 
     Example: realitygap show lineage results/paper --condition novelty-50 -o lineage.svg
 
+    Example: realitygap show divergence results/paper --condition novelty-50 --against novelty-10 -o divergence.svg
+
     Example: realitygap show arena -o arena.svg
 
     Example: realitygap show robot jyro -o robot.svg
@@ -80,6 +92,8 @@ def show(
 
     In Python: realitygap.write_movie("results/paper", "eight.gif", each="individual", generation=4)
 
+    In Python: realitygap.report.save_divergence("results/paper", "divergence.svg", against="novelty-10")
+
     In Python: realitygap.report.save_arena("arena.svg"), realitygap.report.save_robot("robot.svg")
     """
     if out is None:
@@ -88,11 +102,17 @@ def show(
 
     numbers = (replicate, generation, individual)
     try:
+        if what != "movie":
+            _refuse(what, ("--each", "--speed"), each, speed)
+        if what != "divergence":
+            _refuse(what, ("--against", "--repeats"), against, repeats)
         if what == "movie":
             typer.echo(f"Written: {_movie(names, out, each, speed, condition, *numbers)}")
             return
-        _refuse(what, ("--each", "--speed"), each, speed)
         name = _one_name(what, names)
+        if what == "divergence":
+            typer.echo(f"Written: {_divergence(name, out, against, repeats, condition, *numbers)}")
+            return
         if what in ("arena", "robot"):
             _refuse(what, _NUMBERS, condition, *numbers)
             save = save_arena if what == "arena" else save_robot
@@ -124,8 +144,8 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
         return subjects[what], name
     if name is not None:
         raise StudyError(
-            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, movie, arena or robot first, or "
-            "only a folder."
+            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, divergence, movie, arena or robot "
+            "first, or only a folder."
         )
     return "run", what
 
@@ -155,6 +175,35 @@ def _movie(
         generation=generation,
         individual=individual,
         speed=1.0 if speed is None else speed,
+    )
+
+
+def _divergence(
+    name: str | None,
+    out: Path,
+    against: str | None,
+    repeats: int | None,
+    condition: str | None,
+    replicate: int | None,
+    generation: int | None,
+    individual: int | None,
+) -> Path:
+    from realitygap.report import save_divergence
+
+    if name is None or against is None:
+        raise StudyError(
+            "Of which results, and tried on what beside its own condition? realitygap show divergence results/paper "
+            f"--against novelty-10 -o {shlex.quote(str(out))}"
+        )
+    return save_divergence(
+        name,
+        out,
+        against=against,
+        condition=condition,
+        replicate=replicate,
+        generation=generation,
+        individual=individual,
+        repeats=30 if repeats is None else repeats,
     )
 
 

@@ -20,6 +20,7 @@ from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
+from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._effects import (
     Interval,
@@ -104,6 +105,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_view",
     "save_arena",
     "save_robot",
+    # two platforms
+    "compare_trials",
+    "Side",
+    "draw_divergence",
+    "save_divergence",
     # in motion
     "write_movie",
     "choose_moving",

@@ -5,7 +5,7 @@ It lies below `world`, because it knows nothing but points, colors and text. Wha
 same shapes into its figures, and matplotlib is imported only there.
 """
 
-from ._ink import Ink
+from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 
-__all__ = ["FONT", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text"]
+__all__ = ["FONT", "PENS", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text"]

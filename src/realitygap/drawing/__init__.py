@@ -7,5 +7,6 @@ same shapes into its figures, and matplotlib is imported only there.
 
 from ._ink import Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
+from ._x11 import hex_of, rgb_of
 
-__all__ = ["FONT", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text"]
+__all__ = ["FONT", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text", "hex_of", "rgb_of"]

@@ -28,6 +28,7 @@ def rgb_of(color: str) -> Rgb:
     hint = f"Did you mean {near[0]!r}?" if near else "Give an X11 name, such as 'red', or #rrggbb."
     raise ValueError(f"Unknown color {color!r}. {hint}")
 
+
 def hex_of(color: str) -> str:
     """A color as `#rrggbb`, which pictures take.
 
@@ -35,6 +36,7 @@ def hex_of(color: str) -> str:
         ValueError: There is no such color.
     """
     return "#{:02x}{:02x}{:02x}".format(*rgb_of(color))
+
 
 @functools.cache
 def x11_colors() -> dict[str, Rgb]:

@@ -188,7 +188,7 @@ def length7(ax, ay, bx, by):
 
 @kernel
 def nearest_hit(lines, ray, px, py, reach):
-    """The nearest of `lines` (n, 6) that `ray` (6,) from P crosses within `reach` [m]: (distance or inf, which or -1)."""
+    """The nearest of `lines` (n, 6) that `ray` (6,) crosses within `reach` [m] of P: (distance or inf, which or -1)."""
     nearest = math.inf
     which = np.int64(-1)
     for i in range(len(lines)):
@@ -324,7 +324,9 @@ def light_at(standing, lights, robot, pose, mount, sensor, reach, stops):
     turned = pose[2] + _HALF_PI
     cos = math.cos(turned)
     sin = math.sin(turned)
-    px = pose[0] + mount[0] * cos - mount[1] * sin  # the point of `look_along`, but Jyro adds in another order here
+    px = (
+        pose[0] + mount[0] * cos - mount[1] * sin
+    )  # the point of `look_along`, but Jyro adds in another order here
     py = pose[1] + mount[0] * sin + mount[1] * cos
     total = 0.0
     for i in range(len(lights)):

@@ -167,18 +167,19 @@ class Camera(Device):
         large.save(file, "PNG")
         return file.getvalue()
 
-    def shapes(self) -> list[Shape]:
-        """The camera on the robot, and the borders of what it sees."""
-        corners = ((0.14, -0.06), (0.06, -0.06), (0.06, 0.06), (0.14, 0.06))
-        housing = tuple(self.robot.point(*corner) for corner in corners)
-        shapes: list[Shape] = [Line(housing, None, closed=True, fill=Ink.TEXT)]
+    def rays(self) -> list[Shape]:
+        """The borders of what it sees."""
+        shapes: list[Shape] = []
         for angle, column in ((self.field / 2, self.columns[0]), (-self.field / 2, self.columns[-1])):
             if column:
                 end = (column.distance * math.cos(angle), column.distance * math.sin(angle))
-                shapes.append(
-                    Line((self.robot.point(0.0, 0.0), self.robot.point(*end)), Ink.PEN4, 0.5, (2.0, 2.0))
-                )
+                ends = (self.robot.point(0.0, 0.0), self.robot.point(*end))
+                shapes.append(Line(ends, Ink.PEN4, 0.6, (2.0, 2.0)))
         return shapes
+
+    def shapes(self) -> list[Shape]:
+        """The camera on the robot."""
+        return [self.robot.polygon(((0.14, -0.06), (0.06, -0.06), (0.06, 0.06), (0.14, 0.06)), "black", None)]
 
     def to_dict(self) -> dict[str, Any]:
         """Size, field, and what each column sees, as plain values."""

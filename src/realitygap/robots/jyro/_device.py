@@ -56,8 +56,12 @@ class Device:
         """
         return ()
 
+    def rays(self) -> list[Shape]:
+        """What it sees, drawn below the robot, in the world's coordinates [m]."""
+        return []
+
     def shapes(self) -> list[Shape]:
-        """What it looks like, in the world's coordinates [m]."""
+        """What it looks like, drawn above the robot, in the world's coordinates [m]."""
         return []
 
     def to_dict(self) -> dict[str, Any]:

@@ -66,7 +66,7 @@ class RangeSensor(MountedSensors):
             nearest = np.clip(nearest, 0.0, self.max_range)
         return nearest
 
-    def shapes(self) -> list[Shape]:
+    def rays(self) -> list[Shape]:
         """The rays, as far as they see."""
         shapes: list[Shape] = []
         for (forward, left, direction), far in zip(self.mounts.tolist(), self._lengths(), strict=True):

@@ -228,12 +228,13 @@ class SceneRobot:
         shapes: list[Shape] = []
         if len(self.trail) > 1:
             shapes.append(Line(tuple((pose.x, pose.y) for pose in self.trail), hex_of(self.color), 0.9))
-        shapes += [shape for device in self.devices if device.active for shape in device.shapes()]
+        shapes += [shape for device in self.devices if device.active for shape in device.rays()]
         shapes += self.outlines()
         for ax, ay, bx, by in self._segments:
             shapes.append(Line((self.point(ax, ay), self.point(bx, by)), Ink.TEXT, 1.0))
         head = (self.point(0.0, 0.012), self.point(0.03, 0.0), self.point(0.0, -0.012))
         shapes.append(Line(head, None, closed=True, fill=Ink.TEXT))
+        shapes += [shape for device in self.devices for shape in device.shapes()]
         if self.speech:
             x, y = self.point(0.0, 0.0)
             shapes.append(Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True))

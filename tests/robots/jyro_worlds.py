@@ -1,4 +1,4 @@
-"""Set-ups of `tests/data/jyro_world`, which real Jyro has carried out, carried out here."""
+"""Set-ups of `tests/data/world_of_jyro`, which real Jyro has carried out, carried out here."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from realitygap.robots import jyro
 from realitygap.world import Pose
 
-FOLDER = Path(__file__).parents[1] / "data" / "jyro_world"
+FOLDER = Path(__file__).parents[1] / "data" / "world_of_jyro"
 HALF_PI = np.pi / 2
 SETUPS = sorted(path.stem for path in FOLDER.glob("*.json") if path.stem not in ("colors", "groups"))
 

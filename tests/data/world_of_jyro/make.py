@@ -1,7 +1,7 @@
 """What real Jyro 0.3.2 does with several robots and all of its devices; writes the files beside this one.
 
     uv venv /tmp/jyro && uv pip install --python /tmp/jyro jyro==0.3.2 numpy
-    /tmp/jyro/bin/python tests/data/jyro_world/make.py
+    /tmp/jyro/bin/python tests/data/world_of_jyro/make.py
 
 Each file is a set-up and, step by step, what Jyro reported. Jyro needs the system library cairo. A step of a set-up is
 a list of things to do before it: `[robot, "move", speed, turn rate]`, `[robot, "gripper", "close"]` and so on, as `do`

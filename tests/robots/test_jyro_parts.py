@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from realitygap.drawing import Line
 from realitygap.errors import RobotError
@@ -431,6 +433,32 @@ def test_the_picture_shows_everything() -> None:
     robot.move(0.2, 0.0)
     world.step(120)
     assert "blocked: pioneer-1" in world._repr_svg_()
+
+
+def test_parts_of_a_picture_can_be_hidden() -> None:
+    world = room()
+    robot = world.add(Pioneer(0.6, 1.0, color="orchid"))
+    robot.add(Pioneer4Sonars())
+    assert "#da70d6" not in world.picture(hide=["bodies"]).to_svg()
+    assert len(world.picture().shapes) - len(world.picture(hide=["rays"]).shapes) == 4
+    with pytest.raises(ValueError, match="Nothing is called 'ray'"):
+        world.picture(hide=["ray"])
+
+
+def test_a_world_is_saved_as_picture_and_movie(tmp_path: Path) -> None:
+    world = room()
+    robot = world.add(Scribbler(1.0, 1.0))
+    robot.move(0.3, 0.5)
+    assert world.save(tmp_path / "world.svg").read_text() == world._repr_svg_()
+    with Image.open(world.save(tmp_path / "world.png", width=300)) as image:
+        assert image.size[0] == 300
+    with Image.open(world.save_movie(tmp_path / "world.gif", 10, every=2, width=200)) as movie:
+        assert movie.n_frames == 6
+        assert movie.info["duration"] == 200
+    assert world.n_steps == 10
+    for call in (world.save, lambda path: world.save_movie(path, 3)):
+        with pytest.raises(ValueError, match=r"ends in \.jpg, expected"):
+            call(tmp_path / "world.jpg")
 
 
 def test_an_empty_world_has_a_picture() -> None:

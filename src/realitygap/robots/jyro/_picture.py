@@ -3,32 +3,47 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from realitygap.drawing import Line, Picture, Shape, hex_of
+from realitygap.errors import did_you_mean
 
 if TYPE_CHECKING:
-    from ._world import JyroWorld
+    from ._world import Box, JyroWorld
 
+PARTS = ("boxes", "shapes", "lights", "walls", "trails", "rays", "bodies", "devices", "speech")
+"""What a picture is made of."""
 LAMP_RADIUS = 0.25  # as Jyro draws them [m]
 _MARGIN = 0.03  # around everything, of the larger side
 _FAR = 100.0  # what is further away is not shown: stored robots are [m]
 _ALONE = (-0.5, 0.5)  # what is shown of an empty world [m]
 
 
-def world_picture(world: JyroWorld) -> Picture:
-    """Boxes, walls, lamps, robots with what they carry and see, to scale."""
+def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
+    """Boxes, walls, lamps, robots with what they carry and see, to scale.
+
+    Args:
+        world: As it is now.
+        hide: What is left out: any of `PARTS`.
+
+    Raises:
+        ValueError: There is no such part.
+    """
+    for part in hide:
+        if part not in PARTS:
+            raise ValueError(f"Nothing is called {part!r}. {did_you_mean(part, PARTS)}")
     left, right, bottom, top = _borders(world)
     margin = _MARGIN * max(right - left, top - bottom)
-    shapes: list[Shape] = [
-        _rectangle(box.left, box.bottom, box.right, box.top, hex_of(box.fill)) for box in world.boxes
+    parts: list[tuple[str, Sequence[Shape]]] = [
+        ("boxes", [_rectangle(box) for box in world.boxes]),
+        ("shapes", world.drawn),
+        ("lights", [_disc(lamp.x, lamp.y, LAMP_RADIUS, hex_of(lamp.color)) for lamp in world.lights]),
+        ("walls", _walls(world)),
     ]
-    shapes += world.drawn
-    shapes += [_disc(lamp.x, lamp.y, LAMP_RADIUS, hex_of(lamp.color)) for lamp in world.lights]
-    for (x1, y1, x2, y2), color in zip(world.walls, world.wall_colors, strict=True):
-        shapes.append(Line(((x1, y1), (x2, y2)), hex_of(color), 2.0))
     for robot in world.robots:
-        shapes += robot.shapes()
+        parts += robot.parts().items()
+    shapes = tuple(shape for part, own in parts if part not in hide for shape in own)
     n = len(world.robots)
     stalled = [str(robot.name) for robot in world.robots if robot.stalled]
     return Picture(
@@ -39,7 +54,7 @@ def world_picture(world: JyroWorld) -> Picture:
         bottom - margin,
         right + margin,
         top + margin,
-        tuple(shapes),
+        shapes,
     )
 
 
@@ -60,8 +75,16 @@ def _borders(world: JyroWorld) -> tuple[float, float, float, float]:
     return left, right, bottom, top
 
 
-def _rectangle(left: float, bottom: float, right: float, top: float, fill: str) -> Line:
-    return Line(((left, bottom), (right, bottom), (right, top), (left, top)), None, closed=True, fill=fill)
+def _walls(world: JyroWorld) -> list[Shape]:
+    return [
+        Line(((x1, y1), (x2, y2)), hex_of(color), 2.0)
+        for (x1, y1, x2, y2), color in zip(world.walls, world.wall_colors, strict=True)
+    ]
+
+
+def _rectangle(box: Box) -> Line:
+    corners = ((box.left, box.bottom), (box.right, box.bottom), (box.right, box.top), (box.left, box.top))
+    return Line(corners, None, closed=True, fill=hex_of(box.fill))
 
 
 def _disc(x: float, y: float, radius: float, fill: str, n: int = 48) -> Line:

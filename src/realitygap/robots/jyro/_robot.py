@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from ._device import Device, Edge
 if TYPE_CHECKING:
     from ._world import JyroWorld
 
+Part = Literal["trails", "rays", "bodies", "devices", "speech"]
+"""What a robot is drawn of."""
 AnyDevice = TypeVar("AnyDevice", bound=Device)
 
 
@@ -223,22 +225,34 @@ class SceneRobot:
         points = tuple(self.point(forward, left) for forward, left in corners)
         return Line(points, line, 0.8, closed=True, fill=hex_of(fill))
 
-    def shapes(self) -> list[Shape]:
-        """What it looks like: trail, body, single edges, devices, an arrow ahead, what it says."""
-        shapes: list[Shape] = []
-        if len(self.trail) > 1:
-            shapes.append(Line(tuple((pose.x, pose.y) for pose in self.trail), hex_of(self.color), 0.9))
-        shapes += [shape for device in self.devices if device.active for shape in device.rays()]
-        shapes += self.outlines()
+    def parts(self) -> dict[Part, list[Shape]]:
+        """What it looks like, part by part, from the hindmost to the foremost."""
+        return {
+            "trails": self._trail_shapes(),
+            "rays": [shape for device in self.devices if device.active for shape in device.rays()],
+            "bodies": self._body_shapes(),
+            "devices": [shape for device in self.devices for shape in device.shapes()],
+            "speech": self._speech_shapes(),
+        }
+
+    def _trail_shapes(self) -> list[Shape]:
+        if len(self.trail) < 2:
+            return []
+        return [Line(tuple((pose.x, pose.y) for pose in self.trail), hex_of(self.color), 0.9)]
+
+    def _body_shapes(self) -> list[Shape]:
+        shapes = self.outlines()
         for ax, ay, bx, by in self._segments:
             shapes.append(Line((self.point(ax, ay), self.point(bx, by)), Ink.TEXT, 1.0))
         head = (self.point(0.0, 0.012), self.point(0.03, 0.0), self.point(0.0, -0.012))
         shapes.append(Line(head, None, closed=True, fill=Ink.TEXT))
-        shapes += [shape for device in self.devices for shape in device.shapes()]
-        if self.speech:
-            x, y = self.point(0.0, 0.0)
-            shapes.append(Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True))
         return shapes
+
+    def _speech_shapes(self) -> list[Shape]:
+        if not self.speech:
+            return []
+        x, y = self.point(0.0, 0.0)
+        return [Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True)]
 
     def to_dict(self) -> dict[str, Any]:
         """What it is and does, devices and their readings included, as plain values."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Collection
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -330,14 +332,26 @@ class JyroWorld:
 
     # -- showing ----------------------------------------------------------------------------------------------
 
-    def picture(self) -> Picture:
-        """The world from above."""
+    def picture(self, hide: Collection[str] = ()) -> Picture:
+        """The world from above, without the parts to hide: "rays", "trails", "devices" and so on."""
         from ._picture import world_picture
 
-        return world_picture(self)
+        return world_picture(self, hide)
 
     def _repr_svg_(self) -> str:
         return self.picture().to_svg()
+
+    def save(self, path: str | Path, width: int = 720) -> Path:
+        """Write the picture to a file that ends in .svg or .png; see `save_world`."""
+        from ._files import save_world
+
+        return save_world(self, path, width)
+
+    def save_movie(self, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480) -> Path:
+        """Go on by some steps and write what happens as a GIF in real time; see `save_world_movie`."""
+        from ._files import save_world_movie
+
+        return save_world_movie(self, path, n_steps, every=every, width=width)
 
     def to_dict(self) -> dict[str, Any]:
         """Time, what stands and what all robots are and do, as plain values."""

@@ -2,7 +2,20 @@
 
 from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
+from ._kinds import TASKS, as_task, task_model
+from ._python import PythonTask
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
 
-__all__ = ["CLASSICAL_TASKS", "ClassicalTask", "CoverageTask", "Task", "TraceArrays", "Trajectories"]
+__all__ = [
+    "CLASSICAL_TASKS",
+    "TASKS",
+    "ClassicalTask",
+    "CoverageTask",
+    "PythonTask",
+    "Task",
+    "TraceArrays",
+    "Trajectories",
+    "as_task",
+    "task_model",
+]

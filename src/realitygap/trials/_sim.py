@@ -19,7 +19,7 @@ from realitygap.world import Arena
 from ._batch import REAL, TrialBatch, Tried
 from ._draws import Draws
 from ._jyro import SNAP
-from ._sim_scene import SimScene, highest, sim_scene
+from ._sim_scene import SimScene, sim_scene
 
 
 class SimTrials:
@@ -33,6 +33,8 @@ class SimTrials:
         noise: The paper's a, on top of the robot's own noise.
         bias_value: Of the constant input.
     """
+
+    distance_unit = 1.0
 
     def __init__(
         self,
@@ -48,9 +50,6 @@ class SimTrials:
         self.n_steps = platform.steps
         self.step_s = platform.command_s
         self.sensors = sensor_names(self.scene.shape)
-        self.reach = np.array(
-            [highest(self.scene.numbers[f"range.{k}.reach"]) for k in range(len(self.scene.robot.range))]
-        )
         self._draws = Draws(self.scene.numbers)
         self.drawn_names = self._draws.names
         self._rules = rules
@@ -60,6 +59,7 @@ class SimTrials:
         self._fixed = self.scene.table(self.scene.fixed)
         self._rows = np.array([self.scene.rows[name] for name in self.drawn_names], np.int64)
         self._table = self._fixed
+        self._no_trace = self._kept = self._make_trace(-1, 1)
 
     def carry_out(
         self,
@@ -78,9 +78,7 @@ class SimTrials:
         if hidden_room != self._hidden_room:
             self._hidden_room = hidden_room
             self._room = make_sim_room(self.scene.shape, self._rules, hidden_room, dtype)
-        steps = make_sim_trace(
-            self.scene.shape, self._rules.n_inputs, self.n_steps if trace else -1, n if trace else 1, dtype
-        )
+        steps = self._trace(n) if trace else self._no_trace
         cells = np.zeros((n, self._n_cells), np.uint8)
         end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
         ended = np.zeros((n, 2))
@@ -102,8 +100,18 @@ class SimTrials:
             steps,
         )
         batch = TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2], drawn, self.drawn_names)
-        reach = self.reach[:, None].astype(dtype)
-        return Tried(batch, end_cells, ended, _as_arrays(steps), steps.distances / reach)
+        return Tried(batch, end_cells, ended, _as_arrays(steps), steps.distances)
+
+    def _make_trace(self, n_steps: int, n_kept: int) -> SimTrace:
+        dtype = REAL[self.scene.platform.precision]
+        trace: SimTrace = make_sim_trace(self.scene.shape, self._rules.n_inputs, n_steps, n_kept, dtype)
+        return trace
+
+    def _trace(self, n: int) -> SimTrace:
+        """Room for every step of n trials, the same as for the call before where that had as many."""
+        if self._kept.stalled.shape != (self.n_steps + 1, n):
+            self._kept = self._make_trace(self.n_steps, n)
+        return self._kept
 
     def _table_of(self, drawn: NDArray[np.float64]) -> NDArray[np.floating]:
         """(p, n) the numbers of n trials, or (p, 1) where none is drawn. Only what is drawn is written anew."""

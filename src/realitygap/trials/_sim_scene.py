@@ -48,6 +48,11 @@ class SimScene:
     rows: dict[str, int]
 
     @property
+    def drawn_names(self) -> tuple[str, ...]:
+        """Of the numbers that are drawn, in the order in which records have them."""
+        return tuple(name for name, value in self.numbers.items() if isinstance(value, Distribution))
+
+    @property
     def origin(self) -> tuple[float, float]:
         """From where trials measure positions: the start [m]."""
         return self.arena.start.x, self.arena.start.y

@@ -162,13 +162,19 @@ def trace_genome(
     return Trajectory(
         trials.step_s,
         poses_of(trace.poses[:, :, 0], arena.start),
-        tried.distances[:, :, 0].astype(np.float64) * trials.reach,
+        tried.distances[:, :, 0].astype(np.float64) * trials.distance_unit,
         trace.inputs[:, :, 0].astype(np.float64),
         trace.commands[:, :, 0].astype(np.float64),
         trace.stalled[:, 0],
         float(batch.coverage_line[0]),
         float(batch.coverage_ends[0]),
         tuple(int(cell) for cell in batch.behavior(0)),
+        tuple(name for name in trials.sensors if name.startswith("range.")),
+        trace.wheels[:, :, 0].astype(np.float64),
+        trace.readings[:, :, 0].astype(np.float64),
+        trials.sensors,
+        tuple(batch.drawn[0].tolist()) if batch.drawn_names else (),
+        batch.drawn_names,
     )
 
 

@@ -36,8 +36,9 @@ def in_meters(values: Mapping[str, Any]) -> dict[str, Any]:
     """
     unit = values.get("unit", "m")
     rest = {key: value for key, value in values.items() if key != "unit"}
-    scale = FILE_UNITS.get(unit) if isinstance(unit, str) else unit
-    if type(scale) not in (int, float) or not (scale > 0 and math.isfinite(scale)):
+    named = FILE_UNITS.get(unit, 0.0) if isinstance(unit, str) else unit
+    scale = float(named) if type(named) in (int, float) else 0.0
+    if not (scale > 0 and math.isfinite(scale)):
         names = ", ".join(f"'{name}'" for name in FILE_UNITS)
         raise ValueError(f"unit: expected {names} or a length in meters, came {shown(unit)}")
     if scale == 1:
@@ -134,9 +135,8 @@ class ImageEntry(Settings):
 
     x: float = Field(0.0, description="Lower left corner [m].")
     y: float = Field(0.0, description="[m].")
-    width: float = Field(gt=0, description="How large it lies there [m].")
-    height: float = Field(gt=0, description="[m].")
-    file: str = Field("", description="An image file beside the arena file; its darkness counts.")
+    width: float = Field(gt=0, description="How wide it lies there [m]; its pixels are square.")
+    file: str = Field("", description="An image file beside the arena file; its brightness counts.")
     columns: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
     rows: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
     pixels: str = Field("", description="The pixels themselves; come from the file.")

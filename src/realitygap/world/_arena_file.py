@@ -74,7 +74,18 @@ def _scaled(value: Any, scale: float, key: str) -> Any:
     return value
 
 
-class WallEntry(Settings):
+class Row(Settings):
+    """A table that a file may write as a list of its numbers."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_whole_row(cls, values: Any) -> Any:
+        if isinstance(values, list | tuple):  # one of the right length is a table by now
+            raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
+        return values
+
+
+class WallEntry(Row):
     """A straight wall from one point to another."""
 
     x1: Number = Field(description="Where it begins [m].")
@@ -121,7 +132,7 @@ class LightEntry(Settings):
     )
 
 
-class TapeEntry(Settings):
+class TapeEntry(Row):
     """A dark strip on the floor, along its middle."""
 
     x1: float
@@ -171,7 +182,7 @@ class GridEntry(Settings):
         return self
 
 
-class StartEntry(Settings):
+class StartEntry(Row):
     """Where every trial begins."""
 
     x: Number = Field(description="[m].")
@@ -179,7 +190,7 @@ class StartEntry(Settings):
     heading: Number = Field(0.0, description="From +x, counter-clockwise [rad].")
 
 
-class GoalEntry(Settings):
+class GoalEntry(Row):
     """What is to be reached."""
 
     x: Number = Field(description="Center [m].")

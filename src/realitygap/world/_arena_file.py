@@ -212,7 +212,9 @@ class ArenaFile(Described):
     obstacle: tuple[ObstacleEntry, ...] = Field((), max_length=256)
     light: tuple[LightEntry, ...] = Field((), max_length=64)
     floor: FloorEntry = FloorEntry()
-    grid: GridEntry | None = Field(None, description="Left out: 16 cells along the longer side of the walls.")
+    grid: GridEntry | None = Field(
+        None, description="Left out: 16 cells along the longer side of the walls, in their middle."
+    )
     start: StartEntry
     goal: GoalEntry | None = None
 
@@ -278,8 +280,14 @@ class ArenaFile(Described):
         ys = [y for wall in self.wall for y in (wall.y1, wall.y2)] or [self.start.y - 0.5, self.start.y + 0.5]
         across, up = max(xs) - min(xs), max(ys) - min(ys)
         cell = max(across, up) / 16 or 1.0 / 16
-        columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (across, up))
-        return Grid(min(xs), min(ys), cell, columns, rows)
+        columns, rows = (max(1, math.floor(size / cell + 0.5)) for size in (across, up))
+        return Grid(
+            (min(xs) + max(xs) - columns * cell) / 2,
+            (min(ys) + max(ys) - rows * cell) / 2,
+            cell,
+            columns,
+            rows,
+        )
 
     def _floor(self) -> Floor:
         tape = tuple((each.x1, each.y1, each.x2, each.y2) for each in self.floor.tape)

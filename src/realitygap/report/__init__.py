@@ -28,6 +28,7 @@ from realitygap.report._distance_audit import (
     distance_notes,
 )
 from realitygap.report._distance_figure import draw_distance, save_distance
+from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._effects import (
     Interval,
@@ -42,6 +43,7 @@ from realitygap.report._frame_file import export_frame
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
+from realitygap.report._motion import Each, choose_moving, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
 from realitygap.report._paper_audit import Finding, audit_paper
@@ -119,6 +121,15 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_view",
     "save_arena",
     "save_robot",
+    # two platforms
+    "compare_trials",
+    "Side",
+    "draw_divergence",
+    "save_divergence",
+    # in motion
+    "write_movie",
+    "choose_moving",
+    "Each",
     # for other programs
     "export_individual",
     "export_frame",

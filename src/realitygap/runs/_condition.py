@@ -141,15 +141,21 @@ class Condition(Settings):
         return random_key(self.seed, None if self.pair else self.name)
 
     @property
+    def network_inputs(self) -> tuple[str, ...]:
+        """Names of what its networks see, in order."""
+        return self.task.input_names(self.selection)
+
+    @property
     def has_bias_input(self) -> bool:
         """Whether its networks have the constant input."""
-        return self.task.has_bias_input(self.selection)
+        return "bias" in self.network_inputs
 
     @property
     def neat_rules(self) -> NeatRules:
-        """Its NEAT in the form that kernels read: inputs largest reading, stall, time and, where it has one, 1."""
-        bias = self.has_bias_input
-        return self.neat.rules(3 + bias, 2, bias_input=3 if bias else -1)
+        """Its NEAT in the form that kernels read."""
+        inputs = self.network_inputs
+        bias_input = inputs.index("bias") if "bias" in inputs else -1
+        return self.neat.rules(len(inputs), 2, bias_input=bias_input)
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""

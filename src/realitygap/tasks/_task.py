@@ -23,8 +23,8 @@ class Task(Protocol):
         name: As `[task] kind` has it.
         inputs: What the networks see, in order: `obstacle` (the largest of the range readings), `stall`, `time`
             (step / steps), `bias` (constant, the last if there is one), one sensor's reading `range.K`, `light.K`,
-            `line.K`, `bump.K`, `encoder.K`, `goal.sector.K` (which pie slice the goal is in), `goal.distance`,
-            `last.move`, `last.turn`.
+            `line.K`, `bump.K`, `encoder.K`, `goal_sector.K` (which pie slice the goal is in), `goal_distance`,
+            `last_move`, `last_turn`.
         needs_trace: Whether `fitness` looks at single steps; where it does not, the arrays of steps have no rows.
     """
 

@@ -18,8 +18,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from realitygap.runs import MAZE_REWARDS, MazeReward, MazeTrials, run_maze
 from realitygap.evolution import NeatSettings
+from realitygap.runs import MAZE_REWARDS, MazeReward, MazeTrials, run_maze
 from realitygap.study import MAZE_SEEDS, measure_maze
 from realitygap.tasks import MAZE_TASKS
 from realitygap.world import load_arena

@@ -248,9 +248,9 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     n_sensors = trajectory.readings.shape[1]
     names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
     _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
-    axes[0].set_ylim(0, 1.08 * trial.condition.jyro.sensors.max_range)
+    axes[0].set_ylim(0, 1.08 * trial.condition.simulated_on.sensors.max_range)
     _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, ["obstacle"], "input")
-    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.task.output_names, "command")
+    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.output_names, "command")
     axes[2].set_ylim(-1.1, 1.1)
     for each in axes:
         each.set_xlim(0, times[-1])
@@ -310,7 +310,7 @@ def _frames(trial: ChosenTrial, trajectory: Trajectory, stride: int) -> list[Any
     from PIL import Image
 
     arena = trial.condition.arena.arena()
-    body, sensors = trial.condition.tried_on.body, trial.condition.jyro.sensors
+    body, sensors = trial.condition.tried_on.body, trial.condition.simulated_on.sensors
     x_range, y_range = arena_extent(arena)
     width, head = 8.0, 0.3
     up = (width - 0.1) * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])

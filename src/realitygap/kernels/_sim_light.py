@@ -1,6 +1,6 @@
 """Light sensors of the platform `sim`: several lights, a directional lobe, the inverse square, shadows.
 
-A sensor answers gain * sum over lights of strength * lobe * lit / d^2, plus noise * N, limited to 0..1. The lobe is
+A sensor answers gain * sum over lights of strength * lobe * lit / d^2, times 1 + noise * N, limited to 0..1. The lobe is
 (cos a - cos w) / (1 - cos w), a the angle between the sensor's direction and the light: 1 straight ahead, 0 from
 the half-width w on (w a quarter turn gives cos a). `lit` is 1, or in the shadow of a wall or an obstacle what the
 robot's description says: one half (as in Jyro) or 0.
@@ -83,9 +83,9 @@ def add_light(ahead, left, distance, strength, cosine, sine, edge, scale, lit, r
 
 @stage
 def answer_light(gain, noise, word, reading):
-    """Gain * reading + noise * N(0, 1), limited to 0..1, by a word a lane."""
+    """Gain * reading * (1 + noise * N(0, 1)), limited to 0..1, by a word a lane."""
     real = reading.dtype.type
     for lane in range(LANES):
-        one = gain[lane] * reading[lane] + noise[lane] * normal(word[lane], noise[lane])
+        one = gain[lane] * reading[lane] * (real(1.0) + noise[lane] * normal(word[lane], noise[lane]))
         one = one if one < real(1.0) else real(1.0)
         reading[lane] = one if one > real(0.0) else real(0.0)

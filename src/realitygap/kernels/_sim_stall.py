@@ -14,6 +14,8 @@ from ._compile import stage
 from ._lanes import LANES
 from ._math import exp
 
+COUNT = 2.5e-4  # of an S2's encoders [m]; less than that is no difference
+
 
 @stage
 def prepare_stall(window, step_s, keep):
@@ -64,7 +66,7 @@ def idler_stall(was, now, wheels, before, idler, share, keep, driven, rolled, st
         driven[lane] = new_driven
         rolled[lane] = new_rolled
         turning = (left[lane] != before_left[lane]) | (right[lane] != before_right[lane])
-        slow = new_rolled < share[lane] * new_driven
+        slow = new_rolled + real(COUNT) < share[lane] * new_driven
         stalled[lane] = real(1.0) if slow & turning else real(0.0)
     for lane in range(LANES):
         was_sine[lane] = sine[lane]

@@ -3,7 +3,7 @@
 from ._batch import NoiseKey, PlatformTrials, Trajectory, TrialBatch, counters_of, poses_of
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
-from ._operator import Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
+from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
@@ -13,6 +13,7 @@ from ._sim_scene import SimScene, sim_scene
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
+    "PATH_PARTS",
     "Card",
     "DrivenTrial",
     "EndReason",

@@ -36,8 +36,9 @@ def in_meters(values: Mapping[str, Any]) -> dict[str, Any]:
     """
     unit = values.get("unit", "m")
     rest = {key: value for key, value in values.items() if key != "unit"}
-    scale = FILE_UNITS.get(unit) if isinstance(unit, str) else unit
-    if type(scale) not in (int, float) or not (scale > 0 and math.isfinite(scale)):
+    named = FILE_UNITS.get(unit, 0.0) if isinstance(unit, str) else unit
+    scale = float(named) if type(named) in (int, float) else 0.0
+    if not (scale > 0 and math.isfinite(scale)):
         names = ", ".join(f"'{name}'" for name in FILE_UNITS)
         raise ValueError(f"unit: expected {names} or a length in meters, came {shown(unit)}")
     if scale == 1:
@@ -73,7 +74,18 @@ def _scaled(value: Any, scale: float, key: str) -> Any:
     return value
 
 
-class WallEntry(Settings):
+class Row(Settings):
+    """A table that a file may write as a list of its numbers."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_whole_row(cls, values: Any) -> Any:
+        if isinstance(values, list | tuple):  # one of the right length is a table by now
+            raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
+        return values
+
+
+class WallEntry(Row):
     """A straight wall from one point to another."""
 
     x1: Number = Field(description="Where it begins [m].")
@@ -120,7 +132,7 @@ class LightEntry(Settings):
     )
 
 
-class TapeEntry(Settings):
+class TapeEntry(Row):
     """A dark strip on the floor, along its middle."""
 
     x1: float
@@ -134,9 +146,8 @@ class ImageEntry(Settings):
 
     x: float = Field(0.0, description="Lower left corner [m].")
     y: float = Field(0.0, description="[m].")
-    width: float = Field(gt=0, description="How large it lies there [m].")
-    height: float = Field(gt=0, description="[m].")
-    file: str = Field("", description="An image file beside the arena file; its darkness counts.")
+    width: float = Field(gt=0, description="How wide it lies there [m]; its pixels are square.")
+    file: str = Field("", description="An image file beside the arena file; its brightness counts.")
     columns: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
     rows: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
     pixels: str = Field("", description="The pixels themselves; come from the file.")
@@ -171,7 +182,7 @@ class GridEntry(Settings):
         return self
 
 
-class StartEntry(Settings):
+class StartEntry(Row):
     """Where every trial begins."""
 
     x: Number = Field(description="[m].")
@@ -179,7 +190,7 @@ class StartEntry(Settings):
     heading: Number = Field(0.0, description="From +x, counter-clockwise [rad].")
 
 
-class GoalEntry(Settings):
+class GoalEntry(Row):
     """What is to be reached."""
 
     x: Number = Field(description="Center [m].")
@@ -201,7 +212,9 @@ class ArenaFile(Described):
     obstacle: tuple[ObstacleEntry, ...] = Field((), max_length=256)
     light: tuple[LightEntry, ...] = Field((), max_length=64)
     floor: FloorEntry = FloorEntry()
-    grid: GridEntry | None = Field(None, description="Left out: 16 cells along the longer side of the walls.")
+    grid: GridEntry | None = Field(
+        None, description="Left out: 16 cells along the longer side of the walls, in their middle."
+    )
     start: StartEntry
     goal: GoalEntry | None = None
 
@@ -267,8 +280,14 @@ class ArenaFile(Described):
         ys = [y for wall in self.wall for y in (wall.y1, wall.y2)] or [self.start.y - 0.5, self.start.y + 0.5]
         across, up = max(xs) - min(xs), max(ys) - min(ys)
         cell = max(across, up) / 16 or 1.0 / 16
-        columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (across, up))
-        return Grid(min(xs), min(ys), cell, columns, rows)
+        columns, rows = (max(1, math.floor(size / cell + 0.5)) for size in (across, up))
+        return Grid(
+            (min(xs) + max(xs) - columns * cell) / 2,
+            (min(ys) + max(ys) - rows * cell) / 2,
+            cell,
+            columns,
+            rows,
+        )
 
     def _floor(self) -> Floor:
         tape = tuple((each.x1, each.y1, each.x2, each.y2) for each in self.floor.tape)

@@ -18,49 +18,57 @@ MOST_PIXELS = 512  # across or up: a larger image is more than line sensors see,
 
 @dataclass(frozen=True)
 class FloorImage:
-    """How dark the floor is, pixel by pixel.
+    """How bright the floor is, pixel by pixel; beyond the image it goes on as at its edge.
 
     Attributes:
         x, y: Lower left corner [m].
-        width, height: How large it lies there [m].
+        width: How wide it lies there [m]; pixels are square.
         columns, rows: Of its pixels.
-        pixels: (rows * columns) bytes, 0 dark to 255 light, the top row first, compressed and in letters.
+        pixels: (rows * columns) bytes, 0 black to 255 white, the top row first, compressed and in letters.
     """
 
     x: float
     y: float
     width: float
-    height: float
     columns: int
     rows: int
     pixels: str
 
     @classmethod
-    def of(cls, x: float, y: float, width: float, height: float, gray: NDArray[np.uint8]) -> FloorImage:
-        """The image of (rows, columns) bytes, 0 dark to 255 light, the top row first."""
+    def of(cls, x: float, y: float, width: float, gray: NDArray[np.uint8]) -> FloorImage:
+        """The image of (rows, columns) bytes, 0 black to 255 white, the top row first."""
         rows, columns = gray.shape
         packed = base64.b85encode(zlib.compress(np.ascontiguousarray(gray, np.uint8).tobytes(), 9))
-        return cls(x, y, width, height, columns, rows, packed.decode())
+        return cls(x, y, width, columns, rows, packed.decode())
 
     @cached_property
     def gray(self) -> NDArray[np.uint8]:
-        """(rows, columns) 0 dark to 255 light, the top row first."""
+        """(rows, columns) 0 black to 255 white, the top row first."""
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(base64.b85decode(self.pixels), self.rows * self.columns)
         return np.frombuffer(data, np.uint8).reshape(self.rows, self.columns)
 
-    def darkness(self, x: float, y: float) -> float:
-        """How dark the floor is at a point [m]: 0 light, 1 dark, and 0 beside the image."""
-        column = int(np.floor((x - self.x) / self.width * self.columns))
-        row = int(np.floor((self.y + self.height - y) / self.height * self.rows))
-        if not (0 <= column < self.columns and 0 <= row < self.rows):
-            return 0.0
-        return 1.0 - float(self.gray[row, column]) / 255
+    @property
+    def height(self) -> float:
+        """How high it lies there [m]."""
+        return self.width * self.rows / self.columns
+
+    @property
+    def brightness(self) -> NDArray[np.float32]:
+        """(rows, columns) 0 black to 1 white, the row of lowest y first."""
+        return np.asarray(self.gray[::-1] / np.float32(255), dtype=np.float32)
+
+    def at(self, x: float, y: float) -> float:
+        """How bright the pixel at a point [m] is, or the nearest one: 0 black, 1 white."""
+        scale = self.columns / self.width
+        column = min(self.columns - 1, max(0, int((x - self.x) * scale)))
+        row = min(self.rows - 1, max(0, int((y - self.y) * scale)))
+        return float(self.gray[self.rows - 1 - row, column]) / 255
 
 
 @dataclass(frozen=True)
 class Floor:
-    """A light floor with dark tape on it, or an image.
+    """A white floor with black tape on it, or an image.
 
     Attributes:
         tape: (k, 4) x1, y1, x2, y2 along the middle of each strip [m].
@@ -72,11 +80,11 @@ class Floor:
     tape_width: float = TAPE_WIDTH
     image: FloorImage | None = None
 
-    def darkness(self, x: float, y: float) -> float:
-        """How dark the floor is at a point [m]: 0 light, 1 dark."""
+    def brightness(self, x: float, y: float) -> float:
+        """How bright the floor is at a point [m]: 0 black, as tape is, to 1 white."""
         if any(distance_to_segment(x, y, strip) <= self.tape_width / 2 for strip in self.tape):
-            return 1.0
-        return 0.0 if self.image is None else self.image.darkness(x, y)
+            return 0.0
+        return 1.0 if self.image is None else self.image.at(x, y)
 
     def to_dict(self) -> dict[str, Any]:
         """It as plain values, without what is not there."""
@@ -84,7 +92,7 @@ class Floor:
         if self.tape:
             values |= {"tape": [list(strip) for strip in self.tape], "tape_width": self.tape_width}
         if self.image is not None:
-            names = ("x", "y", "width", "height", "columns", "rows", "pixels")
+            names = ("x", "y", "width", "columns", "rows", "pixels")
             values["image"] = {name: getattr(self.image, name) for name in names}
         return values
 

@@ -21,11 +21,17 @@ T = TypeVar("T")
 
 LARGEST = 4_000_000  # of a file [bytes]: a drawing of a large maze has some 100,000
 MOST_BASES = 8  # robots that build on robots
+BOARDS = ("fluke1", "fluke2")  # what may be plugged into a Scribbler
+CARDBOARD = "cardboard"  # what may be put around it, last
 
 
 def robot_names() -> list[str]:
     """The robots that come with realitygap."""
-    return _names("robots")
+    alone = _names("robots")
+    scribblers = [name for name in alone if name.startswith("scribbler")]
+    equipped = [f"{name}-{board}" for name in scribblers for board in BOARDS]
+    boxed = [f"{name}-{CARDBOARD}" for name in (*scribblers, *equipped)]
+    return sorted([*alone, *equipped, *boxed])
 
 
 def load_robot(robot: str | Path) -> RobotModel:
@@ -43,26 +49,63 @@ def load_robot(robot: str | Path) -> RobotModel:
 
 def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], str]:
     """The values of a robot's file laid over those of the robot it builds on, and what to call it."""
-    file, origin = _find("robot", "robots", robot)
+    below, addition = _taken_apart(str(robot))
+    if addition:
+        file = resources.files(__package__) / "robots" / "additions" / f"{addition}.toml"
+        values, origin = _values_of(file, str(robot)), str(robot)
+        values |= {"name": str(robot), "base": below}
+    else:
+        file, origin = _find("robot", robot_names(), robot)
+        values = _values_of(file, origin)
+        values.setdefault("name", Path(origin).stem)
     if str(file) in chain or len(chain) >= MOST_BASES:
         raise DescriptionError(
-            f"{origin}: base leads back to it, or too far: {' -> '.join([*chain, str(file)])}. Expected a robot that "
+            f"{origin}: `base` leads back to it, or through more than {MOST_BASES} robots. Expected a robot that "
             "stands by itself in the end."
         )
-    values = _checked(origin, lambda: in_si(read_toml(file, origin)))
-    values.setdefault("name", Path(origin).stem)
+    return _with_base(values, origin, [*chain, str(file)]), origin
+
+
+def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[str, Any]:
+    """The values of a robot laid over those of its base."""
     base, turned = values.pop("base", None), values.pop("turned", False)
     if base is None and not turned:
-        return values, origin
+        return values
     if not isinstance(base, str):
         raise DescriptionError(f"{origin}: base is {base!r}, expected the name of a robot or its file.")
     if not isinstance(turned, bool):
         raise DescriptionError(f"{origin}: turned is {turned!r}, expected true or false.")
     beside = Path(origin).parent / base
-    below, _ = _robot_values(
-        beside if Path(origin).exists() and beside.exists() else base, [*chain, str(file)]
-    )
-    return _laid_over(_turned(below, origin) if turned else below, values), origin
+    is_beside = Path(origin).is_file() and beside.is_file()
+    below, _ = _robot_values(beside if is_beside else base, chain)
+    sources = [*_texts(below.get("sources")), *_texts(values.get("sources"))]
+    merged = _laid_over(_turned(below, origin) if turned else below, values)
+    return merged | ({"sources": sources} if sources else {})
+
+
+def _taken_apart(name: str) -> tuple[str, str]:
+    """The robot and the addition that a name is made of, such as scribbler-s2 and fluke2; no addition otherwise."""
+    rest, _, last = name.rpartition("-")
+    is_made = last in (*BOARDS, CARDBOARD) and name in robot_names()
+    return (rest, last) if is_made else (name, "")
+
+
+def _texts(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
+    """The values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind."""
+    values = _checked(origin, lambda: in_si(read_toml(file, origin)))
+    each = values.pop("each", {})
+    if not isinstance(each, dict):
+        raise DescriptionError(f"{origin}: each is {each!r}, expected tables such as [each.range].")
+    for kind, common in each.items():
+        entries = values.get(kind)
+        if not isinstance(entries, list) or not isinstance(common, dict):
+            raise DescriptionError(f"{origin}: [each.{kind}] goes with [[{kind}]], of which there are none.")
+        values[kind] = [common | entry if isinstance(entry, dict) else entry for entry in entries]
+    return values
 
 
 def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
@@ -85,7 +128,7 @@ def _turned(values: Mapping[str, Any], origin: str) -> dict[str, Any]:
     changed: dict[str, float] = {}
     for name, value in model.numbers().items():
         last = name.rsplit(".", 1)[-1]
-        if last in ("x", "y", "axle"):
+        if last in ("x", "y", "axle", "idler"):
             changed[name] = -float(value) or 0.0  # type: ignore[arg-type]
         elif last == "direction":
             changed[name] = (float(value) + 2 * math.pi) % (2 * math.pi) - math.pi  # type: ignore[arg-type]
@@ -118,7 +161,7 @@ def load_arena(arena: str | Path) -> Arena:
     """
     if str(arena) == "paper":
         return paper_arena()
-    file, origin = _find("arena", "arenas", arena)
+    file, origin = _find("arena", arena_names(), arena)
     values = read_toml(file, origin)
     values.setdefault("name", Path(origin).stem)
     return _checked(origin, lambda: ArenaFile(**in_meters(values))).arena()
@@ -163,13 +206,12 @@ def _names(folder: str) -> list[str]:
     )
 
 
-def _find(what: str, folder: str, name: str | Path) -> tuple[Traversable, str]:
+def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, str]:
     """The file of that name or path, and what to call it in messages."""
     if not isinstance(name, str | Path):
         raise TypeError(f"{what} is {name!r}, expected the name of one, or the path of its file.")
-    known = robot_names() if what == "robot" else arena_names()
     if str(name) in known:
-        return resources.files(__package__) / folder / f"{name}.toml", str(name)
+        return resources.files(__package__) / f"{what}s" / f"{name}.toml", str(name)
     path = Path(name)
     if str(name) and path.is_file():
         return path, str(path)

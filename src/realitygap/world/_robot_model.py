@@ -53,7 +53,7 @@ class Drive(Settings):
         0,
         ge=0,
         le=1000,
-        description="How many speeds there are up to full; 0 for any. Lower ones are rounded down.",
+        description="How many speeds there are up to full, the nearest counts; 0 for any.",
     )
     lowest_level: int = Field(0, ge=0, description="The slowest speed but standing, counted in `levels`.")
     speed: Positive = Field(description="Of a wheel at full command [m/s].")
@@ -110,8 +110,8 @@ class RangeSensor(Settings):
     )
     response: Literal["linear", "ir", "table", "pulses"] = Field(
         "linear",
-        description="linear: 1 - d / reach; ir: amplitude * exp(-d / decay); table: read from `table`; pulses: each of "
-        "`pulses` comes back with the probability that ir states, and their share is the reading.",
+        description="linear: 1 - d / reach; ir: amplitude * exp(-d / decay); table: read from `table`; pulses: the "
+        "share of `pulses` seen, as many as ir states less those missed, each with the probability of drop_*.",
     )
     amplitude: NotNegative = Field(1.0, description="A of ir and pulses: the reading at no distance.")
     decay: Positive = Field(0.1, description="L of ir and pulses: where it has fallen to 1/e [m].")
@@ -129,6 +129,9 @@ class RangeSensor(Settings):
     outlier_most: Share = Field(0.0, description="Probability of any reading in 0..1, far away.")
     outlier_at: Number = Field(0.1, description="Distance at which this is half as likely [m].")
     outlier_width: Positive = Field(0.02, description="Of the logistic curve between [m].")
+    burst: Share = Field(
+        0.0, description="Of pulses: how often those of one reading share one fate, their correlation."
+    )
 
     @model_validator(mode="after")
     def _has_what_its_response_needs(self) -> Self:
@@ -159,7 +162,6 @@ class LightSensor(Settings):
     )
     gain: NotNegative = Field(1.0, description="Reading for a light of strength 1 straight ahead, 1 m away.")
     noise: NotNegative = Field(0.0, description="Standard deviation by which a reading is multiplied.")
-    shadows: bool = Field(True, description="Whether walls and obstacles keep light away.")
 
 
 class LineSensor(Settings):
@@ -167,8 +169,11 @@ class LineSensor(Settings):
 
     x: Number = Field(description="Ahead of the body's origin [m].")
     y: Number = Field(description="To the left [m].")
-    threshold: Share = Field(0.5, description="Floor darker than this is seen: 0 is light, 1 dark.")
-    noise: NotNegative = Field(0.0, description="Standard deviation added to the floor's darkness.")
+    threshold: Share = Field(
+        0.5, description="It answers 1 on floor less bright than this: 0 is black, 1 white."
+    )
+    noise: NotNegative = Field(0.0, description="Standard deviation added to the brightness.")
+    level: bool = Field(False, description="Whether it answers how dark the floor is, in place of whether.")
 
 
 class BumpSensor(Settings):
@@ -190,6 +195,19 @@ class Encoders(Settings):
     drift_per_m: Number = Field(
         0.0, description="Added to the right and taken from the left in each meter [m]."
     )
+
+
+class Stall(Settings):
+    """How the robot knows that it is held up."""
+
+    kind: Literal["blocked", "idler"] = Field(
+        "blocked",
+        description="blocked: whatever held it up in this step; idler: as an S2, a third wheel that turns too little "
+        "for what the drive wheels do.",
+    )
+    idler: Number = Field(0.0, description="The third wheel, ahead of the body's origin [m].")
+    share: Share = Field(0.5, description="Of the drive wheels' way below which it stalls.")
+    window: NotNegative = Field(1.6, description="Time over which both ways are averaged [s].")
 
 
 class Looks(Settings):
@@ -230,6 +248,11 @@ class RobotModel(Described):
     line: tuple[LineSensor, ...] = Field((), max_length=MOST_SENSORS, description="Line sensors.")
     bump: tuple[BumpSensor, ...] = Field((), max_length=MOST_SENSORS, description="Bump sensors.")
     encoder: Encoders | None = Field(None, description="Left out where wheels are not counted.")
+    stall: Stall = Stall()
+    shadows: Literal["none", "half", "dark"] = Field(
+        "dark",
+        description="How much of a light arrives behind walls and obstacles: all, half as in Jyro, or nothing.",
+    )
     looks: Looks = Looks()
 
     def to_dict(self) -> dict[str, Any]:

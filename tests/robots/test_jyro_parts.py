@@ -435,6 +435,13 @@ def test_the_picture_shows_everything() -> None:
     assert "blocked: pioneer-1" in world._repr_svg_()
 
 
+def test_a_robot_shows_itself_without_a_world() -> None:
+    robot = Pioneer(3.0, 4.0, color="orchid")
+    robot.add(Gripper())
+    assert "#da70d6" in robot._repr_svg_()
+    assert "with 1 devices" in robot._repr_svg_()
+
+
 def test_parts_of_a_picture_can_be_hidden() -> None:
     world = room()
     robot = world.add(Pioneer(0.6, 1.0, color="orchid"))

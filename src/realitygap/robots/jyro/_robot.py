@@ -84,11 +84,7 @@ class SceneRobot:
 
     @property
     def world(self) -> JyroWorld:
-        """The world it is in.
-
-        Raises:
-            RobotError: It is in none.
-        """
+        """The world it is in; asking for it where there is none is a RobotError."""
         if self._world is None:
             raise RobotError(
                 f"The {self.kind} {self.name or ''} is in no world: call world.add(robot) first."

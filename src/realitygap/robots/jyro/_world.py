@@ -65,7 +65,10 @@ class JyroWorld:
     Attributes:
         time: Simulated time [s].
         n_steps: Steps since the start or the last reset.
-        robots, lights: In the order of adding.
+        robots: In the order of adding.
+        lights: Likewise; each may be changed at any time.
+        boxes: Filled boxes that pictures show.
+        drawn: What else pictures show.
         light_above_walls: Whether light passes over walls.
         random: Where sensors take their noise from.
 

@@ -38,6 +38,10 @@ class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
 
 
+class DescriptionError(RealityGapError, ValueError):
+    """The file of a robot or an arena cannot be used as written, or there is none of that name."""
+
+
 class TableError(RealityGapError):
     """A table of results for `realitygap audit-results` cannot be read as written."""
 

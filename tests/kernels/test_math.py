@@ -8,6 +8,7 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
 from realitygap.kernels import _math
 from tests.reference.effort import cases
@@ -81,3 +82,57 @@ def test_far_out_tanh_is_one_and_sigmoid_zero_or_one(x: float) -> None:
 def test_tanh_is_odd() -> None:
     for x in numbers(500):
         assert _math.tanh(-x) == -_math.tanh(x)
+
+
+def test_exponentials_and_logarithm_are_within_their_bounds() -> None:
+    """Two units in the last place, in either precision; in double held to decimals of 45 digits."""
+    rng = random.Random(7)
+    with localcontext(prec=45):
+        for _ in range(cases(6_000, 300)):
+            x = rng.choice([rng.uniform(-1, 1), rng.uniform(-87, 87)])
+            for real in (np.float64, np.float32):
+                given, unit = real(x), Decimal(float(np.finfo(real).eps))
+                true = Decimal(float(given)).exp()
+                assert abs(Decimal(float(_math.exp(given))) / true - 1) < 2 * unit
+                assert (
+                    abs(Decimal(float(_math.exp2(given))) / Decimal(2) ** Decimal(float(given)) - 1)
+                    < 2 * unit
+                )
+                above = real(math.exp(x))
+                true = Decimal(float(above)).ln()
+                assert abs(Decimal(float(_math.log(above))) - true) <= 2 * unit * abs(true)
+
+
+def test_exponentials_stay_finite_and_logarithms_exact_where_they_can() -> None:
+    for real in (np.float64, np.float32):
+        assert _math.exp(real(0.0)) == _math.exp2(real(0.0)) == 1.0
+        assert [_math.exp2(real(k)) for k in (-126, -3, 5, 126)] == [2.0**-126, 0.125, 32.0, 2.0**126]
+        assert _math.exp2(real(1e4)) == 2.0**126  # limited, as is said
+        assert _math.exp(real(1e4)) == _math.exp(real(87.0))
+        assert _math.exp(real(-1e4)) == _math.exp(real(-87.0)) > 0.0
+        assert _math.log(real(1.0)) == 0.0
+
+
+def test_normal_is_the_inverse_distribution_of_a_uniform_word() -> None:
+    rng = random.Random(8)
+    words = [rng.getrandbits(32) for _ in range(cases(20_000, 1_000))]
+    words += [0, 1, 2, 3, 1000, 2**31 - 1, 2**31, 2**32 - 1]
+    words += [rng.getrandbits(rng.randint(1, 32)) for _ in range(cases(2_000, 200))]  # the far tail
+    for word in words:
+        true = float(ndtri(min(word, 2**32 - 1 - word) / 2**32 + 2**-33)) * (1 if word < 2**31 else -1)
+        for real in (np.float64, np.float32):
+            assert abs(_math.normal(np.uint32(word), real(0.0)) - true) < 2e-6, word
+            assert _math.normal(np.uint32(2**32 - 1 - word), real(0.0)) == -_math.normal(
+                np.uint32(word), real(0.0)
+            )
+
+
+def test_normal_has_mean_zero_and_variance_one_over_all_words() -> None:
+    """At the middle of each of equal parts of all words: the mean is exact, the variance that of so many parts."""
+    n = cases(4_096, 512)
+    for real in (np.float64, np.float32):
+        middles = [np.uint32((2 * k + 1) * (2**32 // (2 * n))) for k in range(n)]
+        numbers = np.array([_math.normal(word, real(0.0)) for word in middles], np.float64)
+        true = ndtri((np.arange(n) + 0.5) / n)
+        assert abs(numbers.mean()) < 1e-6
+        assert abs(numbers.var() - true.var()) < 5e-6

@@ -90,8 +90,11 @@ def test_different_streams_never_share_a_counter_even_at_the_limits_of_the_field
 
 
 def test_the_purposes_are_different() -> None:
-    purposes = [_philox.PURPOSE_NOISE, _philox.PURPOSE_GENOME, _philox.PURPOSE_CHILD, _philox.PURPOSE_SPECIES]
-    assert list(map(int, purposes)) == [1, 2, 3, 4]
+    purposes = {name: int(value) for name, value in vars(_philox).items() if name.startswith("PURPOSE_")}
+    assert len(set(purposes.values())) == len(purposes)
+    assert max(purposes.values()) < 256
+    first = [_philox.PURPOSE_NOISE, _philox.PURPOSE_GENOME, _philox.PURPOSE_CHILD, _philox.PURPOSE_SPECIES]
+    assert list(map(int, first)) == [1, 2, 3, 4]
     assert (reference.NOISE, reference.GENOME, reference.CHILD, reference.SPECIES) == (1, 2, 3, 4)
 
 

@@ -5,13 +5,14 @@ It lies below `world`, because it knows nothing but points, colors and text. Wha
 same shapes into its figures, and matplotlib is imported only there.
 """
 
-from ._ink import Ink
+from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._x11 import hex_of, rgb_of
 
 __all__ = [
     "FONT",
+    "PENS",
     "Disc",
     "Ink",
     "Line",

@@ -10,6 +10,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+SQRT_HALF = 0.70710678118654757  # rounded up in both precisions
+
 if numba.config.DISABLE_JIT:
 
     def shift_left(word: Any, places: Any) -> Any:
@@ -24,9 +26,24 @@ if numba.config.DISABLE_JIT:
         """The place of the highest bit, likewise."""
         return int(word).bit_length() - 1
 
+    def count_bits(word: Any) -> Any:
+        """How many bits of an int32 are set, which is not below zero."""
+        return int(word).bit_count()
+
     def power_of_two(exponent: Any) -> Any:
         """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
         return type(exponent)(2.0 ** int(exponent))
+
+    def is_single(number: Any) -> Any:
+        """Whether a number is of single precision: known when compiled."""
+        return isinstance(number, np.float32)
+
+    def split(number: Any) -> Any:
+        """(m, k) with number = m * 2^k and sqrt(1/2) <= m < sqrt(2), of a normal number above zero, as numbers."""
+        real = type(number)
+        part, places = np.frexp(number)
+        low = part < real(SQRT_HALF)
+        return (part * real(2.0), real(places - 1)) if low else (part, real(places))
 
 else:
 
@@ -60,6 +77,15 @@ else:
         return types.int64(types.uint32), generate
 
     @intrinsic
+    def count_bits(context, word):
+        """How many bits of an int32 are set, which is not below zero."""
+
+        def generate(context, builder, signature, arguments):
+            return builder.zext(builder.ctpop(arguments[0]), ir.IntType(64))
+
+        return types.int64(types.int32), generate
+
+    @intrinsic
     def power_of_two(context, exponent):
         """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
         word, digits = (ir.IntType(32), 23) if exponent == types.float32 else (ir.IntType(64), 52)
@@ -70,3 +96,32 @@ else:
             return builder.bitcast(builder.shl(biased, word(digits)), arguments[0].type)
 
         return exponent(exponent), generate
+
+    @intrinsic
+    def is_single(context, number):
+        """Whether a number is of single precision: known when compiled."""
+
+        def generate(context, builder, signature, arguments):
+            return ir.IntType(1)(signature.args[0] == types.float32)
+
+        return types.boolean(number), generate
+
+    @intrinsic
+    def split(context, number):
+        """(m, k) with number = m * 2^k and sqrt(1/2) <= m < sqrt(2), of a normal number above zero, as numbers."""
+        single = number == types.float32
+        word, digits = (ir.IntType(32), 23) if single else (ir.IntType(64), 52)
+        least = (
+            int(np.float32(SQRT_HALF).view(np.int32)) if single else int(np.float64(SQRT_HALF).view(np.int64))
+        )
+
+        def generate(context, builder, signature, arguments):
+            bits = builder.bitcast(arguments[0], word)
+            places = builder.ashr(builder.sub(bits, word(least)), word(digits))
+            part = builder.bitcast(builder.sub(bits, builder.shl(places, word(digits))), arguments[0].type)
+            if not single:  # from 32 bits more processors make many numbers at once
+                places = builder.trunc(places, ir.IntType(32))
+            pair = builder.sitofp(places, arguments[0].type)
+            return context.make_tuple(builder, signature.return_type, (part, pair))
+
+        return types.UniTuple(number, 2)(number), generate

@@ -22,6 +22,16 @@ PURPOSE_GENOME = np.int64(2)  # the first genomes
 PURPOSE_CHILD = np.int64(3)  # making one child: parents, crossover, mutation
 PURPOSE_SPECIES = np.int64(4)  # representatives of species; the individual is the species' place in the list
 
+PURPOSE_MODEL = np.int64(5)  # numbers of a robot or an arena that are drawn
+PURPOSE_DRIVE = np.int64(6)  # motion of `sim`: travel, heading, delay
+PURPOSE_RANGE = np.int64(
+    7
+)  # range sensors of `sim`, beside the paper's noise, which is PURPOSE_NOISE there too
+PURPOSE_PULSES = np.int64(8)  # pulses that a range sensor misses
+PURPOSE_LIGHT = np.int64(9)
+PURPOSE_LINE = np.int64(10)
+PURPOSE_ENCODER = np.int64(11)
+
 FIRST = np.int64(0)  # the first repeat, generation or row: a literal 0 would have every kernel compiled twice
 
 MAX_INDIVIDUALS = 1 << 24

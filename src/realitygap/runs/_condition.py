@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
-from realitygap.evolution import NeatSettings, NoveltySettings, random_key
+from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.settings import Settings, mistakes
@@ -88,6 +88,24 @@ class Condition(Settings):
         return self
 
     @model_validator(mode="after")
+    def _the_distance_can_be_told(self) -> Self:
+        distance = DISTANCES[self.novelty.distance]
+        if self.selection != "novelty":
+            return self
+        if self.is_physical and (distance.needs_order or distance.compares != "cells"):
+            what = "their order" if distance.needs_order else "where the trial ended"
+            raise ValueError(
+                f"novelty.distance is {distance.name!r}, expected 'paper', 'jaccard' or 'hamming' with platform "
+                f"'scribbler': an operator enters the visited squares, and not {what}."
+            )
+        if distance.needs_order and self.task.cells != "line":
+            raise ValueError(
+                f"novelty.distance is {distance.name!r}, which looks at the order of visits, expected task.cells "
+                f"'line' with it: of the cells at the ends of steps no order is kept."
+            )
+        return self
+
+    @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
         check_start(self.arena.arena(), self.tried_on.body)
         return self
@@ -123,15 +141,21 @@ class Condition(Settings):
         return random_key(self.seed, None if self.pair else self.name)
 
     @property
+    def network_inputs(self) -> tuple[str, ...]:
+        """Names of what its networks see, in order."""
+        return self.task.input_names(self.selection)
+
+    @property
     def has_bias_input(self) -> bool:
         """Whether its networks have the constant input."""
-        return self.task.has_bias_input(self.selection)
+        return "bias" in self.network_inputs
 
     @property
     def neat_rules(self) -> NeatRules:
-        """Its NEAT in the form that kernels read: inputs largest reading, stall, time and, where it has one, 1."""
-        bias = self.has_bias_input
-        return self.neat.rules(3 + bias, 2, bias_input=3 if bias else -1)
+        """Its NEAT in the form that kernels read."""
+        inputs = self.network_inputs
+        bias_input = inputs.index("bias") if "bias" in inputs else -1
+        return self.neat.rules(len(inputs), 2, bias_input=bias_input)
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""

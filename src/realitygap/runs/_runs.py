@@ -9,12 +9,14 @@ import polars as pl
 from numpy.typing import NDArray
 
 from realitygap.errors import OutgrownError, whole_number
-from realitygap.kernels import _run
-from realitygap.kernels._run import RunRows, RunRules
+from realitygap.evolution import distance_kind
+from realitygap.kernels import _block, _run
+from realitygap.kernels._block import RunRows, RunRules
 from realitygap.records import SCHEMA, list_column
 from realitygap.trials import jyro_rules, jyro_scene
 
 from ._condition import Condition
+from ._staged import run_staged
 
 # The largest genome that a run may grow.
 MOST_GENES = 16_384
@@ -31,11 +33,11 @@ MAX_REPLICATES = 1 << 32
 def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
     novelty = condition.novelty
-    selection = {"coverage": _run.COVERAGE, "novelty": _run.NOVELTY, "random": _run.RANDOM}[
+    selection = {"coverage": _block.COVERAGE, "novelty": _block.NOVELTY, "random": _block.RANDOM}[
         condition.selection
     ]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
-        selection = _run.NEAREST_NOVELTY
+        selection = _block.NEAREST_NOVELTY
     return RunRules(
         n_generations=condition.neat.generations,
         population=condition.neat.population,
@@ -44,6 +46,7 @@ def run_rules(condition: Condition) -> RunRules:
         archive_size=novelty.archive_size,
         above_all=novelty.enter == "above-all",
         by_column=novelty.sort == "x-then-y",
+        distance=distance_kind(novelty.distance),
         neighbors=novelty.neighbors,
         archive_threshold=float(novelty.threshold),
         archive_patience=novelty.patience,
@@ -75,13 +78,14 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
     )
 
 
-def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows:
+def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged: bool = False) -> RunRows:
     """Carry out `n_runs` runs of a condition; see `run_replicates` for them as a frame.
 
     Args:
         condition: As resolved.
         first_replicate: Number of the first run.
         n_runs: How many, >= 1.
+        staged: Take the road that serves all platforms where the whole-run kernel would do; the rows are the same.
 
     Returns:
         Arrays (n_runs, generations, individuals, ...).
@@ -99,22 +103,14 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
     first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
     n_runs = whole_number("n_runs", n_runs, 1, MAX_REPLICATES - first_replicate)
     arena = condition.arena.arena()
-    scene = jyro_scene(condition.jyro, arena)
     neat = condition.neat_rules
-    trial = jyro_rules(
-        condition.jyro,
-        noise=condition.noise,
-        bias_input=condition.has_bias_input,
-        bias_value=condition.neat.bias_value,
-    )
     rules = run_rules(condition)
     room = neat.n_first_genes + FIRST_ROOM
     hidden_room = neat.start_hidden + FIRST_HIDDEN_ROOM
+    carry_out = run_staged if staged else _run_whole
     while True:
         rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
-        space = _run.make_run_room(scene, neat, rules, n_runs, room, hidden_room)
-        key = np.uint64(condition.key)
-        if _run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows):
+        if carry_out(condition, rules, first_replicate, rows, room, hidden_room):
             return rows
         if room == MOST_GENES and hidden_room == MOST_HIDDEN:
             raise OutgrownError(
@@ -123,6 +119,23 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int) -> RunRows
                 "is room for. Nothing of these runs is kept. Lower add_node and add_link, or run fewer generations."
             )
         room, hidden_room = min(2 * room, MOST_GENES), min(2 * hidden_room, MOST_HIDDEN)
+
+
+def _run_whole(
+    condition: Condition, rules: RunRules, first_replicate: int, rows: RunRows, room: int, hidden_room: int
+) -> bool:
+    """All runs in one call of the whole-run kernel, which knows the platform `jyro` and its task; as `run_staged`."""
+    scene = jyro_scene(condition.jyro, condition.arena.arena())
+    neat = condition.neat_rules
+    trial = jyro_rules(
+        condition.jyro,
+        noise=condition.noise,
+        bias_input=condition.has_bias_input,
+        bias_value=condition.neat.bias_value,
+    )
+    space = _run.make_run_room(scene, neat, rules, rows.fitness.shape[0], room, hidden_room)
+    key = np.uint64(condition.key)
+    return bool(_run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows))
 
 
 def prepare_kernels() -> None:

@@ -1,7 +1,6 @@
 """Plain descriptions of arenas, bodies and sensors; nothing here moves."""
 
 from ._arena import (
-    INCH,
     NAMED_STARTS,
     Arena,
     Grid,
@@ -10,25 +9,46 @@ from ._arena import (
     is_inside,
     paper_arena,
 )
+from ._arena_file import ArenaFile
 from ._case import Case
+from ._distribution import Distribution
+from ._floor import Floor, FloorImage
+from ._library import arena_names, load_arena, load_robot, robot_names
+from ._obstacle import Goal, Light, Obstacle
+from ._part import Part
 from ._pictures import arena_picture, robot_picture
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
+from ._robot_model import RobotModel
 from ._settings import ArenaSettings
+from ._units import INCH
 
 __all__ = [
     "INCH",
     "JYRO_SCRIBBLER",
     "NAMED_STARTS",
     "Arena",
+    "ArenaFile",
     "ArenaSettings",
     "Body",
     "Case",
+    "Distribution",
+    "Floor",
+    "FloorImage",
+    "Goal",
     "Grid",
+    "Light",
+    "Obstacle",
+    "Part",
     "Pose",
     "RangeSensors",
+    "RobotModel",
+    "arena_names",
     "arena_picture",
     "check_start",
     "is_inside",
+    "load_arena",
+    "load_robot",
     "paper_arena",
+    "robot_names",
     "robot_picture",
 ]

@@ -6,8 +6,9 @@ import math
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
 
-from ._arena import INCH, Arena, Pose
+from ._arena import Arena, Pose
 from ._robot import Body, RangeSensors
+from ._units import INCH
 
 _TICK = 0.012  # half the length of the strokes that end a dimension line [m]
 _WHOLE = 1e-6  # a length this near to whole inches was meant so [in]

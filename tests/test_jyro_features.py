@@ -56,7 +56,7 @@ def test_everything_that_a_world_offers_is_in_the_table() -> None:
         place.split(".")[2] for entry in HERE for place in entry["here"] if place.startswith("robots.jyro.")
     }
     parts_of_others = {
-        "Box",
+        "Area",
         "Column",
         "DrivenRobot",
         "Edge",

@@ -27,6 +27,7 @@ from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.robots import JyroPlatform, ScribblerPlatform
 from realitygap.runs import Condition
+from realitygap.settings import is_hidden
 from realitygap.study import (
     DEFAULT_NEAT,
     ConditionNotes,
@@ -172,7 +173,7 @@ def settings_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The fields that a study file can set: of a condition only its own keys, its tables being listed apart."""
     if model is Condition:
         return {key: Condition.model_fields[key] for key in CONDITION_KEYS}
-    return model.model_fields
+    return {key: info for key, info in model.model_fields.items() if not is_hidden(info)}
 
 
 def first_line(model: type[BaseModel]) -> str:

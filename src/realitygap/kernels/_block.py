@@ -58,6 +58,10 @@ class RunRows(NamedTuple):
     enabled: NDArray[np.bool_]  # (r, g, n, room)
     hidden: NDArray[np.int32]  # (r, g, n, hidden room)
     bias: NDArray[np.float64]  # (r, g, n, outputs + hidden room)
+    # Written by the staged road only
+    drawn: NDArray[np.float64]  # (r, g, n, d)
+    task_fitness: NDArray[np.float64]  # (r, g, n)
+    ended: NDArray[np.float64]  # (r, g, n, 2) [m from the start]
 
 
 class Runs(NamedTuple):

@@ -110,7 +110,8 @@ def _any(row):
 
 @kernel
 def _start_range(shape, p, senses):
-    fill(senses.noisy, np.int32(0))
+    for k in range(senses.noisy.size):
+        senses.noisy[k] = 0
     for s in range(shape.row_range.size):
         row = shape.row_range[s]
         rate_of(p[row + DECAY], senses.range_rates[3 * s])

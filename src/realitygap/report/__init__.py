@@ -20,6 +20,14 @@ from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
+from realitygap.report._distance_audit import (
+    Confound,
+    DistanceAudit,
+    Estimate,
+    audit_distance,
+    distance_notes,
+)
+from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._effects import (
@@ -88,6 +96,14 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "DoubtfulValue",
     "audit_paper",
     "Finding",
+    # distances of behaviors
+    "audit_distance",
+    "distance_notes",
+    "DistanceAudit",
+    "Confound",
+    "Estimate",
+    "draw_distance",
+    "save_distance",
     # figures
     "draw_coverage",
     "draw_paths",

@@ -97,12 +97,24 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
     problems = Problems()
+    _look_beside(data, origin)
     study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyError("\n  ".join([head, *problems.lines]))
     return study
+
+
+def _look_beside(data: dict[str, Any], origin: str) -> None:
+    """Arena files that are named without a folder lie beside the study file."""
+    listed = data.get("condition", [])
+    for part in [data, *(listed if isinstance(listed, list) else [])]:
+        arena = part.get("arena") if isinstance(part, dict) else None
+        file = arena.get("file") if isinstance(arena, dict) else None
+        if isinstance(arena, dict) and isinstance(file, str) and Path(origin).is_file():
+            beside = Path(origin).parent / file
+            arena["file"] = str(beside) if beside.is_file() else file
 
 
 def _plain(number: Any) -> Any:

@@ -5,8 +5,6 @@ from ._arena import (
     Arena,
     Grid,
     Pose,
-    check_start,
-    is_inside,
     paper_arena,
 )
 from ._arena_file import ArenaFile
@@ -17,6 +15,7 @@ from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
 from ._pictures import arena_picture, robot_picture
+from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
 from ._settings import ArenaSettings

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from .errors import did_you_mean
 
@@ -80,6 +81,12 @@ def mistakes(
             texts = [f"expected {', or '.join(expected)}, came {shown(_value_at(values, place))}."]
         lines += [(place, text) for text in texts]
     return lines
+
+
+def is_hidden(info: FieldInfo) -> bool:
+    """Whether a setting is filled in by realitygap and no part of study files."""
+    extra = info.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("hidden"))
 
 
 def shown(value: object) -> str:

@@ -5,8 +5,6 @@ from ._arena import (
     Arena,
     Grid,
     Pose,
-    check_start,
-    is_inside,
     paper_arena,
 )
 from ._arena_file import ArenaFile
@@ -17,8 +15,10 @@ from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
 from ._pictures import arena_picture, robot_picture
+from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
+from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
 
@@ -48,6 +48,7 @@ __all__ = [
     "is_inside",
     "load_arena",
     "load_robot",
+    "model_picture",
     "paper_arena",
     "robot_names",
     "robot_picture",

@@ -4,13 +4,14 @@ from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
 from ._kinds import TASKS, as_task, task_model
 from ._mazes import MAZE_TASKS, MazeAgent, MazeTask
-from ._python import PythonTask
+from ._python import PYTHON, PythonTask
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
 
 __all__ = [
     "CLASSICAL_TASKS",
     "MAZE_TASKS",
+    "PYTHON",
     "TASKS",
     "ClassicalTask",
     "CoverageTask",

@@ -261,6 +261,11 @@ class RobotModel(Described):
             key: value for key, value in super().to_dict().items() if key not in ("description", "sources")
         }
 
+    def _repr_svg_(self) -> str:
+        from ._robot_picture import model_picture
+
+        return model_picture(self).to_svg()
+
     @property
     def radius(self) -> float:
         """The largest distance from the origin to a point of the body [m]."""

@@ -98,7 +98,11 @@ def in_section(lines):
 
 def setup(app):
     """Write the generated pages before Sphinx looks for pages."""
-    more = {"parts/billion.md": make_billion.page_tables(), **make_speed.page_parts(), **make_sensors.page_parts()}
+    more = {
+        "parts/billion.md": make_billion.page_tables(),
+        **make_speed.page_parts(),
+        **make_sensors.page_parts(),
+    }
     reference_pages.write_all(HERE / "generated", more)
     app.connect("autodoc-skip-member", skip_pydantic)
     app.connect("autodoc-process-docstring", as_restructured, priority=1)

@@ -18,7 +18,7 @@ from ._version import __version__
 if TYPE_CHECKING:
     from .evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
     from .records import ResultsFolder
-    from .report import summarize, write_report
+    from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
     from .study import Study, load_study, run_study
     from .trials import simulate_case
@@ -39,6 +39,8 @@ _HOME = {
     "run_study": "study",
     "simulate_case": "trials",
     "summarize": "report",
+    "watch": "report",
+    "write_movie": "report",
     "write_report": "report",
 }
 
@@ -58,6 +60,8 @@ __all__ = [
     "run_study",
     "simulate_case",
     "summarize",
+    "watch",
+    "write_movie",
     "write_report",
 ]
 
@@ -68,6 +72,7 @@ _PACKAGES = {
     "errors",
     "evolution",
     "gym",
+    "playback",
     "records",
     "report",
     "robots",

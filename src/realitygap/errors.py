@@ -22,6 +22,10 @@ class OutgrownError(StudyError):
     """A genome of a run grew beyond the largest that there is room for; nothing of the run was cut off and kept."""
 
 
+class TaskError(StudyError):
+    """A function of somebody's own that says what trials are worth cannot be loaded, or failed."""
+
+
 class RecordError(RealityGapError):
     """A folder of results holds something that cannot be trusted or cannot be written."""
 
@@ -36,6 +40,10 @@ class ClusterError(RealityGapError):
 
 class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
+
+
+class DescriptionError(RealityGapError, ValueError):
+    """The file of a robot or an arena cannot be used as written, or there is none of that name."""
 
 
 class TableError(RealityGapError):

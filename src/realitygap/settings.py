@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from .errors import did_you_mean
 
@@ -65,7 +66,11 @@ def mistakes(
     """What pydantic found wrong with the values of a model: the place in it, such as start[3], and what is wrong."""
     found: dict[str, list[str]] = {}
     is_setting: dict[str, bool] = {}
-    for problem in error.errors(include_url=False):
+    problems = error.errors(include_url=False)
+    within = {problem["loc"][:-2] for problem in problems} | {problem["loc"][:-1] for problem in problems}
+    for problem in problems:
+        if problem["type"] == "too_short" and problem["loc"] in within:
+            continue  # entries with mistakes of their own are not counted
         place, last, owner = _place(model, problem["loc"])
         found.setdefault(place, []).append(_explained(problem, owner))
         is_setting[place] = last in owner.model_fields
@@ -78,6 +83,12 @@ def mistakes(
     return lines
 
 
+def is_hidden(info: FieldInfo) -> bool:
+    """Whether a setting is filled in by realitygap and no part of study files."""
+    extra = info.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("hidden"))
+
+
 def shown(value: object) -> str:
     """A value as it came, short enough for a message."""
     text = repr(value)
@@ -87,26 +98,44 @@ def shown(value: object) -> str:
 def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str, type[BaseModel]]:
     """A problem's place as text, the last name in it, and the model that this belongs to.
 
-    What follows a setting that is no table itself is an entry of a list, or one of the types that the setting may
-    have, which is no part of the place.
+    Tables in a list are counted from 0, as in the names of their numbers: range.0.cone. What else follows a setting
+    that is no table itself is an entry of a list, or one of the types that the setting may have, which is no part of
+    the place.
     """
     names: list[str] = []
     owner = model
     rest = list(loc)
     while rest:
-        names.append(str(rest.pop(0)))
-        inner = owner.model_fields[names[-1]].annotation if names[-1] in owner.model_fields else None
-        if not rest or not (isinstance(inner, type) and issubclass(inner, BaseModel)):
+        name = str(rest.pop(0))
+        names.append(name)
+        inner = owner.model_fields[name].annotation if name in owner.model_fields else None
+        inner, is_list = _table_in(inner)
+        if not rest or inner is None:
             break
+        if is_list:
+            names.append(str(rest.pop(0)))
         owner = inner
     entry = f"[{rest[0] + 1}]" if len(rest) == 1 and isinstance(rest[0], int) else ""
     return ".".join(names) + entry, names[-1] + entry if names else "", owner
 
 
+def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
+    """The model that a setting's type is, may be or lists, if any, and whether it lists it."""
+    parts = [part for part in get_args(annotation) if part not in (type(None), Ellipsis)]
+    is_list = get_origin(annotation) is tuple
+    if parts:
+        annotation = parts[0] if len(parts) == 1 else None
+    is_model = isinstance(annotation, type) and issubclass(annotation, BaseModel)
+    return (annotation if is_model else None), is_list
+
+
 def _value_at(values: Mapping[str, Any], place: str) -> Any:
     found: Any = values
     for name in place.split("."):
-        found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
+        if isinstance(found, list | tuple):
+            found = found[int(name)] if name.isdigit() and int(name) < len(found) else None
+        else:
+            found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
     return found
 
 
@@ -122,13 +151,19 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
         return f"expected {context['expected']}, came {came}.{_meant(problem['input'], context['expected'])}"
     if kind == "value_error":
         # of the model as a whole there is nothing short to show
-        return f"{context['error']}, came {came}." if problem["loc"] else f"{context['error']}."
+        is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
+        return f"{context['error']}." if is_table else f"{context['error']}, came {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
         words, key = _LIMITS[kind]
         expected = f"{words} {context[key]}"
     if kind in ("too_long", "too_short"):
-        expected = f"{context.get('max_length', context.get('min_length'))} values"
+        n = context.get("max_length", context.get("min_length"))
+        field = model.model_fields.get(str(problem["loc"][-1]))
+        if field is not None and _table_in(field.annotation)[1]:
+            bound = "at most" if kind == "too_long" else "at least"
+            return f"expected {bound} {n}, came {len(problem['input'])}."
+        expected = f"{n} values"
     text = f"expected {expected}" if expected else str(problem["msg"])
     if len(problem["loc"]) > 2 and isinstance(problem["loc"][-1], int):
         text += f" as value {problem['loc'][-1] + 1}"

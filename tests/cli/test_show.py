@@ -57,6 +57,7 @@ def show(*words):
         ["species", "DIR"],
         ["lineage", "DIR"],
         ["lineage", "DIR", "--condition", "novelty-50", "--generation", "1", "--individual", "2"],
+        ["divergence", "DIR", "--against", "novelty-50", "--repeats", "3"],
         ["arena"],
         ["arena", "paper"],
         ["robot", "jyro"],
@@ -90,9 +91,47 @@ def test_a_trial_moves_for_as_long_as_it_lasted(results, tmp_path):
     with Image.open(path) as image:
         assert image.format == "GIF"
         assert image.n_frames == 21, "the start and 20 steps"
-        assert image.size == (640, 395)
+        assert image.size == (720, 464)
         assert image.info["duration"] == 100
         assert image.info["comment"].endswith(b"novelty-50, run 1, generation 1, individual 2")
+
+
+@pytest.mark.parametrize(
+    ("words", "title", "names"),
+    [
+        (["--generation", "1"], "coverage-50, run 0, generation 1, individual 3", []),
+        (["--each", "individual"], "coverage-50, run 0, generation 1", [f"individual {k}" for k in range(4)]),
+        (
+            ["--each", "generation"],
+            "coverage-50, run 0: the best of each generation",
+            ["generation 0", "generation 1"],
+        ),
+        (["--each", "condition"], "tiny: the best of each condition", ["coverage-50", "novelty-50"]),
+    ],
+)
+def test_a_movie_shows_one_trial_or_several(results, tmp_path, monkeypatch, words, title, names):
+    from realitygap.playback import _movie
+
+    screens = []
+    Screen = _movie.Screen
+    monkeypatch.setattr(_movie, "Screen", lambda *args: screens.append(Screen(*args)) or screens[-1])
+    path = tmp_path / "a.gif"
+    assert show("movie", results, *words, "--speed", "10", "-o", path) == f"Written: {path}\n"
+    (screen,) = screens
+    assert screen._title == title or not names
+    assert len(screen.trials) == max(len(names), 1)
+    assert [trial.title for trial in screen.trials] == names or screen.trials[0].title.startswith(
+        "coverage-50, run"
+    )
+    with Image.open(path) as image:
+        assert image.info["comment"].startswith(b"realitygap: SIM, ")
+
+
+def test_a_movie_of_two_studies_shows_a_trial_of_each(results, tmp_path):
+    path = tmp_path / "a.gif"
+    show("movie", results, results, "--speed", "20", "-o", path)
+    with Image.open(path) as image:
+        assert image.info["comment"] == b"realitygap: SIM, 2 studies"
 
 
 def test_a_file_that_is_there_gives_way(results, tmp_path):
@@ -127,15 +166,39 @@ def test_mistakes_in_python_are_told_too(results, tmp_path):
         (["DIR", "--generation", "9", "-o", "a.svg"], "its generations are 0 to 1"),
         (["DIR", "--individual", "1", "-o", "a.svg"], "of which generation?"),
         (["DIR", "--generation", "1", "--individual", "4", "-o", "a.svg"], "its individuals are 0 to 3"),
-        (["DIR", "-o", "a.jpg"], "expected .gif, .pdf, .png or .svg"),
+        (["DIR", "-o", "a.jpg"], "expected .gif, .mp4, .pdf, .png or .svg"),
         (["DIR", "-o", "a"], "ends in nothing"),
         (["DIR"], "Name a file with -o"),
-        (["network", "DIR", "-o", "a.gif"], "Only one trial can move"),
-        (["lineage", "DIR", "-o", "a.gif"], "Only one trial can move"),
+        (["network", "DIR", "-o", "a.gif"], "Only trials can move"),
+        (["lineage", "DIR", "-o", "a.gif"], "Only trials can move"),
         (["lineage", "DIR", "--replicate", "99", "-o", "a.svg"], "its runs are 0 to 2"),
         (["species", "DIR", "--generation", "1", "-o", "a.svg"], "over all generations"),
         (["network", "-o", "a.svg"], "Of which results?"),
-        (["netwrk", "DIR", "-o", "a.svg"], "Expected network, species, lineage, arena or robot first"),
+        (["netwrk", "DIR", "-o", "a.svg"], "species, lineage, divergence, movie, arena or robot first"),
+        (["movie", "-o", "a.gif"], "Of which results? Name a folder: realitygap show movie results/paper"),
+        (["movie", "DIR", "-o", "a.png"], "expected .gif or .mp4"),
+        (["movie", "DIR", "--each", "run", "-o", "a.gif"], "Unknown each 'run'"),
+        (["movie", "DIR", "DIR", "--each", "condition", "-o", "a.gif"], "2 results with each 'condition'"),
+        (
+            ["movie", "DIR", "--each", "individual", "--individual", "1", "-o", "a.gif"],
+            "Of no meaning with each 'individual': individual.",
+        ),
+        (["movie", "DIR", "--speed", "0", "-o", "a.gif"], "speed is 0, expected a number from 0.01 to 100"),
+        (
+            ["movie", "DIR", "--condition", "x", "--each", "individual", "-o", "a.gif"],
+            "Unknown condition 'x'",
+        ),
+        (["movie", "nowhere", "-o", "a.gif"], "nowhere does not exist"),
+        (["divergence", "DIR", "-o", "a.svg"], "tried on what beside its own condition?"),
+        (["divergence", "DIR", "--against", "novelty-5O", "-o", "a.svg"], "Did you mean 'novelty-50'?"),
+        (
+            ["divergence", "DIR", "--against", "jyro", "--repeats", "1", "-o", "a.svg"],
+            "repeats is 1, expected",
+        ),
+        (["divergence", "DIR", "--against", "jyro", "-o", "a.gif"], "expected .pdf, .png or .svg"),
+        (["DIR", "--against", "jyro", "-o", "a.svg"], "--against. Leave that out."),
+        (["DIR", "--speed", "2", "-o", "a.svg"], "--speed. Leave that out."),
+        (["network", "DIR", "DIR", "-o", "a.svg"], "Only a movie shows several"),
         (["arena", "papr", "-o", "a.svg"], "Did you mean 'paper'?"),
         (["robot", "r2d2", "-o", "a.svg"], "Known: jyro."),
         (["arena", "--condition", "x", "-o", "a.svg"], "Of no meaning for arena: --condition"),

@@ -8,19 +8,21 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _novelty
+from realitygap.kernels import _distances, _novelty
 from tests.reference import novelty as reference
 from tests.reference.effort import COMPILED, cases
 
 COLUMNS, ROWS = 12, 6
-BY_COLUMN, BY_ROW = (_novelty.make_cell_table(COLUMNS, ROWS, by_column) for by_column in (True, False))
+BY_COLUMN, BY_ROW = (
+    _distances.make_measure(_distances.PAPER, COLUMNS, ROWS, by_column) for by_column in (True, False)
+)
 Cells = list[int]
 Points = list[tuple[int, int]]
 
 
-def sorted_places(cells: Cells, table: _novelty.CellTable) -> np.ndarray:
+def sorted_places(cells: Cells, table: _distances.CellTable) -> np.ndarray:
     places = np.empty(table.place.size, np.int32)
-    _novelty.sort_cells(np.array(cells), len(cells), table, places)
+    _distances.sort_cells(np.array(cells), len(cells), table, places)
     return places[: len(cells)].copy()
 
 
@@ -35,11 +37,11 @@ def random_cells(rng: random.Random, n_cells: int) -> Cells:
     return rng.sample(range(n_cells), rng.choice([1, 2, rng.randint(1, n_cells), n_cells]))
 
 
-def packed(behaviors: list[Cells], table: _novelty.CellTable) -> tuple[np.ndarray, np.ndarray]:
-    places = np.zeros((len(behaviors), COLUMNS * ROWS), np.int32)
+def packed(behaviors: list[Cells], measure: _distances.Measure) -> _distances.Behaviors:
+    found = _distances.make_behaviors(len(behaviors), COLUMNS * ROWS)
     for k, cells in enumerate(behaviors):
-        places[k, : len(cells)] = sorted_places(cells, table)
-    return places, np.array([len(cells) for cells in behaviors], np.int32)
+        _distances.describe(measure, np.array(cells, np.int64), len(cells), 0.0, 0.0, found, k)
+    return found
 
 
 @pytest.mark.parametrize("by_column", [True, False])
@@ -48,7 +50,7 @@ def packed(behaviors: list[Cells], table: _novelty.CellTable) -> tuple[np.ndarra
 )
 def test_cells_are_sorted_as_pairs(columns: int, rows: int, by_column: bool) -> None:
     rng = random.Random(1)
-    table = _novelty.make_cell_table(columns, rows, by_column)
+    table = _distances.make_cell_table(columns, rows, by_column)
     for _ in range(cases(80, 10)):
         cells = random_cells(rng, columns * rows) if columns * rows > 1 else [0]
         found = points_at(sorted_places(cells, table), columns, rows, by_column)
@@ -60,7 +62,7 @@ def test_cells_are_sorted_as_pairs(columns: int, rows: int, by_column: bool) -> 
 def test_the_difference_of_two_places_says_how_far_apart_the_cells_are(
     columns: int, rows: int, by_column: bool
 ) -> None:
-    table = _novelty.make_cell_table(columns, rows, by_column)
+    table = _distances.make_cell_table(columns, rows, by_column)
     places = sorted_places(list(range(columns * rows)), table)
     points = points_at(places, columns, rows, by_column)
     for one, a in zip(places.tolist(), points, strict=True):
@@ -72,15 +74,15 @@ def test_the_difference_of_two_places_says_how_far_apart_the_cells_are(
 @pytest.mark.parametrize("by_column", [True, False])
 def test_the_distance_equals_the_reference(by_column: bool) -> None:
     rng = random.Random(2)
-    table = BY_COLUMN if by_column else BY_ROW
+    table = (BY_COLUMN if by_column else BY_ROW).table
     for _ in range(cases(500, 50)):
         one, other = random_cells(rng, COLUMNS * ROWS), random_cells(rng, COLUMNS * ROWS)
         a, b = sorted_places(one, table), sorted_places(other, table)
-        distance = _novelty.sorted_cells_distance(a, len(a), b, len(b), table.span)
+        distance = _distances.pointwise_distance(a, len(a), b, len(b), table.span)
         points = [reference.points_of(cells, COLUMNS, x_first=by_column) for cells in (one, other)]
         assert distance == pytest.approx(reference.paper_distance(*points, COLUMNS, ROWS), rel=1e-13)
-        assert distance == _novelty.sorted_cells_distance(b, len(b), a, len(a), table.span)
-        assert _novelty.sorted_cells_distance(a, len(a), a, len(a), table.span) == 0.0
+        assert distance == _distances.pointwise_distance(b, len(b), a, len(a), table.span)
+        assert _distances.pointwise_distance(a, len(a), a, len(a), table.span) == 0.0
 
 
 # --- the paper's archive ----------------------------------------------------------------------------------------
@@ -91,15 +93,16 @@ class KernelPaperArchive:
 
     def __init__(self, size: int, *, above_all: bool, by_column: bool) -> None:
         self.above_all, self.by_column = above_all, by_column
-        self.table = BY_COLUMN if by_column else BY_ROW
+        self.measure = BY_COLUMN if by_column else BY_ROW
         self.archive = _novelty.make_archive(0, size, COLUMNS * ROWS)
 
     def update(self, behaviors: list[Cells]) -> list[float]:
-        places, n_places = packed(behaviors, self.table)
         n = len(behaviors)
-        novelty, distance = np.empty(n), np.empty((n, self.archive.n_places.size))
+        novelty, distance = np.empty(n), np.empty((n, self.archive.archived.size))
         archive = self.archive._replace(place_of=np.empty(n, np.int64), distance=distance)
-        _novelty.paper_archive_step(places, n_places, self.table.span, archive, self.above_all, novelty)
+        _novelty.paper_archive_step(
+            packed(behaviors, self.measure), self.measure, archive, self.above_all, novelty
+        )
         return novelty.tolist()
 
     def behaviors(self) -> list[Points]:
@@ -107,8 +110,8 @@ class KernelPaperArchive:
         n, oldest = self.archive.state.tolist()
         archived = [(oldest + k) % n for k in range(n)]
         return [
-            points_at(self.archive.places[k, : self.archive.n_places[k]], COLUMNS, ROWS, self.by_column)
-            for k in archived
+            points_at(self.archive.behaviors.marks[k, :n_cells], COLUMNS, ROWS, self.by_column)
+            for k, n_cells in ((k, self.archive.behaviors.n_cells[k]) for k in archived)
         ]
 
 
@@ -201,8 +204,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         rng = random.Random(seed)
         n, k, generations = 4 + seed % 6, rng.randint(1, 12), 10
         start = [20.0, 400.0, 0.0, 150.0][seed % 4]
-        archive = np.empty((n * generations, COLUMNS * ROWS), np.int32)
-        n_archive = np.zeros(n * generations, np.int32)
+        archive = _distances.make_behaviors(n * generations, COLUMNS * ROWS)
         state, counters = np.zeros(1, np.int64), np.zeros(2, np.int64)
         threshold = np.array([start])
         plain = reference.NearestArchive(
@@ -210,16 +212,13 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         )
         for _ in range(generations):
             behaviors = [random_cells(rng, COLUMNS * ROWS) for _ in range(n)]
-            places, n_places = packed(behaviors, BY_COLUMN)
             novelty = np.empty(n)
-            room = _novelty.NearestRoom(np.empty(n + len(archive)), np.empty(k), np.empty(n, np.bool_))
+            room = _novelty.NearestRoom(np.empty(n + n * generations), np.empty(k), np.empty(n, np.bool_))
             _novelty.nearest_archive_step(
-                places,
-                n_places,
-                BY_COLUMN.span,
+                packed(behaviors, BY_COLUMN),
+                BY_COLUMN,
                 patience,
                 archive,
-                n_archive,
                 state,
                 counters,
                 threshold,
@@ -231,7 +230,9 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
             assert state[0] == len(plain.behaviors)
             assert threshold[0] == pytest.approx(plain.threshold, rel=1e-12)
             for place, behavior in enumerate(plain.behaviors):
-                assert points_at(archive[place, : n_archive[place]], COLUMNS, ROWS, True) == behavior
+                assert (
+                    points_at(archive.marks[place, : archive.n_cells[place]], COLUMNS, ROWS, True) == behavior
+                )
         moved.add(int(np.sign(threshold[0] - start)))
     assert {-1, 1} <= moved or not COMPILED
 

@@ -381,6 +381,8 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
         lanes,
         wiring,
         cells,
+        np.zeros((0, 72), np.uint8),
+        np.zeros((n, 2)),
         counts,
         trace,
     )

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 import pytest
 
-from realitygap.records import COLUMNS, SCHEMA, column_table, list_column
+from realitygap.records import COLUMNS, EXTRA_SCHEMA, SCHEMA, ResultsFolder, column_table, list_column
 from realitygap.records._columns import check_rows
 from tests.records.rows import make_rows
 
@@ -13,7 +15,7 @@ def test_table_describes_every_column_and_every_field_of_the_genome():
     table = column_table()
     names = [name for name, _, _ in table]
     fields = [f"{column.name}.{field.name}" for column in COLUMNS for field in column.fields]
-    assert [name for name in names if "." not in name] == list(SCHEMA)
+    assert [name for name in names if "." not in name] == [*SCHEMA, *EXTRA_SCHEMA]
     assert [name for name in names if "." in name] == fields
     assert len(set(names)) == len(names)
     assert all(description.endswith(".") for _, _, description in table)
@@ -91,3 +93,26 @@ def test_rows_that_do_not_fit_are_refused(spoil, message):
 def test_what_is_not_a_frame_is_refused():
     with pytest.raises(TypeError, match="dict"):
         check_rows({}, "coverage", 0)
+
+
+def test_extra_columns_are_kept_digested_and_null_where_a_condition_has_none(tmp_path: Path) -> None:
+    plain = make_rows()
+    drawn = [[float(k), 0.5] for k in range(plain.height)]
+    extra = plain.with_columns(pl.lit("sim").alias("condition"), pl.Series("drawn", drawn))
+    other = extra.with_columns(pl.Series("drawn", [[1.0, 0.5], *drawn[1:]]))
+    digests = []
+    for name, frame in (("a", extra), ("b", other)):
+        folder = ResultsFolder.create(tmp_path / name, {"conditions": ["coverage", "sim"]})
+        with folder.locked():
+            folder.publish("coverage", 0, plain, "h")
+            folder.publish("sim", 0, frame, "h")
+        digests.append(folder.digest())
+    assert digests[0] != digests[1]
+    assert folder.read("coverage").schema == SCHEMA
+    assert folder.read("sim")["drawn"].to_list() == other["drawn"].to_list()
+    for both in (folder.read(), folder.scan().collect(), folder.read(columns=["condition", "drawn"])):
+        assert both["drawn"].to_list() == [None] * plain.height + other["drawn"].to_list()
+    assert folder.read("coverage", columns=["drawn"]).height == plain.height
+    wrong = extra.with_columns(pl.col("drawn").list.first())
+    with pytest.raises(ValueError, match="'drawn' is Float64, expected List"):
+        check_rows(wrong, "sim", 0)

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from realitygap.drawing import Disc, Line, Text
+from realitygap.drawing import PENS, Disc, Line, Text
 from realitygap.errors import RecordError
 from realitygap.evolution import network_picture
 from realitygap.report import (
@@ -28,7 +28,7 @@ from realitygap.report import (
 )
 from realitygap.report._drawing import inline
 from realitygap.report._export import tables_of
-from realitygap.report._individuals_figure import _PENS, _moved_apart
+from realitygap.report._individuals_figure import _moved_apart
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._tally import read_tally
@@ -90,12 +90,12 @@ def test_all_individuals_of_all_generations_are_drawn(tiny_study):
         assert drawn.count(str(individual)) == 3, "its number stands in each of three generations"
         assert f"individual {individual}" in drawn
     assert "all 8 individuals of every generation" in drawing.caption
-    for color, _ in _PENS:
+    for color, _ in PENS:
         assert f"stroke: {color}" in drawing.svg
 
 
 def test_each_pen_has_dashes_of_its_own():
-    assert len({dashes for _, dashes in _PENS}) == len({color for color, _ in _PENS}) == 8
+    assert len({dashes for _, dashes in PENS}) == len({color for color, _ in PENS}) == 8
 
 
 def test_best_of_each_generation_is_named(tiny_study):

@@ -98,7 +98,7 @@ def test_cells_come_when_the_trial_comes_to_them(tiny):
     grid = condition.arena.arena().grid
     for row in rows_of(tally, "coverage").iter_rows(named=True):
         trajectory = replay(condition, row)
-        cells, steps, end_steps = _replay.first_visits(trajectory, grid)
+        cells, steps, end_steps = _replay.first_visits(trajectory.poses, grid)
         assert tuple(cells) == trajectory.cells
         assert len(end_steps) == round(trajectory.coverage_ends * grid.n_cells)
         assert (np.diff(steps) >= 0).all()

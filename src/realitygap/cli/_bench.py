@@ -17,14 +17,16 @@ def bench(
     task: Annotated[
         str | None,
         typer.Argument(
-            metavar="[TASK]", help="xor, double-pole or double-pole-no-velocity; without it, speed."
+            metavar="[TASK]",
+            help="xor, double-pole, double-pole-no-velocity, maze-medium or maze-hard; without it, speed.",
         ),
     ] = None,
     settings: Annotated[
         str | None, typer.Option(help="With a task: a named set of NEAT's settings. [default: default]")
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}]")
+        int | None,
+        typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}; mazes 40]"),
     ] = None,
     seed: Annotated[
         int | None,
@@ -49,15 +51,22 @@ def bench(
     one network tried once, counted up to and with the first that solves the task; figures are over the runs that
     solved it.
 
+    A maze: as many runs rewarded for novelty, and as many for nearness to the exit, beside the results of Lehman &
+    Stanley (2011). A run in which no network reaches the exit counts as its limit of evaluations.
+
     Example: realitygap bench --json
 
     Example: realitygap bench xor --settings stanley-2002 --seeds 100
 
     Example: realitygap bench double-pole --seeds 20 --change crossover=0
 
+    Example: realitygap bench maze-medium --seeds 10
+
     In Python: realitygap.study.measure_speed()
 
     In Python: realitygap.study.measure_task("xor", "stanley-2002", seeds=100)
+
+    In Python: realitygap.study.measure_maze("maze-medium", seeds=10)
     """
     if task is None:
         given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change or None}
@@ -68,10 +77,11 @@ def bench(
         return
     if seconds is not None:
         raise StudyError("--seconds goes with the measurement of speed, which has no task.")
-    _bench_task(
+    measured = _bench_maze if task.startswith("maze") else _bench_task
+    measured(
         task,
         "default" if settings is None else settings,
-        DEFAULT_SEEDS if seeds is None else seeds,
+        seeds,
         1 if seed is None else seed,
         _changes(change or []),
         as_json=as_json,
@@ -101,12 +111,13 @@ def _changed_setting(text: str) -> tuple[str, Any]:
 
 
 def _bench_task(
-    task: str, settings: str, seeds: int, seed: int, changes: dict[str, Any], *, as_json: bool
+    task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
     from realitygap.study import measure_task
 
     from ._study import RunsBar
 
+    seeds = DEFAULT_SEEDS if seeds is None else seeds
     with RunsBar(quiet=as_json) as bar:
         figures = measure_task(task, settings, seeds=seeds, seed=seed, changes=changes, tell=bar.show)
     if as_json:
@@ -132,6 +143,43 @@ def _bench_task(
         if key in figures:
             typer.echo(f"{name:28} {_shown(key, figures[key]):>10} {_shown(key, published.get(key)):>10}")
     typer.echo(f"Published: {published['source']}.")
+
+
+def _bench_maze(
+    task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
+) -> None:
+    from realitygap.study import MAZE_SEEDS, measure_maze
+
+    from ._study import RunsBar
+
+    with RunsBar(quiet=as_json) as bar:
+        figures = measure_maze(
+            task,
+            settings,
+            seeds=MAZE_SEEDS if seeds is None else seeds,
+            seed=seed,
+            changes=changes,
+            tell=bar.show,
+        )
+    if as_json:
+        typer.echo(json.dumps(figures, indent=2))
+        return
+    columns = [figures["novelty"], figures["novelty"]["published"]]
+    columns += [figures["objective"], figures["objective"]["published"]]
+    typer.echo(f"{task}, {figures['settings']}, seed {seed}; at most {figures['limit']:,} evaluations a run")
+    typer.echo(
+        f"{'':20}" + "".join(f"{name:>12}" for name in ("novelty", "published", "objective", "published"))
+    )
+    names = {
+        "solved": "solved",
+        "seeds": "of so many runs",
+        "mean_evaluations": "mean evaluations",
+        "median_evaluations": "median",
+        "sd_evaluations": "standard deviation",
+    }
+    for key, name in names.items():
+        typer.echo(f"{name:20}" + "".join(f"{_shown(key, column.get(key)):>12}" for column in columns))
+    typer.echo(f"Published: {figures['source']}.")
 
 
 def _shown(key: str, value: float | None) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
 from realitygap.errors import RealityGapError, StudyError
 
 if TYPE_CHECKING:
+    from realitygap.report import Each
     from realitygap.report._show import Subject
 
 
@@ -18,34 +19,63 @@ def show(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="WHAT", help="A folder of results; or network, species, lineage, arena or robot."
+            metavar="WHAT",
+            help="A folder of results; or network, species, lineage, divergence, movie, arena or robot.",
         ),
     ],
-    name: Annotated[
-        str | None,
+    names: Annotated[
+        list[str] | None,
         typer.Argument(
             metavar="NAME",
-            help="After network, species and lineage, the folder; after arena, paper; after robot, jyro.",
+            help="After network, species, lineage and divergence, the folder; after movie, one or more; after arena, "
+            "an arena's name or file; after robot, a robot's.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", metavar="FILE", help="Ends in .svg, .pdf, .png or, for a trial, .gif."),
+        typer.Option(
+            "-o", "--out", metavar="FILE", help="Ends in .svg, .pdf, .png or, for a trial, .gif or .mp4."
+        ),
     ] = None,
     condition: Annotated[str | None, typer.Option(help="Of which. [default: the first]")] = None,
     replicate: Annotated[int | None, typer.Option(help="Which run. [default: the typical one]")] = None,
     generation: Annotated[int | None, typer.Option(help="Of a trial, network or lineage.")] = None,
     individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
+    each: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHAT",
+            help="Of a movie: each individual of a generation, the best of each generation, or of each condition.",
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Of a movie: 2 is twice as fast as it was. [default: 1]")
+    ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Of a divergence: another condition, or a platform, to try the network on."
+        ),
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of an arena: a robot's name or file, at the start.")
+    ] = None,
+    repeats: Annotated[
+        int | None, typer.Option(help="Of a divergence: trials on each of the two. [default: 30]")
+    ] = None,
 ) -> None:
-    """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file.
+    """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file, or trials in motion.
 
     A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
-    commands. FILE.gif shows a trial in motion (without --generation, the run's best). Trials are recomputed from their
-    rows. A file that is there gives way once the new one is complete.
+    commands. FILE.gif and FILE.mp4 show a trial in motion (without --generation, the run's best), movie several of
+    them. divergence tries a trial's network on two platforms, and shows how far they come apart. Trials are recomputed
+    from their rows. A file that is there gives way once the new one is complete.
 
     Example: realitygap show results/paper --condition coverage-50 --replicate 3 -o run.svg
 
     Example: realitygap show results/paper --generation 4 --individual 2 -o trial.gif
+
+    Example: realitygap show movie results/paper --each individual --generation 4 -o eight.gif
 
     Example: realitygap show network results/paper --condition novelty-50 -o network.pdf
 
@@ -53,15 +83,23 @@ def show(
 
     Example: realitygap show lineage results/paper --condition novelty-50 -o lineage.svg
 
-    Example: realitygap show arena -o arena.svg
+    Example: realitygap show divergence results/paper --condition novelty-50 --against novelty-10 -o divergence.svg
 
-    Example: realitygap show robot jyro -o robot.svg
+    Example: realitygap show arena maze-hard --robot khepera -o arena.svg
+
+    Example: realitygap show robot scribbler-s2-fluke2 -o robot.svg
 
     In Python: realitygap.report.save_view("results/paper", "run.svg", condition="coverage-50", replicate=3)
 
     In Python: realitygap.report.save_view("results/paper", "network.pdf", subject="network")
 
-    In Python: realitygap.report.save_arena("arena.svg"), realitygap.report.save_robot("robot.svg")
+    In Python: realitygap.write_movie("results/paper", "eight.gif", each="individual", generation=4)
+
+    In Python: realitygap.report.save_divergence("results/paper", "divergence.svg", against="novelty-10")
+
+    In Python: realitygap.report.save_arena("arena.svg", "maze-hard", robot="khepera")
+
+    In Python: realitygap.report.save_robot("robot.svg", "scribbler-s2-fluke2")
     """
     if out is None:
         raise StudyError("Where to? Name a file with -o, such as -o run.svg.")
@@ -69,10 +107,25 @@ def show(
 
     numbers = (replicate, generation, individual)
     try:
+        if what != "movie":
+            _refuse(what, ("--each", "--speed"), each, speed)
+        if what != "divergence":
+            _refuse(what, ("--against", "--repeats"), against, repeats)
+        if what != "arena":
+            _refuse(what, ("--robot",), robot)
+        if what == "movie":
+            typer.echo(f"Written: {_movie(names, out, each, speed, condition, *numbers)}")
+            return
+        name = _one_name(what, names)
+        if what == "divergence":
+            typer.echo(f"Written: {_divergence(name, out, against, repeats, condition, *numbers)}")
+            return
         if what in ("arena", "robot"):
-            _refuse(what, condition, *numbers)
-            save = save_arena if what == "arena" else save_robot
-            path = save(out) if name is None else save(out, name)
+            _refuse(what, _NUMBERS, condition, *numbers)
+            is_arena = what == "arena"
+            path = (
+                save_arena(out, name or "paper", robot=robot) if is_arena else save_robot(out, name or "jyro")
+            )
         else:
             subject, folder = _subject(what, name, out)
             path = save_view(
@@ -100,14 +153,81 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
         return subjects[what], name
     if name is not None:
         raise StudyError(
-            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, arena or robot first, or only a "
-            "folder."
+            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, divergence, movie, arena or robot "
+            "first, or only a folder."
         )
     return "run", what
 
 
-def _refuse(what: str, *given: object) -> None:
-    names = ("--condition", "--replicate", "--generation", "--individual")
-    surplus = [name for name, value in zip(names, given, strict=True) if value is not None]
+def _movie(
+    names: list[str] | None,
+    out: Path,
+    each: str | None,
+    speed: float | None,
+    condition: str | None,
+    replicate: int | None,
+    generation: int | None,
+    individual: int | None,
+) -> Path:
+    from realitygap.report import write_movie
+
+    if not names:
+        raise StudyError(
+            f"Of which results? Name a folder: realitygap show movie results/paper -o {shlex.quote(str(out))}"
+        )
+    return write_movie(
+        names,
+        out,
+        each=cast("Each | None", each),
+        condition=condition,
+        replicate=replicate,
+        generation=generation,
+        individual=individual,
+        speed=1.0 if speed is None else speed,
+    )
+
+
+def _divergence(
+    name: str | None,
+    out: Path,
+    against: str | None,
+    repeats: int | None,
+    condition: str | None,
+    replicate: int | None,
+    generation: int | None,
+    individual: int | None,
+) -> Path:
+    from realitygap.report import save_divergence
+
+    if name is None or against is None:
+        raise StudyError(
+            "Of which results, and tried on what beside its own condition? realitygap show divergence results/paper "
+            f"--against novelty-10 -o {shlex.quote(str(out))}"
+        )
+    return save_divergence(
+        name,
+        out,
+        against=against,
+        condition=condition,
+        replicate=replicate,
+        generation=generation,
+        individual=individual,
+        repeats=30 if repeats is None else repeats,
+    )
+
+
+def _one_name(what: str, names: list[str] | None) -> str | None:
+    if names and len(names) > 1:
+        raise StudyError(
+            f"Cannot show {what!r} of {len(names)} at once, expected one name after it. Only a movie shows several."
+        )
+    return names[0] if names else None
+
+
+_NUMBERS = ("--condition", "--replicate", "--generation", "--individual")
+
+
+def _refuse(what: str, options: tuple[str, ...], *given: object) -> None:
+    surplus = [name for name, value in zip(options, given, strict=True) if value is not None]
     if surplus:
         raise StudyError(f"Of no meaning for {what}: {', '.join(surplus)}. Leave that out.")

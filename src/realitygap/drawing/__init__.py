@@ -1,11 +1,27 @@
-"""Plain shapes to SVG, without matplotlib: how arenas, robots, networks and paths show themselves.
+"""Plain shapes to SVG and pixels, without matplotlib: how arenas, robots, networks and paths show themselves.
 
 It lies below `world`, because it knows nothing but points, colors and text. What has a picture (an `Arena`, a
 `JyroPlatform`, a `Genome`, a `Trajectory`) says so as a `Picture` of shapes, which notebooks show; the report draws the
 same shapes into its figures, and matplotlib is imported only there.
 """
 
-from ._ink import Ink
+from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
+from ._pixels import to_image, to_png
+from ._x11 import hex_of, rgb_of
 
-__all__ = ["FONT", "Disc", "Ink", "Line", "Picture", "Point", "Shape", "Text"]
+__all__ = [
+    "FONT",
+    "PENS",
+    "Disc",
+    "Ink",
+    "Line",
+    "Picture",
+    "Point",
+    "Shape",
+    "Text",
+    "hex_of",
+    "rgb_of",
+    "to_image",
+    "to_png",
+]

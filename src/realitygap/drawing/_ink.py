@@ -33,3 +33,16 @@ class Ink:
     def names(cls) -> dict[str, str]:
         """Color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
         return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}
+
+
+PENS: tuple[tuple[str, tuple[float, ...]], ...] = (
+    (Ink.PEN0, ()),
+    (Ink.PEN1, (6, 1.5)),
+    (Ink.PEN2, (1.3, 1.5)),
+    (Ink.PEN3, (5, 1.5, 1.3, 1.5)),
+    (Ink.PEN4, (3, 1.6)),
+    (Ink.PEN5, (7, 1.5, 1.3, 1.5, 1.3, 1.5)),
+    (Ink.PEN6, (2, 1)),
+    (Ink.PEN7, (9, 2.5)),
+)
+"""Color and dashes [pt] of the paper's eight pens; a ninth individual takes the first pen again."""

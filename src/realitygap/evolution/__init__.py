@@ -1,5 +1,7 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
+from ._archive import NoveltyArchive
+from ._distances import DISTANCES, BehaviorDistance, behavior_distance, distance_kind
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
 from ._novelty import (
@@ -17,17 +19,22 @@ from ._random import random_key
 from ._settings import NAMED_SETTINGS, NeatSettings
 
 __all__ = [
+    "DISTANCES",
     "NAMED_SETTINGS",
+    "BehaviorDistance",
     "ConnectionGene",
     "Genome",
     "NearestArchive",
     "NeatSettings",
     "Network",
     "NodeGene",
+    "NoveltyArchive",
     "NoveltySettings",
     "PaperArchive",
     "Population",
+    "behavior_distance",
     "decode_all",
+    "distance_kind",
     "euclidean",
     "genome_from_record",
     "genome_record",

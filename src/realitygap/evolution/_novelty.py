@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import reprlib
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap.kernels import _novelty
 from realitygap.settings import Settings
 
-Cells = Sequence[int] | NDArray[np.integer]
+from ._distances import DISTANCES, Cells, DistanceName, Sort, measure_of, pack_behaviors
 
 
 class NoveltySettings(Settings):
@@ -23,14 +21,19 @@ class NoveltySettings(Settings):
 
     `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
     mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in
-    population and archive, which takes what exceeds a moving threshold. Both compare sorted lists of cells.
+    population and archive, which takes what exceeds a moving threshold. Both with any distance of behaviors.
     """
 
     kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Which novelty search.")
-    sort: Literal["x-then-y", "y-then-x"] = Field(
+    distance: DistanceName = Field(
+        "paper",
+        description="How different two behaviors are: the paper's distance of sorted cells, or another of those that "
+        "realitygap audit-distance draws. ordered, edit and alignment need the order in which cells were visited.",
+    )
+    sort: Sort = Field(
         "x-then-y",
-        description="How the cells of a behavior are sorted. The paper does not say; it names cells (0,0) and "
-        "(11,5), pairs that Python sorts by x first.",
+        description="paper's distance: how the cells of a behavior are sorted. The paper does not say; it names cells "
+        "(0,0) and (11,5), pairs that Python sorts by x first.",
     )
     archive_size: int = Field(
         8,
@@ -45,7 +48,10 @@ class NoveltySettings(Settings):
     )
     neighbors: int = Field(15, ge=1, le=100_000, description="lehman-stanley: k (2011: 15).")
     threshold: float = Field(
-        6.0, ge=0, description="lehman-stanley: novelty from which on a behavior enters at first."
+        6.0,
+        ge=0,
+        description="lehman-stanley: novelty from which on a behavior enters at first, in the unit of the distance: to "
+        "be given with any other than the paper's.",
     )
     patience: int = Field(
         2500,
@@ -53,34 +59,27 @@ class NoveltySettings(Settings):
         description="lehman-stanley: evaluations without an entry after which the threshold falls by 5 %.",
     )
 
+    @model_validator(mode="after")
+    def _threshold_is_in_the_unit_of_the_distance(self) -> Self:
+        chosen = self.kind == "lehman-stanley" and self.distance != "paper"
+        if chosen and "threshold" not in self.model_fields_set:
+            unit = {"cells": "in cells", "m": "in meters", "1": "0 to 1"}[DISTANCES[self.distance].unit]
+            raise ValueError(
+                f"threshold is not given, expected one with distance {self.distance!r} ({unit}): the default of 6 is "
+                "for the paper's distance"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _leave_out_what_was_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The paper's distance is not named, so that conditions from before there was another keep their hash."""
+        values: dict[str, Any] = handler(self)
+        return {key: value for key, value in values.items() if (key, value) != ("distance", "paper")}
+
 
 def largest_cell_distance(columns: int, rows: int) -> float:
     """The largest distance of two cells of a grid [cells], the paper's padding."""
     return math.hypot(columns - 1, rows - 1)
-
-
-Sort = Literal["x-then-y", "y-then-x"]
-
-
-@functools.cache
-def _table_of(columns: int, rows: int, sort: Sort) -> _novelty.CellTable:
-    table: _novelty.CellTable = _novelty.make_cell_table(columns, rows, sort == "x-then-y")
-    return table
-
-
-def _sorted_places(cells: Cells, columns: int, rows: int, table: _novelty.CellTable) -> NDArray[np.int32]:
-    given = np.asarray(cells)
-    if given.size and given.dtype.kind not in "iu":
-        raise TypeError(f"A behavior is {reprlib.repr(cells)}, expected whole numbers: those of its cells.")
-    numbers = np.unique(given.astype(np.int64))
-    if numbers.size and (numbers[0] < 0 or numbers[-1] >= columns * rows):
-        raise ValueError(
-            f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
-            f"expected 0 to {columns * rows - 1}: the grid has {columns} columns and {rows} rows."
-        )
-    places = np.empty(columns * rows, np.int32)
-    _novelty.sort_cells(numbers, numbers.size, table, places)
-    return places[: numbers.size]
 
 
 def sorted_cells_distance(
@@ -107,10 +106,7 @@ def sorted_cells_distance(
 
     Source: Rosenzweig & Remy, section 2.4.
     """
-    table = _table_of(columns, rows, sort)
-    a = _sorted_places(one, columns, rows, table)
-    b = _sorted_places(other, columns, rows, table)
-    return float(_novelty.sorted_cells_distance(a, len(a), b, len(b), table.span))
+    return float(DISTANCES["paper"].distances([one], [other], columns=columns, rows=rows, sort=sort)[0, 0])
 
 
 class PaperArchive:
@@ -132,45 +128,29 @@ class PaperArchive:
     def __len__(self) -> int:
         return int(self._archive.state[0])
 
-    def update(self, behaviors: Sequence[Cells]) -> NDArray[np.float64]:
+    def update(self, behaviors: Sequence[Cells] | ArrayLike) -> NDArray[np.float64]:
         """Novelty of one generation, which the archive then takes in.
 
         Args:
-            behaviors: n lists of visited cells, in the order of individuals.
+            behaviors: n lists of visited cells, in the order of individuals, or what else the distance of the
+                settings compares (`BehaviorDistance.distances`).
 
         Returns:
-            (n,) float64 [cells]; 0 where there is nothing to compare with.
+            (n,) float64, in the unit of the distance [cells]; 0 where there is nothing to compare with.
 
         Raises:
             TypeError: A cell that is not a whole number.
-            ValueError: A cell outside the grid.
+            ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
         """
-        table = _table_of(self._columns, self._rows, self.settings.sort)
-        places, n_places = _pack(behaviors, self._columns, self._rows, table)
-        n = len(behaviors)
+        measure = measure_of(self.settings.distance, self._columns, self._rows, self.settings.sort)
+        packed = pack_behaviors(measure, behaviors, self._columns, self._rows)
+        n = len(packed.n_cells)
         novelty = np.empty(n)
         room = {"place_of": np.zeros(n, np.int64), "distance": np.zeros((n, self.settings.archive_size))}
         _novelty.paper_archive_step(
-            places,
-            n_places,
-            table.span,
-            self._archive._replace(**room),
-            self.settings.enter == "above-all",
-            novelty,
+            packed, measure, self._archive._replace(**room), self.settings.enter == "above-all", novelty
         )
         return novelty
-
-
-def _pack(
-    behaviors: Sequence[Cells], columns: int, rows: int, table: _novelty.CellTable
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    places = np.zeros((len(behaviors), columns * rows), np.int32)
-    n_places = np.zeros(len(behaviors), np.int32)
-    for k, cells in enumerate(behaviors):
-        found = _sorted_places(cells, columns, rows, table)
-        places[k, : len(found)] = found
-        n_places[k] = len(found)
-    return places, n_places
 
 
 def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:

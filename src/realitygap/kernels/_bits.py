@@ -26,6 +26,10 @@ if numba.config.DISABLE_JIT:
         """The place of the highest bit, likewise."""
         return int(word).bit_length() - 1
 
+    def count_bits(word: Any) -> Any:
+        """How many bits of an int32 are set, which is not below zero."""
+        return int(word).bit_count()
+
     def power_of_two(exponent: Any) -> Any:
         """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
         return type(exponent)(2.0 ** int(exponent))
@@ -71,6 +75,15 @@ else:
             return builder.zext(place, ir.IntType(64))
 
         return types.int64(types.uint32), generate
+
+    @intrinsic
+    def count_bits(context, word):
+        """How many bits of an int32 are set, which is not below zero."""
+
+        def generate(context, builder, signature, arguments):
+            return builder.zext(builder.ctpop(arguments[0]), ir.IntType(64))
+
+        return types.int64(types.int32), generate
 
     @intrinsic
     def power_of_two(context, exponent):

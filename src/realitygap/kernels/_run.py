@@ -2,87 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, kernel
-from ._evolve import next_generation
-from ._genome import Genomes, first_genomes, make_genomes
+from ._block import (
+    NEAREST_NOVELTY,
+    NOVELTY,
+    NoveltyRoom,
+    Runs,
+    begin_runs,
+    breed_runs,
+    cover_runs,
+    decode_runs,
+    keep_runs,
+    make_novelty_room,
+    make_runs,
+    select_novel,
+)
+from ._compile import kernel
+from ._genome import Genomes, make_genomes
 from ._lanes import LANES, Lanes
 from ._marks import list_cells
-from ._mutation import Innovations, clear_innovations
-from ._network import Networks, decode, make_networks
-from ._novelty import (
-    Archive,
-    CellTable,
-    NearestRoom,
-    make_cell_table,
-    nearest_archive_step,
-    paper_archive_step,
-    sort_cells,
-)
-from ._philox import FIRST, PURPOSE_NOISE, make_stream
-from ._species import SpeciesTable, clear_species, speciate
+from ._network import Networks, make_networks
 from ._trial import Trace, make_block, make_trace, run_block
 from ._wiring import Wiring, wire
-
-COVERAGE = 0
-NOVELTY = 1
-NEAREST_NOVELTY = 2
-RANDOM = 3
-
-
-class RunRules(NamedTuple):
-    """What a run selects for, and for how long."""
-
-    n_generations: int
-    population: int
-    selection: int
-    count_ends: bool  # whether selection counts the cells at the ends of steps, else those along the line
-    archive_size: int
-    above_all: bool  # whether a newcomer must be more novel than everyone in the paper's archive
-    by_column: bool  # whether behaviors are sorted by x first
-    neighbors: int
-    archive_threshold: float
-    archive_patience: int
-
-
-class RunRows(NamedTuple):
-    """What r runs of g generations of n individuals leave behind, with room for genomes."""
-
-    fitness: NDArray[np.float64]  # (r, g, n)
-    novelty: NDArray[np.float64]  # (r, g, n) NaN where selection is not novelty
-    counts: NDArray[np.int32]  # (r, g, n, 3) cells along the line, at the ends of steps; blocked steps
-    cells: NDArray[np.uint8]  # (r, g, n, c) along the line, in order of first visit
-    species: NDArray[np.int32]  # (r, g, n)
-    parents: NDArray[np.int32]  # (r, g, n, 2) -1: none
-    n_connections: NDArray[np.int32]  # (r, g, n)
-    n_hidden: NDArray[np.int32]  # (r, g, n)
-    innovation: NDArray[np.int32]  # (r, g, n, room)
-    source: NDArray[np.int32]  # (r, g, n, room)
-    target: NDArray[np.int32]  # (r, g, n, room)
-    weight: NDArray[np.float64]  # (r, g, n, room)
-    enabled: NDArray[np.bool_]  # (r, g, n, room)
-    hidden: NDArray[np.int32]  # (r, g, n, hidden room)
-    bias: NDArray[np.float64]  # (r, g, n, outputs + hidden room)
-
-
-class Runs(NamedTuple):
-    """What a block of r runs of n individuals knows beside its genomes."""
-
-    species_of: NDArray[np.int32]  # (r, n)
-    parents: NDArray[np.int32]  # (r, n, 2)
-    fitness: NDArray[np.float64]  # (r, n)
-    novelty: NDArray[np.float64]  # (r, n)
-    # Of each run, with the run as first axis
-    innovations: Innovations
-    species: SpeciesTable
-    archive: Archive
-    archive_counters: NDArray[np.int64]  # (r, 2)
-    archive_threshold: NDArray[np.float64]  # (r, 1)
 
 
 class RunRoom(NamedTuple):
@@ -100,228 +45,8 @@ class RunRoom(NamedTuple):
     cells: NDArray[np.uint8]  # (t, k)
     ends: NDArray[np.uint8]  # (t, k)
     counts: NDArray[np.int32]  # (t, 3)
-    places: NDArray[np.int32]  # (n, k)
-    n_places: NDArray[np.int32]  # (n,)
-    table: CellTable
-    nearest: NearestRoom
-
-
-@inlined
-def rows_of(genomes, first, n):
-    """The genomes of n individuals among others."""
-    last = first + n
-    return Genomes(
-        genomes.n_connections[first:last],
-        genomes.n_hidden[first:last],
-        genomes.innovation[first:last],
-        genomes.source[first:last],
-        genomes.target[first:last],
-        genomes.weight[first:last],
-        genomes.enabled[first:last],
-        genomes.hidden[first:last],
-        genomes.bias[first:last],
-        genomes.full,
-        genomes.reached,
-        genomes.cursor,
-    )
-
-
-@inlined
-def _innovations_of(innovations, run):
-    return Innovations(
-        innovations.counters[run],
-        innovations.link_source[run],
-        innovations.link_target[run],
-        innovations.link_number[run],
-        innovations.split_gene[run],
-        innovations.split_node[run],
-        innovations.split_number[run],
-    )
-
-
-@inlined
-def _species_of_run(species, run):
-    return SpeciesTable(
-        species.identity[run],
-        species.size[run],
-        species.best[run],
-        species.improved[run],
-        species.counts[run],
-        species.floats[run],
-        species.improved_at[run],
-        species.numbers,
-        species.shares,
-    )
-
-
-@inlined
-def _archive_of(archive, run):
-    return Archive(
-        archive.places[run],
-        archive.n_places[run],
-        archive.among[run],
-        archive.state[run],
-        archive.place_of,
-        archive.distance,
-        archive.archived,
-    )
-
-
-def _make_runs(rules, cells, n_runs):
-    n = rules.population
-    archive_room = rules.archive_size if rules.selection == NOVELTY else 0
-    if rules.selection == NEAREST_NOVELTY:
-        archive_room = n * rules.n_generations
-    return Runs(
-        species_of=np.zeros((n_runs, n), np.int32),
-        parents=np.zeros((n_runs, n, 2), np.int32),
-        fitness=np.zeros((n_runs, n)),
-        novelty=np.full((n_runs, n), math.nan),
-        innovations=Innovations(
-            np.zeros((n_runs, 4), np.int64),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-        ),
-        species=SpeciesTable(
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, n)),
-            np.zeros((n_runs, n), np.int32),
-            np.zeros((n_runs, 2), np.int64),
-            np.zeros((n_runs, 2)),
-            np.zeros((n_runs, 1), np.int64),
-            np.zeros((3, 2 * n), np.int64),
-            np.zeros((4, n)),
-        ),
-        archive=Archive(
-            np.zeros((n_runs, archive_room, cells), np.int32),
-            np.zeros((n_runs, archive_room), np.int32),
-            np.zeros((n_runs, rules.archive_size, rules.archive_size)),
-            np.zeros((n_runs, 2), np.int64),
-            np.zeros(n, np.int64),
-            np.zeros((n, rules.archive_size)),
-            np.zeros(rules.archive_size),
-        ),
-        archive_counters=np.zeros((n_runs, 2), np.int64),
-        archive_threshold=np.zeros((n_runs, 1)),
-    )
-
-
-@kernel
-def _begin(runs, genomes, run, neat, rules, key, replicate):
-    """First genomes, in their species."""
-    n = rules.population
-    clear_innovations(neat, _innovations_of(runs.innovations, run))
-    species = _species_of_run(runs.species, run)
-    clear_species(neat, species)
-    archive = _archive_of(runs.archive, run)
-    archive.state[0] = archive.state[1] = 0
-    runs.archive_counters[run, 0] = runs.archive_counters[run, 1] = 0
-    runs.archive_threshold[run, 0] = rules.archive_threshold
-    for row in range(n):
-        runs.species_of[run, row] = 0
-        runs.parents[run, row, 0] = runs.parents[run, row, 1] = -1
-    own = rows_of(genomes, run * n, n)
-    first_genomes(own, neat, key, replicate, FIRST)
-    if rules.selection != RANDOM:
-        speciate(own, own, runs.fitness[run], runs.species_of[run], species, neat, key, replicate, FIRST)
-
-
-@kernel
-def _go_on(runs, genomes, children, run, neat, rules, key, replicate, generation):
-    """The next generation of a run, into `children`."""
-    n = rules.population
-    new = rows_of(children, run * n, n)
-    if rules.selection == RANDOM:
-        first_genomes(new, neat, key, replicate, generation + 1)
-        return
-    next_generation(
-        rows_of(genomes, run * n, n),
-        runs.fitness[run],
-        runs.species_of[run],
-        _species_of_run(runs.species, run),
-        neat,
-        _innovations_of(runs.innovations, run),
-        key,
-        replicate,
-        generation,
-        new,
-        runs.parents[run],
-    )
-
-
-@kernel
-def _keep(runs, genomes, run, rows, to_run, generation):
-    """Copy a generation of a run into the rows."""
-    outputs = genomes.bias.shape[1] - genomes.hidden.shape[1]
-    population = runs.fitness.shape[1]
-    for k in range(population):
-        row = run * population + k
-        rows.fitness[to_run, generation, k] = runs.fitness[run, k]
-        rows.novelty[to_run, generation, k] = runs.novelty[run, k]
-        rows.species[to_run, generation, k] = runs.species_of[run, k]
-        rows.parents[to_run, generation, k, 0] = runs.parents[run, k, 0]
-        rows.parents[to_run, generation, k, 1] = runs.parents[run, k, 1]
-        n = genomes.n_connections[row]
-        h = genomes.n_hidden[row]
-        rows.n_connections[to_run, generation, k] = n
-        rows.n_hidden[to_run, generation, k] = h
-        for gene in range(n):
-            rows.innovation[to_run, generation, k, gene] = genomes.innovation[row, gene]
-            rows.source[to_run, generation, k, gene] = genomes.source[row, gene]
-            rows.target[to_run, generation, k, gene] = genomes.target[row, gene]
-            rows.weight[to_run, generation, k, gene] = genomes.weight[row, gene]
-            rows.enabled[to_run, generation, k, gene] = genomes.enabled[row, gene]
-        for node in range(h):
-            rows.hidden[to_run, generation, k, node] = genomes.hidden[row, node]
-        for node in range(outputs + h):
-            rows.bias[to_run, generation, k, node] = genomes.bias[row, node]
-
-
-@kernel
-def _score(room, run, rules, scene, rows, to_run, generation):
-    """What a run's generation is worth: its coverage, or its novelty."""
-    runs = room.runs
-    n_cells = scene.columns * scene.rows
-    is_novelty = rules.selection == NOVELTY or rules.selection == NEAREST_NOVELTY
-    for row in range(rules.population):
-        trial = run * rules.population + row
-        for k in range(3):
-            rows.counts[to_run, generation, row, k] = room.counts[trial, k]
-        for k in range(room.counts[trial, 0]):
-            rows.cells[to_run, generation, row, k] = room.cells[trial, k]
-        counted = room.counts[trial, 1] if rules.count_ends else room.counts[trial, 0]
-        runs.fitness[run, row] = counted / n_cells
-        if is_novelty:
-            visited = room.ends[trial] if rules.count_ends else room.cells[trial]
-            sort_cells(visited, counted, room.table, room.places[row])
-            room.n_places[row] = counted
-    if not is_novelty:
-        return
-    archive = _archive_of(runs.archive, run)
-    novelty = runs.novelty[run]
-    if rules.selection == NOVELTY:
-        paper_archive_step(room.places, room.n_places, room.table.span, archive, rules.above_all, novelty)
-    else:
-        nearest_archive_step(
-            room.places,
-            room.n_places,
-            room.table.span,
-            rules.archive_patience,
-            archive.places,
-            archive.n_places,
-            archive.state,
-            runs.archive_counters[run],
-            runs.archive_threshold[run],
-            room.nearest,
-            novelty,
-        )
-    for row in range(rules.population):
-        runs.fitness[run, row] = novelty[row]
+    ended: NDArray[np.float64]  # (t, 2) where trials ended [m from the start]
+    novelty: NoveltyRoom
 
 
 def runs_together(population):
@@ -339,9 +64,8 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
     trials = together * n
     n_cells = scene.columns * scene.rows
     lanes, wiring = make_block(scene, neat, hidden_room)
-    archive_room = n * rules.n_generations if rules.selection == NEAREST_NOVELTY else 0
     return RunRoom(
-        runs=_make_runs(rules, n_cells, together),
+        runs=make_runs(rules, n_cells, together),
         genomes=make_genomes(trials, neat.n_outputs, room, hidden_room),
         children=make_genomes(trials, neat.n_outputs, room, hidden_room),
         networks=make_networks(trials, neat, room, hidden_room),
@@ -353,10 +77,8 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
         cells=np.zeros((trials, n_cells), np.uint8),
         ends=np.zeros((trials, n_cells), np.uint8),
         counts=np.zeros((trials, 3), np.int32),
-        places=np.zeros((n, n_cells), np.int32),
-        n_places=np.zeros(n, np.int32),
-        table=make_cell_table(scene.columns, scene.rows, rules.by_column),
-        nearest=NearestRoom(np.zeros(n + archive_room), np.zeros(rules.neighbors), np.zeros(n, np.bool_)),
+        ended=np.zeros((trials, 2)),
+        novelty=make_novelty_room(rules, scene.columns, scene.rows),
     )
 
 
@@ -381,26 +103,18 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
     n = rules.population
     total = rows.fitness.shape[0]
     together = runs.fitness.shape[0]
+    novelty = rules.selection == NOVELTY or rules.selection == NEAREST_NOVELTY
     for first_run in range(0, total, together):
         n_runs = min(together, total - first_run)
-        for run in range(n_runs):
-            _begin(runs, genomes, run, neat, rules, key, first_replicate + first_run + run)
+        first = first_replicate + first_run
+        begin_runs(runs, genomes, n_runs, neat, rules, key, first)
         if genomes.full[0]:
             return False
         for generation in range(rules.n_generations):
-            for run in range(n_runs):
-                for row in range(n):
-                    at = run * n + row
-                    decode(genomes, at, neat, networks, at)
-                    stream = make_stream(
-                        key, first_replicate + first_run + run, generation, row, FIRST, PURPOSE_NOISE
-                    )
-                    room.counters[at, 0] = stream[0]
-                    room.counters[at, 1] = stream[1]
-                    room.counters[at, 2] = stream[2]
-            for first in range(0, n_runs * n, LANES):
-                n_lanes = min(LANES, n_runs * n - first)
-                wire(networks, room.which, first, n_lanes, neat, room.wiring)
+            decode_runs(genomes, networks, room.counters, n_runs, neat, rules, key, first, generation)
+            for first_trial in range(0, n_runs * n, LANES):
+                n_lanes = min(LANES, n_runs * n - first_trial)
+                wire(networks, room.which, first_trial, n_lanes, neat, room.wiring)
                 run_block(
                     scene,
                     trial,
@@ -408,24 +122,28 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
                     room.wiring,
                     key,
                     room.counters,
-                    first,
+                    first_trial,
                     n_lanes,
                     room.lanes,
                     room.cells,
                     room.counts,
                     room.trace,
                 )
+                for lane in range(n_lanes):
+                    room.ended[first_trial + lane, 0] = room.lanes.pose.x[lane]
+                    room.ended[first_trial + lane, 1] = room.lanes.pose.y[lane]
                 if rules.count_ends:
                     for lane in range(n_lanes):
-                        list_cells(room.lanes.ends, lane, scene.columns, scene.rows, room.ends[first + lane])
-            for run in range(n_runs):
-                to_run = first_run + run
-                _score(room, run, rules, scene, rows, to_run, generation)
-                _keep(runs, genomes, run, rows, to_run, generation)
-                if generation + 1 < rules.n_generations:
-                    _go_on(
-                        runs, genomes, children, run, neat, rules, key, first_replicate + to_run, generation
-                    )
+                        list_cells(
+                            room.lanes.ends, lane, scene.columns, scene.rows, room.ends[first_trial + lane]
+                        )
+            cover_runs(runs, n_runs, room.counts, rules, scene.columns * scene.rows)
+            if novelty:
+                visited = room.ends if rules.count_ends else room.cells
+                select_novel(runs, n_runs, visited, room.counts, room.ended, rules, room.novelty)
+            keep_runs(runs, genomes, n_runs, room.cells, room.counts, room.ended, rows, first_run, generation)
+            if generation + 1 < rules.n_generations:
+                breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
             if children.full[0]:
                 return False
             genomes, children = children, genomes

@@ -5,6 +5,9 @@ places, and operations come in the same order. The rounding matters. It decides 
 touches a wall is blocked, and it moves a crossing of two nearly parallel lines by far more than 1e-7 m.
 `_walls.py` leaves it out and is for trials, where speed counts and noise hides it.
 
+`run_scene` carries out a whole scene in one call. `move_robot`, `read_ranges` and `read_lights` are its parts for
+callers that step a scene themselves, with devices that are not compiled.
+
 Headings are Jyro's: 0 faces +y, counter-clockwise. A *line* is a row of six numbers: both ends, slope, and
 y at x = 0; a vertical one has the slope inf.
 
@@ -35,6 +38,11 @@ INPUT_ALL_INVERTED = 1
 INPUT_STALL = 2
 INPUT_TIME = 3
 
+# What stops a ray: any sum of these.
+WALLS = np.int64(1)
+OWN_BODY = np.int64(2)
+OTHER_BODIES = np.int64(4)
+
 START_ENERGY = 10000.0
 LIGHT_NEAREST = 0.2  # ambient and direct light grow no further within this distance [m]
 LIGHT_RAY_SHORT = 0.1  # the ray that looks for a shadow ends this far before the sensor [m]
@@ -46,19 +54,35 @@ _NO_DECIMALS_ABOVE = float(2**29)  # beyond it float64 is too coarse for a seven
 _SPLITTER = float(2**27 + 1)  # Dekker's: splits a float64 into two halves of 26 bits
 
 
-class Scene(NamedTuple):
-    """What does not change while a scene runs. Letters: w walls, l lights, r robots, c corners, s sensors.
+class Standing(NamedTuple):
+    """What is in the way at one moment. Letters: w walls, e edges of all bodies, r robots.
 
-    A field that ends in `_rows` says where the part of each robot begins: the corners of robot i are
-    `corners[corner_rows[i]:corner_rows[i + 1]]`.
+    Attributes:
+        walls: (w, 6) lines.
+        bodies: (e, 6) lines, where each robot is now.
+        rows: (r + 1,) where the edges of each robot begin.
+        names: (r,) equal numbers for robots of one name: they neither touch nor see each other.
+    """
+
+    walls: FLOATS
+    bodies: FLOATS
+    rows: INTS
+    names: INTS
+
+
+class Scene(NamedTuple):
+    """What does not change while a scene runs. Letters: w walls, l lights, r robots, e edges, s sensors.
+
+    A field that ends in `_rows` says where the part of each robot begins: the edges of robot i are
+    `edges[edge_rows[i]:edge_rows[i + 1]]`.
 
     Attributes:
         walls: (w, 4) x1, y1, x2, y2 [m].
         lights: (l, 3) x, y [m], brightness.
         starts: (r, 3) x, y [m], heading [rad].
         names: (r,) equal numbers for robots of one name: they neither touch nor see each other.
-        corners: (c, 2) forward, left [m]; a body is the closed polygon of its corners.
-        corner_rows: (r + 1,).
+        edges: (e, 4) forward, left of both ends [m].
+        edge_rows: (r + 1,).
         mounts: (s, 3) forward, left [m], angle [rad].
         sensors: (s,) one of `SENSOR_...`.
         reaches: (s,) maximum range [m].
@@ -76,8 +100,8 @@ class Scene(NamedTuple):
     lights: FLOATS
     starts: FLOATS
     names: INTS
-    corners: FLOATS
-    corner_rows: INTS
+    edges: FLOATS
+    edge_rows: INTS
     mounts: FLOATS
     sensors: INTS
     reaches: FLOATS
@@ -164,15 +188,17 @@ def length7(ax, ay, bx, by):
 
 @kernel
 def nearest_hit(lines, ray, px, py, reach):
-    """Distance from P to the nearest of `lines` (n, 6) that `ray` (6,) crosses within `reach` [m], or inf."""
+    """The nearest of `lines` (n, 6) that `ray` (6,) crosses within `reach` [m] of P: (distance or inf, which or -1)."""
     nearest = math.inf
+    which = np.int64(-1)
     for i in range(len(lines)):
         crossed, x, y = crossing(lines[i], ray)
         if crossed:
             away = length7(x, y, px, py)
             if away <= reach and away < nearest:
                 nearest = away
-    return nearest
+                which = i
+    return nearest, which
 
 
 @kernel
@@ -189,56 +215,55 @@ def any_crossing(some, others):
 
 
 @kernel
-def place_body(corners, x, y, heading, edges):
-    """Fill `edges` (c, 6) with the closed polygon of `corners` (c, 2) at a pose."""
+def place_edges(edges, x, y, heading, lines):
+    """Fill `lines` (e, 6) with `edges` (e, 4), forward and left of both ends, of a body at a pose."""
     turned = heading + _HALF_PI
     cos = math.cos(turned)
     sin = math.sin(turned)
-    for i in range(len(corners)):
-        forward, left = corners[i, 0], corners[i, 1]
-        forward_before, left_before = corners[i - 1, 0], corners[i - 1, 1]
+    for i in range(len(edges)):
+        forward, left, forward_end, left_end = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
         set_line(
-            edges[i],
+            lines[i],
             x + forward * cos - left * sin,
             y + forward * sin + left * cos,
-            x + forward_before * cos - left_before * sin,
-            y + forward_before * sin + left_before * cos,
+            x + forward_end * cos - left_end * sin,
+            y + forward_end * sin + left_end * cos,
         )
 
 
 @kernel
-def blocked(scene, walls, bodies, robot, edges):
-    """Whether a robot's body, as `edges` (c, 6), crosses a wall or the body of a robot of another name."""
-    if any_crossing(edges, walls):
+def blocked(standing, robot, lines):
+    """Whether a robot's body, as `lines` (e, 6), crosses a wall or the body of a robot of another name."""
+    if any_crossing(lines, standing.walls):
         return True
-    for other in range(len(scene.names)):
-        body = bodies[scene.corner_rows[other] : scene.corner_rows[other + 1]]
-        if scene.names[other] != scene.names[robot] and any_crossing(edges, body):
+    for other in range(len(standing.names)):
+        body = standing.bodies[standing.rows[other] : standing.rows[other + 1]]
+        if standing.names[other] != standing.names[robot] and any_crossing(lines, body):
             return True
     return False
 
 
 @maker
-def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):
+def move_robot(standing, robot, edges, pose, speed, sideways, turn_rate, dt):
     """Move one robot by one step, or leave it entirely where it is: (stall, energy spent).
 
-    `pose` (3,) and the robot's rows of `bodies` change in place. The translation uses the old heading.
+    `pose` (3,) and the robot's rows of `standing.bodies` change in place. The translation uses the old heading;
+    `sideways` is positive to the right, as in Jyro [m/s].
     """
-    velocity_x = speed * math.sin(-pose[2])
-    velocity_y = speed * math.cos(-pose[2])
+    velocity_x = speed * math.sin(-pose[2]) + sideways * math.cos(-pose[2])
+    velocity_y = speed * math.cos(-pose[2]) - sideways * math.sin(-pose[2])
     x = pose[0] + velocity_x * dt
     y = pose[1] + velocity_y * dt
     heading = pose[2] + turn_rate * dt
     cost = 1.0 if velocity_x != 0.0 or velocity_y != 0.0 or turn_rate != 0.0 else 0.0
-    corners = scene.corners[scene.corner_rows[robot] : scene.corner_rows[robot + 1]]
-    edges = np.empty((len(corners), 6))
-    place_body(corners, x, y, heading, edges)
-    if blocked(scene, walls, bodies, robot, edges):
+    lines = np.empty((len(edges), 6))
+    place_edges(edges, x, y, heading, lines)
+    if blocked(standing, robot, lines):
         return 1, cost
     pose[0] = x
     pose[1] = y
     pose[2] = heading % _TWO_PI
-    place_body(corners, x, y, pose[2], bodies[scene.corner_rows[robot] : scene.corner_rows[robot + 1]])
+    place_edges(edges, x, y, pose[2], standing.bodies[standing.rows[robot] : standing.rows[robot + 1]])
     return 0, cost
 
 
@@ -246,19 +271,39 @@ def move(scene, walls, bodies, robot, pose, speed, turn_rate, dt):
 
 
 @maker
-def cast_ray(scene, walls, bodies, robot, px, py, angle, reach):
-    """Distance from P to the nearest wall or robot of another name [m]; inf when nothing is within `reach`.
+def cast_ray(standing, robot, px, py, angle, reach, stops):
+    """What a ray from P meets first: (distance [m] or inf, which line or -1); lines of bodies count on from the walls.
 
-    `angle` is clockwise from +y [rad]. A negative reach points backward and meets nothing.
+    `angle` is clockwise from +y [rad]. A negative reach points backward and meets nothing. `stops` is a sum of
+    WALLS, OWN_BODY and OTHER_BODIES.
     """
     ray = np.empty(6)
     set_line(ray, px, py, math.sin(angle) * reach + px, math.cos(angle) * reach + py)
-    nearest = nearest_hit(walls, ray, px, py, reach)
-    for other in range(len(scene.names)):
-        if scene.names[other] != scene.names[robot]:
-            body = bodies[scene.corner_rows[other] : scene.corner_rows[other + 1]]
-            nearest = min(nearest, nearest_hit(body, ray, px, py, reach))
-    return nearest
+    nearest = math.inf
+    which = np.int64(-1)
+    if stops & WALLS:
+        nearest, which = nearest_hit(standing.walls, ray, px, py, reach)
+    for other in range(len(standing.names)):
+        is_own = standing.names[other] == standing.names[robot]
+        if stops & (OWN_BODY if is_own else OTHER_BODIES):
+            first = standing.rows[other]
+            body = standing.bodies[first : standing.rows[other + 1]]
+            away, edge = nearest_hit(body, ray, px, py, reach)
+            if away < nearest:
+                nearest = away
+                which = len(standing.walls) + first + edge
+    return nearest, which
+
+
+@maker
+def look_along(standing, robot, pose, mount, reach):
+    """What the ray of a mount (3,) on a robot meets within `reach` [m]: (distance or inf, which line or -1)."""
+    turned = pose[2] + _HALF_PI
+    cos = math.cos(turned)
+    sin = math.sin(turned)
+    px = pose[0] + (mount[0] * cos - mount[1] * sin)
+    py = pose[1] + (mount[0] * sin + mount[1] * cos)
+    return cast_ray(standing, robot, px, py, -(pose[2] + mount[2]), reach, WALLS | OTHER_BODIES)
 
 
 @kernel
@@ -274,41 +319,55 @@ def light_falloff(sensor, distance, reach):
 
 
 @maker
-def read_light(scene, walls, bodies, robot, sensor, px, py, reach):
-    """Light that arrives at P from all lights; half of it from those in a shadow."""
+def light_at(standing, lights, robot, pose, mount, sensor, reach, stops):
+    """Light that arrives at a mount (3,) from all `lights` (l, 3); half of it from those in a shadow."""
+    turned = pose[2] + _HALF_PI
+    cos = math.cos(turned)
+    sin = math.sin(turned)
+    px = (
+        pose[0] + mount[0] * cos - mount[1] * sin
+    )  # the point of `look_along`, but Jyro adds in another order here
+    py = pose[1] + mount[0] * sin + mount[1] * cos
     total = 0.0
-    for i in range(len(scene.lights)):
-        x, y, brightness = scene.lights[i, 0], scene.lights[i, 1], scene.lights[i, 2]
+    for i in range(len(lights)):
+        x, y, brightness = lights[i, 0], lights[i, 1], lights[i, 2]
         distance = length7(x, y, px, py)
         angle = -math.atan2(round7(py) - round7(y), round7(px) - round7(x)) + _HALF_PI
         intensity = light_falloff(sensor, distance, reach)
-        if cast_ray(scene, walls, bodies, robot, x, y, angle, distance - LIGHT_RAY_SHORT) < math.inf:
+        if cast_ray(standing, robot, x, y, angle, distance - LIGHT_RAY_SHORT, stops)[0] < math.inf:
             intensity /= 2.0
         total += intensity * brightness
     return total
 
 
 @maker
-def sense(scene, walls, bodies, robot, pose, readings):
+def sense(scene, standing, robot, pose, readings):
     """Fill the robot's part of `readings` (s,): distances [m], 0 or 1 from bumpers, light intensities."""
-    turned = pose[2] + _HALF_PI
-    cos = math.cos(turned)
-    sin = math.sin(turned)
     for i in range(scene.sensor_rows[robot], scene.sensor_rows[robot + 1]):
-        forward, left, angle = scene.mounts[i, 0], scene.mounts[i, 1], scene.mounts[i, 2]
-        sensor, reach = scene.sensors[i], scene.reaches[i]
+        mount, sensor, reach = scene.mounts[i], scene.sensors[i], scene.reaches[i]
         if sensor in (SENSOR_RANGE, SENSOR_BUMPER):
-            px = pose[0] + (forward * cos - left * sin)
-            py = pose[1] + (forward * sin + left * cos)
-            away = min(cast_ray(scene, walls, bodies, robot, px, py, -(pose[2] + angle), reach), reach)
+            away = min(look_along(standing, robot, pose, mount, reach)[0], reach)
             if sensor == SENSOR_RANGE:
                 readings[i] = away
             else:
                 readings[i] = 1.0 if away < reach else 0.0
-        else:  # the same point, but Jyro adds in another order here
-            px = pose[0] + forward * cos - left * sin
-            py = pose[1] + forward * sin + left * cos
-            readings[i] = read_light(scene, walls, bodies, robot, sensor, px, py, reach)
+        else:
+            stops = WALLS | OTHER_BODIES
+            readings[i] = light_at(standing, scene.lights, robot, pose, mount, sensor, reach, stops)
+
+
+@maker
+def read_ranges(standing, robot, pose, mounts, reach, distances, hits):
+    """Fill `distances` (s,) [m], inf where nothing is within reach, and `hits` (s,): which line, or -1."""
+    for i in range(len(mounts)):
+        distances[i], hits[i] = look_along(standing, robot, pose, mounts[i], reach)
+
+
+@maker
+def read_lights(standing, lights, robot, pose, mounts, sensor, reach, stops, readings):
+    """Fill `readings` (s,) with the light that arrives at each of `mounts` (s, 3)."""
+    for i in range(len(mounts)):
+        readings[i] = light_at(standing, lights, robot, pose, mounts[i], sensor, reach, stops)
 
 
 # --- controllers -------------------------------------------------------------------------------------------
@@ -393,18 +452,19 @@ def run_scene(scene: Scene, dt: float, n_steps: int) -> tuple[FLOATS, FLOATS, IN
     energies = np.full((n_steps + 1, n_robots), START_ENERGY)
     readings = np.empty((n_steps + 1, len(scene.mounts)))
     walls = np.empty((len(scene.walls), 6))
-    bodies = np.empty((len(scene.corners), 6))
+    bodies = np.empty((len(scene.edges), 6))
+    standing = Standing(walls, bodies, scene.edge_rows, scene.names)
     weights = first_weights(scene)
 
     for i in range(len(walls)):
         set_line(walls[i], scene.walls[i, 0], scene.walls[i, 1], scene.walls[i, 2], scene.walls[i, 3])
     poses[0] = scene.starts
     for robot in range(n_robots):
-        first, last = scene.corner_rows[robot], scene.corner_rows[robot + 1]
+        first, last = scene.edge_rows[robot], scene.edge_rows[robot + 1]
         x, y, heading = scene.starts[robot, 0], scene.starts[robot, 1], scene.starts[robot, 2]
-        place_body(scene.corners[first:last], x, y, heading, bodies[first:last])
+        place_edges(scene.edges[first:last], x, y, heading, bodies[first:last])
     for robot in range(n_robots):
-        sense(scene, walls, bodies, robot, poses[0, robot], readings[0])
+        sense(scene, standing, robot, poses[0, robot], readings[0])
 
     for step in range(1, n_steps + 1):
         times[step] = times[step - 1] + dt
@@ -420,10 +480,11 @@ def run_scene(scene: Scene, dt: float, n_steps: int) -> tuple[FLOATS, FLOATS, IN
                 commands[step, robot, 1] = turn_rate
         for robot in range(n_robots):
             speed, turn_rate = commands[step, robot, 0], commands[step, robot, 1]
+            edges = scene.edges[scene.edge_rows[robot] : scene.edge_rows[robot + 1]]
             pose = poses[step, robot]
-            stall, cost = move(scene, walls, bodies, robot, pose, speed, turn_rate, dt)
+            stall, cost = move_robot(standing, robot, edges, pose, speed, 0.0, turn_rate, dt)
             stalls[step, robot] = stall
             energies[step, robot] = energies[step - 1, robot] - cost
         for robot in range(n_robots):
-            sense(scene, walls, bodies, robot, poses[step, robot], readings[step])
+            sense(scene, standing, robot, poses[step, robot], readings[step])
     return times, poses, stalls, commands, energies, readings

@@ -13,8 +13,10 @@ from ._lanes import LANES, copy_row, fill
 from ._marks import count_cells, list_fresh, mark_ends, mark_line, place_line
 from ._sim_contact import settle
 from ._sim_drive import drive, take_commands
+from ._sim_encoders import as_input
 from ._sim_lanes import start_block
 from ._sim_rays import cast_rays
+from ._sim_senses import answer, feel_motion
 from ._sim_shape import (
     BIAS,
     BUMP,
@@ -28,36 +30,15 @@ from ._sim_shape import (
     STALL,
     TIME,
 )
-from ._trial import as_command, draw_lanes
+from ._trial import as_command
 from ._wiring import think, wire
-
-
-@stage
-def _linear(distance, reach, noise, words, clip, reading):
-    real = reading.dtype.type
-    for lane in range(LANES):
-        odd = np.int32(np.int32(words[lane] >> np.uint32(8)) * np.int32(2) + np.int32(1 - (1 << 24)))
-        one = real(1.0) - distance[lane] / reach[lane] + noise[lane] * (real(odd) * real(1.0 / (1 << 24)))
-        if clip:
-            one = one if one > real(0.0) else real(0.0)
-            one = one if one < real(1.0) else real(1.0)
-        reading[lane] = one
 
 
 @stage
 def sense(shape, rules, key, lanes, step):
     """What the sensors answer before a step, noise and all, into `lanes.readings`."""
     cast_rays(shape, lanes)
-    n = shape.row_range.size
-    blocks = (n + 3) >> 2
-    for s in range(n):
-        if s & 3 == 0:
-            draw_lanes(step * blocks + (s >> 2), lanes.counters, key, lanes.words)
-        row = shape.row_range[s]
-        _linear(
-            lanes.distances[shape.first_ray[s]], lanes.p[row + 4], lanes.p[row + 7], lanes.words[s & 3], rules.clip,
-            lanes.readings[s],
-        )  # fmt: skip
+    answer(shape, rules, key, lanes, step)
 
 
 @stage
@@ -94,7 +75,7 @@ def observe(shape, rules, lanes, step):
         elif kind == BUMP:
             copy_row(lanes.readings[n_range + n_light + n_line + index], value)
         elif kind == ENCODER:
-            copy_row(lanes.wheels[index], value)
+            as_input(lanes.senses.counted_step[index], lanes.p[shape.row_drive], rules.step_s, value)
         elif kind == LAST_MOVE:
             copy_row(lanes.commands[0], value)
         elif kind == LAST_TURN:
@@ -138,6 +119,8 @@ def _keep_state(trace, lanes, first, n_lanes, step):
             trace.wheels[step, w, k] = lanes.wheels[w, lane]
         for s in range(trace.readings.shape[1]):
             trace.readings[step, s, k] = lanes.readings[s, lane]
+        for s in range(trace.distances.shape[1]):
+            trace.distances[step, s, k] = lanes.senses.near[s, lane]
 
 
 @kernel
@@ -164,6 +147,7 @@ def _run_block(shape, table, rules, neat, key, counters, first, n_lanes, room, c
             take_commands(lanes.values[neat.n_inputs], lanes.values[neat.n_inputs + 1], lanes)
             drive(shape, rules, key, lanes, step)
             settle(shape, lanes)
+            feel_motion(shape, rules, key, lanes, step)
         arrive(shape, rules, lanes)
         _list(shape, lanes, n_lanes, cells, first)
         sense(shape, rules, key, lanes, step + 1)
@@ -227,6 +211,7 @@ def step_sim(shape, rules, key, n, room, cells, step, commands):
     take_commands(commands[0], commands[1], lanes)
     drive(shape, rules, key, lanes, step)
     settle(shape, lanes)
+    feel_motion(shape, rules, key, lanes, step)
     arrive(shape, rules, lanes)
     _list(shape, lanes, n, cells, 0)
     sense(shape, rules, key, lanes, step + 1)

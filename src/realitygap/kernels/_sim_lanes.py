@@ -12,6 +12,7 @@ from ._lanes import LANES, Line, Poses, Row, Rows, Words, fill
 from ._math import sin_cos_of_turns
 from ._philox import PURPOSE_DRIVE
 from ._sim_outline import outline_of, place_obstacle, reach_of
+from ._sim_senses import Senses, make_senses, start_senses
 from ._wiring import Wiring, make_wiring
 
 NEAR = 32  # trials in contact that are worked on side by side
@@ -47,6 +48,7 @@ class SimLanes(NamedTuple):
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
     readings: Rows  # (n_readings,) 0..1, 1 is near
+    senses: Senses
     counters: Words  # (3,) the fixed words of each trial's random numbers
     drive_counters: Words  # (3,) likewise, for another purpose
     words: Words  # (4,) random
@@ -98,6 +100,9 @@ class SimTrace(NamedTuple):
     commands: NDArray[np.floating]  # (t, 2, k) what they answered, -1..1
     stalled: NDArray[np.bool_]  # (t + 1, k)
     wheels: NDArray[np.floating]  # (t + 1, 2, k) driven since the start by the left and right wheel [m]
+    distances: NDArray[
+        np.floating
+    ]  # (t + 1, r, k) from each range sensor to what is nearest, without noise [m]
 
 
 def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
@@ -110,6 +115,7 @@ def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
         np.zeros((max(n_steps, 0), 2, n_kept), dtype),
         np.zeros((t, n_kept), np.bool_),
         np.zeros((t, 2, n_kept), dtype),
+        np.zeros((t, shape.row_range.size, n_kept), dtype),
     )
 
 
@@ -173,6 +179,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         distances=rows(n_rays),
         rates=rows(n_rays),
         readings=rows(shape.n_readings),
+        senses=make_senses(shape, dtype),
         counters=bits(3),
         drive_counters=bits(3),
         words=bits(4),
@@ -320,3 +327,4 @@ def start_block(shape, rules, table, counters, first, n_lanes, lanes):
     for word in range(lanes.visited.shape[0]):
         fill(lanes.visited[word], np.uint32(0))
         fill(lanes.ends[word], np.uint32(0))
+    start_senses(shape, rules, lanes)

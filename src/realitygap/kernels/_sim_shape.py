@@ -26,6 +26,14 @@ MIXINGS = {"wheels": WHEELS, "independent": INDEPENDENT}
 LINEAR, IR, TABLE, PULSES = 0, 1, 2, 3
 RESPONSES = {"linear": LINEAR, "ir": IR, "table": TABLE, "pulses": PULSES}
 
+# What says that a robot stalls: contact that held it up, or an idler wheel as in an S2.
+BLOCKED, IDLER = 0, 1
+STALLS = {"blocked": BLOCKED, "idler": IDLER}
+
+# How much of a light arrives in the shadow of a wall or an obstacle: there are none, half of it, or nothing.
+NO_SHADOWS, HALF_SHADOWS, DARK_SHADOWS = 0, 1, 2
+SHADOWS = {"none": NO_SHADOWS, "half": HALF_SHADOWS, "dark": DARK_SHADOWS}
+
 # What a network sees: kind and index of each input.
 OBSTACLE, STALL, TIME, BIAS, RANGE, LIGHT, LINE, BUMP = 0, 1, 2, 3, 4, 5, 6, 7
 GOAL_SECTOR, GOAL_DISTANCE, ENCODER, LAST_MOVE, LAST_TURN = 8, 9, 10, 11, 12
@@ -84,10 +92,12 @@ RANGE_NUMBERS = (
     "outlier_most",
     "outlier_at",
     "outlier_width",
+    "burst",
 )  # then distance and reading of each entry of its table
 LIGHT_NUMBERS = ("x", "y", "direction", "width", "gain", "noise")
 LINE_NUMBERS = ("x", "y", "threshold", "noise")
 BUMP_NUMBERS = ("x", "y", "reach")
+STALL_NUMBERS = ("idler", "share", "window")
 ENCODER_NUMBERS = ("gain_left", "gain_right", "noise_per_m", "drift_per_m")
 
 # What a number is when nobody says: it changes nothing.
@@ -120,14 +130,17 @@ class SimShape(NamedTuple):
     late_substeps: int  # likewise, of its beginning, when the old command still goes on
     sweeps: int  # how often contact is mended in each of them
     enclosed: bool  # whether the walls close a convex room, so that each is a half-plane
-    light_shadows: bool  # whether walls and obstacles keep light away
+    stall: int  # BLOCKED or IDLER
+    light_shadows: int  # NO_SHADOWS, HALF_SHADOWS or DARK_SHADOWS
     columns: int  # of the grid of cells
     rows: int
     part_corners: NDArray[np.int32]  # (k,) corners of each part of the body
     row_part: NDArray[np.int32]  # (k,) x, y of its corners in turn, then its radius
     row_contact: int
     row_drive: int
+    encoders: bool  # whether wheel encoders are read
     row_encoder: int
+    row_stall: int
     row_range: NDArray[np.int32]  # (s,) first row of each range sensor
     range_response: NDArray[np.int32]  # (s,) LINEAR, IR, TABLE or PULSES
     range_rays: NDArray[np.int32]  # (s,) how many rays each has
@@ -136,6 +149,7 @@ class SimShape(NamedTuple):
     first_ray: NDArray[np.int32]  # (s + 1,) the rays of each sensor among all
     row_light: NDArray[np.int32]
     row_line: NDArray[np.int32]
+    line_levels: NDArray[np.bool_]  # whether each line sensor answers how dark it is, and not whether
     row_bump: NDArray[np.int32]
     row_start: int  # x, y, heading
     n_walls: int
@@ -151,6 +165,7 @@ class SimShape(NamedTuple):
     inputs: NDArray[np.int32]  # (i, 2) what networks see: kind and index
     floor: NDArray[np.float32]  # (h, w) brightness of the floor, 0..1; (0, 0): no image
     floor_grid: NDArray[np.float64]  # (3,) x, y of its lower left corner [m], pixels per meter
+    tapes: NDArray[np.float64]  # (k, 6) lines on the floor: both ends [m], width [m], brightness
     # Rows that follow from the table, behind it
     row_outline: NDArray[np.int32]  # (k,) for each corner of a part, counter-clockwise: x from the axle, y,
     # normal x, y and length of the edge that begins there
@@ -171,6 +186,7 @@ def _names(shape: Mapping[str, object]) -> list[str]:
     names += [f"contact.{name}" for name in CONTACT_NUMBERS]
     names += [f"drive.{name}" for name in DRIVE_NUMBERS]
     names += [f"encoder.{name}" for name in ENCODER_NUMBERS]
+    names += [f"stall.{name}" for name in STALL_NUMBERS]
     for k, entries in enumerate(shape["range_table"]):
         names += [f"range.{k}.{name}" for name in RANGE_NUMBERS]
         names += [f"range.{k}.table.{j}.{name}" for j in range(entries) for name in ("distance", "reading")]
@@ -202,13 +218,16 @@ def make_sim_shape(
     substeps: int = 4,
     late_substeps: int = 1,
     sweeps: int = 2,
+    stall: str = "blocked",
     range_response: Sequence[str] = (),
     range_rays: Sequence[int] | None = None,
     range_table: Sequence[int] | None = None,
     range_pulses: Sequence[int] | None = None,
+    encoders: bool = False,
     n_light: int = 0,
-    light_shadows: bool = False,
+    light_shadows: str = "none",
     n_line: int = 0,
+    line_levels: Sequence[bool] | None = None,
     n_bump: int = 0,
     n_walls: int = 0,
     enclosed: bool = False,
@@ -221,6 +240,7 @@ def make_sim_shape(
     inputs: Sequence[tuple[str, int]] = (("obstacle", 0), ("stall", 0), ("time", 0)),
     floor: NDArray[np.float32] | None = None,
     floor_grid: Sequence[float] = (0.0, 0.0, 1.0),
+    tapes: Sequence[Sequence[float]] = (),
 ) -> SimShape:
     """The structure of a robot and its arena.
 
@@ -235,16 +255,22 @@ def make_sim_shape(
         substeps, late_substeps: Parts of a step in which contact is looked for, of the new command and of the
             old one that goes on before it (`substeps_for`).
         sweeps: How often contact is mended in each of them.
+        stall: "blocked" or "idler".
         range_response: "linear", "ir", "table" or "pulses" for each range sensor.
         range_rays, range_table, range_pulses: Rays (1 or odd), entries of the table, and pulses of each.
-        n_light, light_shadows, n_line, n_bump: Other sensors.
+        encoders: Whether wheel encoders are read; they are where networks see them.
+        n_light, n_line, n_bump: Other sensors.
+        light_shadows: "none", "half" or "dark".
+        line_levels: Whether each line sensor answers how dark the floor is, and not whether it is.
         n_walls, enclosed: Walls, and whether they close a convex room (`encloses`).
         obstacles: Corners of each, in order counter-clockwise; 0: a disc.
         obstacle_round: Whether the radius of each may be other than 0; discs' may.
         n_lamps, goal: Lights, and whether there is a goal.
         columns, rows: Of the grid of cells.
         inputs: What networks see: a key of `INPUT_KINDS` and an index each.
-        floor, floor_grid: Image of the floor (h, w), and where it lies: x, y [m], pixels per meter.
+        floor, floor_grid: Image of the floor (h, w), row 0 lowest in y, and where it lies: x, y of its lower left
+            corner [m from the origin of the table], pixels per meter.
+        tapes: Both ends [m from the origin], width [m] and brightness of each line on the floor.
     """
     s = len(range_response)
     rays = np.ones(s, np.int32) if range_rays is None else np.array(range_rays, np.int32)
@@ -286,14 +312,17 @@ def make_sim_shape(
         late_substeps=late_substeps,
         sweeps=sweeps,
         enclosed=enclosed,
-        light_shadows=light_shadows,
+        stall=STALLS[stall],
+        light_shadows=SHADOWS[light_shadows],
         columns=columns,
         rows=rows,
         part_corners=np.array(parts, np.int32),
         row_part=_firsts(row, "body.{}.corner.0.x", len(parts)),
         row_contact=row["contact.friction"],
         row_drive=row["drive.speed"],
+        encoders=encoders or any(kind == "encoder" for kind, _ in inputs),
         row_encoder=row["encoder.gain_left"],
+        row_stall=row["stall.idler"],
         row_range=_firsts(row, "range.{}.x", s),
         range_response=np.array([RESPONSES[name] for name in range_response], np.int32),
         range_rays=rays,
@@ -302,6 +331,7 @@ def make_sim_shape(
         first_ray=first_ray,
         row_light=_firsts(row, "light.{}.x", n_light),
         row_line=_firsts(row, "line.{}.x", n_line),
+        line_levels=np.zeros(n_line, np.bool_) if line_levels is None else np.array(line_levels, np.bool_),
         row_bump=_firsts(row, "bump.{}.x", n_bump),
         row_start=row["arena.start.x"],
         n_walls=n_walls,
@@ -317,6 +347,7 @@ def make_sim_shape(
         inputs=np.array([(INPUT_KINDS[kind], index) for kind, index in inputs], np.int32).reshape(-1, 2),
         floor=np.zeros((0, 0), np.float32) if floor is None else np.ascontiguousarray(floor, np.float32),
         floor_grid=np.array(floor_grid, np.float64),
+        tapes=np.array(tapes, np.float64).reshape(-1, 6),
         row_outline=row_outline,
         row_reach=row_reach,
         row_plane=row_plane,
@@ -356,7 +387,7 @@ def sim_rows(shape: SimShape) -> dict[str, int]:
 def is_angle(name: str) -> bool:
     """Whether a number is an angle or a rate of one, which the table holds in whole turns."""
     last = name.rsplit(".", 1)[-1]
-    return last in ANGLES or name == "drive.drift_per_m" or (name.startswith("light.") and last == "width")
+    return last in ANGLES or name.endswith(".drift_per_m") or (name.startswith("light.") and last == "width")
 
 
 def sim_table(
@@ -387,12 +418,20 @@ def sim_table(
     for name, value in numbers.items():
         table[rows[name]] = value
     for name, row in rows.items():
-        if is_angle(name):
-            table[row] /= math.tau
-        parts = name.split(".")
-        if parts[0] == "arena" and "corner" not in parts and parts[-1] in AXES:
-            table[row] -= origin[AXES[parts[-1]]]
+        table[row] = in_table(name, table[row], origin)
     return table.astype(dtype)
+
+
+def in_table(
+    name: str, values: NDArray[np.float64], origin: Sequence[float] = (0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Values of a number as the table holds them: angles in whole turns, places in the arena from the origin."""
+    if is_angle(name):
+        return values / math.tau
+    parts = name.split(".")
+    if parts[0] == "arena" and "corner" not in parts and parts[-1] in AXES:
+        return values - origin[AXES[parts[-1]]]
+    return values
 
 
 def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ._compile import inlined, kernel, stage
 from ._lanes import LANES, fill, keep_where_low, make_lanes
-from ._marks import count_cells, list_fresh, mark_ends, mark_line, place_line
+from ._marks import count_cells, list_cells, list_fresh, mark_ends, mark_line, place_line
 from ._math import sin_cos_of_turns
 from ._philox import philox
 from ._walls import gap_to_planes, sense_planes, sense_segments, touch_segments
@@ -49,7 +49,7 @@ class TrialRules(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What happened step by step in the first k lanes; row 0 is the start. Arrays of no rows keep nothing."""
+    """What happened step by step in the first k trials; row 0 is the start. Arrays of no rows keep nothing."""
 
     poses: NDArray[np.floating]  # (t + 1, 3, k)
     readings: NDArray[np.floating]  # (t + 1, s, k) parts of the range, without noise
@@ -280,19 +280,20 @@ def start_lanes(scene, rules, counters, first, n_lanes, lanes):
 
 
 @kernel
-def _keep(trace, lanes, neat, step):
-    for k in range(trace.stalled.shape[1]):
-        trace.poses[step + 1, 0, k] = lanes.pose.x[k]
-        trace.poses[step + 1, 1, k] = lanes.pose.y[k]
-        trace.poses[step + 1, 2, k] = lanes.pose.heading[k]
-        trace.stalled[step + 1, k] = lanes.stalled[k] > 0
+def _keep(trace, lanes, neat, step, first, n_lanes):
+    for lane in range(min(n_lanes, trace.stalled.shape[1] - first)):
+        k = first + lane
+        trace.poses[step + 1, 0, k] = lanes.pose.x[lane]
+        trace.poses[step + 1, 1, k] = lanes.pose.y[lane]
+        trace.poses[step + 1, 2, k] = lanes.pose.heading[lane]
+        trace.stalled[step + 1, k] = lanes.stalled[lane] > 0
         for s in range(trace.readings.shape[1]):
-            trace.readings[step + 1, s, k] = lanes.fractions[s, k]
+            trace.readings[step + 1, s, k] = lanes.fractions[s, lane]
         if step >= 0:
             for i in range(neat.n_inputs):
-                trace.inputs[step, i, k] = lanes.values[i, k]
-            trace.commands[step, 0, k] = as_command(lanes.values[neat.n_inputs, k])
-            trace.commands[step, 1, k] = as_command(lanes.values[neat.n_inputs + 1, k])
+                trace.inputs[step, i, k] = lanes.values[i, lane]
+            trace.commands[step, 0, k] = as_command(lanes.values[neat.n_inputs, lane])
+            trace.commands[step, 1, k] = as_command(lanes.values[neat.n_inputs + 1, lane])
 
 
 def make_trace(like, n_sensors, n_inputs, n_steps, n_kept):
@@ -359,7 +360,7 @@ def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, 
         advance(scene, rules, neat, wiring, key, lanes, step)
         _list(scene, lanes, n_lanes, cells, first)
         if keep:
-            _keep(trace, lanes, neat, step)
+            _keep(trace, lanes, neat, step, first, n_lanes)
     for lane in range(n_lanes):
         counts[first + lane, 0] = lanes.n_line[lane]
         counts[first + lane, 1] = count_cells(lanes.ends, lane)
@@ -367,7 +368,9 @@ def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, 
 
 
 @kernel
-def run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, counts, trace):
+def run_trials(
+    scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, ends, ended, counts, trace
+):
     """Carry out n trials, a block after the other.
 
     Args:
@@ -375,9 +378,17 @@ def run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring,
         networks: The networks, at least one.
         rows: (n,) int32, which network each trial is of.
         lanes, wiring: Room.
+        ends: (n, c) uint8, written: cells at the ends of steps, in ascending order; (0, c) keeps none.
+        ended: (n, 2) float64, written: where trials ended [m from the start].
         key, counters, cells, counts, trace: As in `run_block`.
     """
     for first in range(0, rows.size, LANES):
         n_lanes = min(LANES, rows.size - first)
         wire(networks, rows, first, n_lanes, neat, wiring)
         run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, cells, counts, trace)
+        for lane in range(n_lanes):
+            ended[first + lane, 0] = lanes.pose.x[lane]
+            ended[first + lane, 1] = lanes.pose.y[lane]
+        if ends.shape[0] > 0:
+            for lane in range(n_lanes):
+                list_cells(lanes.ends, lane, scene.columns, scene.rows, ends[first + lane])

@@ -8,7 +8,17 @@ plain dicts, arrays and polars frames. It knows nothing of genomes or studies.
 
 from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
-from realitygap.records._columns import COLUMNS, KEYS, SCHEMA, Column, column_table, list_column
+from realitygap.records._columns import (
+    COLUMNS,
+    EXTRA,
+    EXTRA_SCHEMA,
+    KEYS,
+    SCHEMA,
+    Column,
+    column_table,
+    list_column,
+    schema_with,
+)
 from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
@@ -39,7 +49,10 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "RESULTS_VERSION",
     "RecordWarning",
     # the columns of its frames
+    "EXTRA",
+    "EXTRA_SCHEMA",
     "SCHEMA",
+    "schema_with",
     "KEYS",
     "COLUMNS",
     "Column",

@@ -12,7 +12,7 @@ from pathlib import Path
 import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError
-from realitygap.records._columns import SCHEMA, check_rows
+from realitygap.records._columns import EXTRA_SCHEMA, check_rows, schema_with
 from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest
 from realitygap.records._files import reading
 from realitygap.records._seal import BrokenSeal, check_seal, seal
@@ -111,7 +111,7 @@ def encode_chunk(
     last = check_rows(frame, condition, first)
     if last > MAX_REPLICATE:
         raise ValueError(f"Replicate {last} is too large, expected at most {MAX_REPLICATE}.")
-    frame = frame.select(list(SCHEMA))
+    frame = frame.select(list(schema_with(frame.columns)))
     path = folder / str(ChunkName(condition, first, last))
     chunk = Chunk(
         path, condition, first, last, condition_hash, RESULTS_VERSION, frame.height, rows_digest(frame)
@@ -176,8 +176,9 @@ def _open(path: Path) -> tuple[Chunk, bytes]:
 def _decode(chunk: Chunk, sealed: bytes, columns: Sequence[str] | None) -> pl.DataFrame:
     with _decoding(chunk.path):
         schema = pl.read_parquet_schema(io.BytesIO(sealed))
-    if schema != SCHEMA:
-        names = [name for name in {**SCHEMA, **schema} if SCHEMA.get(name) != schema.get(name)]
+    expected = schema_with(schema)
+    if schema != expected:
+        names = [name for name in {**expected, **schema} if expected.get(name) != schema.get(name)]
         problem = f"{chunk.path} differs from this version's columns in {', '.join(names) or 'their order'}."
         if chunk.results_version != RESULTS_VERSION:
             raise RecordVersionError(
@@ -185,8 +186,15 @@ def _decode(chunk: Chunk, sealed: bytes, columns: Sequence[str] | None) -> pl.Da
                 "read it with the realitygap that wrote it."
             )
         raise RecordError(f"{problem} {_AGAIN}")
+    there = None if columns is None else [name for name in columns if name in expected]
     with _decoding(chunk.path):
-        return pl.read_parquet(io.BytesIO(sealed), columns=None if columns is None else list(columns))
+        frame = pl.read_parquet(io.BytesIO(sealed), columns=there)
+    if columns is None:
+        return frame
+    lacking = {name: pl.lit(None, EXTRA_SCHEMA[name]) for name in columns if name not in expected}
+    if not there:
+        frame = pl.DataFrame({"row": pl.arange(chunk.n_rows, eager=True)})
+    return frame.with_columns(**lacking).select(columns)
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,14 +79,46 @@ COLUMNS: tuple[Column, ...] = (
     Column("key", pl.UInt64(), "Key of the random numbers; with the study it gives the trial again."),
 )
 
+EXTRA: tuple[Column, ...] = (
+    Column(
+        "drawn",
+        pl.List(pl.Float64()),
+        "Of platform sim: what was drawn for the trial, in the order of the names that the study's description has as "
+        "`drawn` of the condition; empty where nothing is.",
+    ),
+    Column(
+        "task_fitness",
+        pl.Float64(),
+        "Of another task than coverage: what the trial is worth by it, whatever selection uses.",
+    ),
+    Column(
+        "behavior",
+        pl.List(pl.Float64()),
+        "Of a distance that compares other things than cells: the behavior, such as the final x and y [m].",
+    ),
+)
+"""Columns that only some conditions have; null in rows of others where rows of several are read together."""
+
+EXTRA_SCHEMA: pl.Schema = pl.Schema({column.name: column.dtype for column in EXTRA})
 SCHEMA: pl.Schema = pl.Schema({column.name: column.dtype for column in COLUMNS})
 KEYS: tuple[str, ...] = ("replicate", "generation", "individual")
+
+
+def columns_in(frame: pl.DataFrame) -> list[Column]:
+    """The columns of a frame in order: those that all have, and the extra ones that are there."""
+    return [*COLUMNS, *(column for column in EXTRA if column.name in frame.columns)]
+
+
+def schema_with(names: Iterable[str]) -> pl.Schema:
+    """`SCHEMA`, and those extra columns that are among the names."""
+    there = set(names)
+    return pl.Schema({**SCHEMA, **{name: dtype for name, dtype in EXTRA_SCHEMA.items() if name in there}})
 
 
 def column_table() -> list[tuple[str, str, str]]:
     """Name, type and description (with unit) of each column in order; a struct's fields as `column.field`."""
     rows: list[tuple[str, str, str]] = []
-    for column in COLUMNS:
+    for column in (*COLUMNS, *EXTRA):
         rows.append((column.name, "Struct" if column.fields else str(column.dtype), column.description))
         rows += [
             (f"{column.name}.{field.name}", str(field.dtype), field.description) for field in column.fields
@@ -124,7 +157,7 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
     """The last replicate of a frame that is fit to be published.
 
     Args:
-        frame: columns as in `SCHEMA`, in any order.
+        frame: columns as in `SCHEMA`, and any of `EXTRA`, in any order.
         condition: what every row's `condition` must be.
         first: the first row's replicate; the following ones must come without a gap.
 
@@ -150,11 +183,12 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
 
 def _check_schema(frame: pl.DataFrame) -> None:
     found = frame.schema
-    problems = [f"no column {name!r} ({dtype})" for name, dtype in SCHEMA.items() if name not in found]
-    problems += [f"unknown column {name!r}" for name in found if name not in SCHEMA]
+    expected = schema_with(found)
+    problems = [f"no column {name!r} ({dtype})" for name, dtype in expected.items() if name not in found]
+    problems += [f"unknown column {name!r}" for name in found if name not in expected]
     problems += [
         f"{name!r} is {found[name]}, expected {dtype}"
-        for name, dtype in SCHEMA.items()
+        for name, dtype in expected.items()
         if name in found and found[name] != dtype
     ]
     if problems:
@@ -162,7 +196,7 @@ def _check_schema(frame: pl.DataFrame) -> None:
 
 
 def _check_nulls(frame: pl.DataFrame) -> None:
-    for column in COLUMNS:
+    for column in columns_in(frame):
         series = frame[column.name]
         parts = [(column, series)]
         parts += [(field, series.struct.field(field.name)) for field in column.fields]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap.records._columns import COLUMNS, Column
+from realitygap.records._columns import Column, columns_in
 
 Stream = tuple[str, npt.NDArray[Any]]
 """A stream's name, which ends in its type, and its values: (k,), contiguous, little-endian."""
@@ -62,7 +62,7 @@ def study_digest(results_version: int, conditions: dict[str, tuple[str, str]]) -
 
 def row_streams(frame: pl.DataFrame) -> Iterator[Stream]:
     """The values of a frame as streams to hash; the condition's name is hashed once, by `study_digest`."""
-    for column in COLUMNS:
+    for column in columns_in(frame):
         if column.name != "condition":
             yield from _streams(column.name, column, frame[column.name])
 

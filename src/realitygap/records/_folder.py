@@ -24,7 +24,7 @@ from realitygap.records._chunk import (
     load_chunk,
     read_rows,
 )
-from realitygap.records._columns import SCHEMA
+from realitygap.records._columns import EXTRA_SCHEMA, SCHEMA, schema_with
 from realitygap.records._derived import DERIVED, DerivedFrame
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._digest import RowsDigest, row_streams, study_digest
@@ -224,7 +224,8 @@ class ResultsFolder:
         Args:
             condition: one of `conditions`.
             first: the first replicate in `frame`.
-            frame: columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
+            frame: columns as in `SCHEMA`, and any of `EXTRA`; rows sorted by replicate, generation and individual,
+                without a gap.
             condition_hash: hash of the condition as resolved; the same for all chunks of a condition.
 
         Raises:
@@ -307,13 +308,12 @@ class ResultsFolder:
         self._warn_of_version()
         parts: list[pl.LazyFrame] = []
         physical = self._complete_runs()
-        for is_physical, group in itertools.groupby(self.conditions, key=lambda name: name in physical):
-            names = list(group)
-            if is_physical:
-                parts += [frame.lazy() for name in names for frame in self._driven(name)]
-            elif paths := [chunk.path for name in names for chunk in self.chunks(name)]:
+        for name in self.conditions:
+            if name in physical:
+                parts += [frame.lazy() for frame in self._driven(name)]
+            elif paths := [chunk.path for chunk in self.chunks(name)]:
                 parts.append(pl.scan_parquet(paths, glob=False, hive_partitioning=False))
-        return pl.concat(parts) if parts else pl.LazyFrame(schema=SCHEMA)
+        return pl.concat(parts, how="diagonal") if parts else pl.LazyFrame(schema=SCHEMA)
 
     def frames(
         self, condition: str | None = None, columns: Sequence[str] | None = None
@@ -360,7 +360,7 @@ class ResultsFolder:
             needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
             chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
             parts = [frame.filter(chosen) for frame in self._all_frames(condition, needed, wanted)]
-        frame = pl.concat(parts) if parts else pl.DataFrame(schema=SCHEMA)
+        frame = pl.concat(parts, how="diagonal") if parts else pl.DataFrame(schema=schema_with(columns or ()))
         return frame if columns is None else frame.select(columns)
 
     def derive(
@@ -626,8 +626,10 @@ class ResultsFolder:
         physical = self._complete_runs()
         for name in self.conditions if condition is None else [condition]:
             if name in physical:
+                lacking = [pl.lit(None, dtype).alias(extra) for extra, dtype in EXTRA_SCHEMA.items()]
                 yield from (
-                    frame if columns is None else frame.select(columns) for frame in self._driven(name)
+                    frame if columns is None else frame.with_columns(lacking).select(columns)
+                    for frame in self._driven(name)
                 )
             else:
                 yield from self._frames(chunks.get(name, []), columns)
@@ -707,8 +709,8 @@ class ResultsFolder:
         if condition is not None:
             self._check_known(condition)
         for column in columns or ():
-            if column not in SCHEMA:
-                raise ValueError(f"Unknown column {column!r}. {did_you_mean(column, SCHEMA)}")
+            if column not in (known := schema_with(EXTRA_SCHEMA)):
+                raise ValueError(f"Unknown column {column!r}. {did_you_mean(column, known)}")
 
     def _warn_of_version(self) -> None:
         if self.version_note is not None:

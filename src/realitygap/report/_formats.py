@@ -14,8 +14,8 @@ from realitygap.records import write_whole
 from realitygap.report._drawing import Drawing, house_style, to_svg
 from realitygap.report._shapes_drawing import figure_of
 
-ENDINGS = (".gif", ".pdf", ".png", ".svg")
-"""What a picture's file name may end in; `.gif` only for a trial, which moves."""
+ENDINGS = (".gif", ".mp4", ".pdf", ".png", ".svg")
+"""What a picture's file name may end in; `.gif` and `.mp4` only for trials, which move."""
 
 _DOTS = 200
 """Of a PNG, per inch."""
@@ -36,8 +36,8 @@ def check_ending(path: Path, endings: tuple[str, ...] = ENDINGS) -> str:
     ending = path.suffix.lower()
     if ending not in endings:
         hint = (
-            "only one trial can move: give a folder of results, without another word"
-            if ending == ".gif"
+            "only trials can move: realitygap show movie, or a folder of results without another word"
+            if ending in (".gif", ".mp4")
             else did_you_mean(ending, endings)
         )
         raise ValueError(

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap.drawing import Ink
+from realitygap.drawing import PENS, Ink
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
@@ -43,18 +43,6 @@ from realitygap.world import Arena, Body
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_PENS: tuple[tuple[str, tuple[float, ...]], ...] = (
-    (Ink.PEN0, ()),
-    (Ink.PEN1, (6, 1.5)),
-    (Ink.PEN2, (1.3, 1.5)),
-    (Ink.PEN3, (5, 1.5, 1.3, 1.5)),
-    (Ink.PEN4, (3, 1.6)),
-    (Ink.PEN5, (7, 1.5, 1.3, 1.5, 1.3, 1.5)),
-    (Ink.PEN6, (2, 1)),
-    (Ink.PEN7, (9, 2.5)),
-)
-"""Color and dashes [pt] of eight pens; a ninth individual takes the first pen again."""
 
 _MOST_PANELS = 11
 """Generations shown at most, evenly spread; with the legend they fill rows of two and of three."""
@@ -294,19 +282,19 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
 
 def _dot_cells(axes: Axes, path: TracedPath, arena: Arena, *, small: bool) -> None:
     """A dot in each visited cell, every pen at a place of its own within it."""
-    grid, pen = arena.grid, path.individual % len(_PENS)
+    grid, pen = arena.grid, path.individual % len(PENS)
     across, up = divmod(pen if pen < 4 else pen + 1, 3)  # eight places around the middle
     cells = np.array(path.cells)
     xs = grid.x + (cells % grid.columns + (across + 1) / 4) * grid.cell
     ys = grid.y + (cells // grid.columns + (up + 1) / 4) * grid.cell
     size = 1.6 if small else 2.6
-    draw_line(axes, xs, ys, marker="o", linestyle="", color=_PENS[pen][0], markersize=size, zorder=5)
+    draw_line(axes, xs, ys, marker="o", linestyle="", color=PENS[pen][0], markersize=size, zorder=5)
 
 
 def _pen(individual: int, *, small: bool) -> dict[str, Any]:
     """How a pen draws: the first ones broad, so that they show beside those that lie over them."""
-    pen = individual % len(_PENS)
-    color, dash = _PENS[pen]
+    pen = individual % len(PENS)
+    color, dash = PENS[pen]
     width = (2.7 - 0.25 * pen) * (0.75 if small else 1.0)
     scaled = tuple(part * (0.7 if small else 0.9) * 1.6 / width for part in dash)
     return {
@@ -328,7 +316,7 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
     places[:, 0] = places[:, 0].clip(left + radius / points, right - radius / points)
     places[:, 1] = places[:, 1].clip(bottom + radius / points, top - radius / points)
     for path, end, place in zip(paths, ends, places, strict=True):
-        color = _PENS[path.individual % len(_PENS)][0]
+        color = PENS[path.individual % len(PENS)][0]
         if math.dist(end, place) * points > radius:
             draw_line(axes, [end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
             draw_line(
@@ -400,10 +388,10 @@ def _draw_pen_legend(axes: Axes, n_pens: int, *, small: bool) -> None:
     from matplotlib.patches import Patch
 
     axes.set_axis_off()
-    n = min(n_pens, len(_PENS))
+    n = min(n_pens, len(PENS))
     handles: list[Any] = []
     for pen in range(n):
-        same = ", ".join(str(each) for each in range(pen, n_pens, len(_PENS)))
+        same = ", ".join(str(each) for each in range(pen, n_pens, len(PENS)))
         handles.append(Line2D([], [], label=f"individual {same}", **_pen(pen, small=small)))
     handles += [
         Line2D([], [], color=Ink.BODY, marker="s", markerfacecolor="none", linestyle="", markersize=6, label="start"),

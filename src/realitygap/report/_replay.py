@@ -20,12 +20,11 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.errors import RealityGapError
-from realitygap.kernels._coverage import to_grid, visit, visit_line
+from realitygap.playback import first_visits
 from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Tally, label_of, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
-from realitygap.world import Grid
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -116,7 +115,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         if condition.is_physical:
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)
-        chosen = _choose(rows, room // (condition.jyro.steps + 1), f"coverage_{tally.measure}")
+        chosen = _choose(rows, room // (condition.simulated_on.steps + 1), f"coverage_{tally.measure}")
         trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
     except (RealityGapError, ValueError):
         note = (
@@ -124,7 +123,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         )
         return _Run(name, replicate, None, 0, rows.height, note)
     if not trials:
-        note = f"a trial of {condition.jyro.steps:,} steps is too long to be embedded in a page."
+        note = f"a trial of {condition.simulated_on.steps:,} steps is too long to be embedded in a page."
         return _Run(name, replicate, None, 0, rows.height, note)
     note = ""
     if len(trials) < rows.height:
@@ -157,7 +156,7 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
 
 def _scene(condition: Condition) -> dict[str, Any]:
     """Where and with what body and sensors; lengths in meters."""
-    arena, platform = condition.arena.arena(), condition.jyro
+    arena, platform = condition.arena.arena(), condition.simulated_on
     grid, mounts = arena.grid, platform.sensors.mounts
     return {
         "walls": [list(wall) for wall in arena.walls],
@@ -165,7 +164,7 @@ def _scene(condition: Condition) -> dict[str, Any]:
         "body": [list(corner) for corner in platform.body.corners],
         "mounts": [list(mount) for mount in mounts],
         "sensors": _sensor_names([left for _, left, _ in mounts]),
-        "range": platform.sensor_range,
+        "range": platform.sensors.max_range,
         "steps": platform.steps,
     }
 
@@ -180,7 +179,7 @@ def _pack_row(condition: Condition, row: Mapping[str, Any]) -> list[Any]:
     """Generation, individual, cells along the line and at the ends of steps, the step's length and the bytes."""
     trajectory = replay(condition, row)
     grid = condition.arena.arena().grid
-    cells, steps, end_steps = first_visits(trajectory, grid)
+    cells, steps, end_steps = first_visits(trajectory.poses, grid)
     packed = pack_trial(trajectory, cells, steps, end_steps)
     return [
         int(row["generation"]),
@@ -190,38 +189,6 @@ def _pack_row(condition: Condition, row: Mapping[str, Any]) -> list[Any]:
         trajectory.step_s,
         base64.b64encode(packed).decode(),
     ]
-
-
-def first_visits(
-    trajectory: Trajectory, grid: Grid
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """When a trial comes to its cells, counted as the trial itself counts them.
-
-    Returns:
-        (n,) cells along the line in order of first visit, columns * row + column; (n,) the step at whose end
-        each has been visited, 0 for the start; (m,) the same of cells in which steps end.
-    """
-    shape = (grid.columns, grid.rows)
-    along, at_ends = np.zeros((2, grid.n_cells), np.bool_)
-    order, order_ends = np.zeros((2, grid.n_cells), np.uint8)
-    at = [
-        (to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell))
-        for x, y, _ in trajectory.poses.tolist()
-    ]
-    n, n_ends = [0] * len(at), [0] * len(at)
-    for step, (u, v) in enumerate(at):
-        column, row = int(np.floor(u)), int(np.floor(v))
-        if step == 0:
-            n[0] = visit(column, row, *shape, along, order, 0)
-            n_ends[0] = visit(column, row, *shape, at_ends, order_ends, 0)
-        elif trajectory.stalled[step]:
-            n[step], n_ends[step] = n[step - 1], n_ends[step - 1]
-        else:
-            u0, v0 = at[step - 1]
-            n[step] = visit_line(u0, v0, u, v, *shape, along, order, n[step - 1])
-            n_ends[step] = visit(column, row, *shape, at_ends, order_ends, n_ends[step - 1])
-    steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))
-    return order[: n[-1]].astype(np.int64), steps, end_steps
 
 
 def pack_trial(

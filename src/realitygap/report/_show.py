@@ -6,23 +6,25 @@ import warnings
 from pathlib import Path
 from typing import Literal, get_args
 
-from realitygap.drawing import Picture
 from realitygap.errors import did_you_mean
+from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
 from realitygap.report._lineage_figure import draw_chosen_lineage
+from realitygap.report._motion import choose_moving
 from realitygap.report._networks_figure import draw_network
 from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._species_figure import count_species, draw_tally_species
 from realitygap.report._tally import read_tally
-from realitygap.report._trial_figure import animate_trial, choose_trial, draw_chosen_trial
+from realitygap.report._trial_figure import choose_trial, draw_chosen_trial
 from realitygap.robots import JyroPlatform
-from realitygap.world import arena_picture, paper_arena
+from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
 Subject = Literal["run", "network", "species", "lineage"]
 
 _STILL = (".pdf", ".png", ".svg")
+_MOVING = (".gif", ".mp4")
 
 
 def save_view(
@@ -39,7 +41,7 @@ def save_view(
 
     Args:
         folder: the results of a study, or the path to them.
-        out: ends in .svg, .pdf, .png or, for one trial, .gif; a file that is there gives way.
+        out: ends in .svg, .pdf, .png or, for one trial, .gif or .mp4; a file that is there gives way.
         subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
             network, that of one individual; species, their shares in one run and their number in all; lineage, the
             ancestors of one individual.
@@ -61,7 +63,7 @@ def save_view(
     """
     out = Path(out)
     _check_name("subject", subject, list(get_args(Subject)))
-    ending = check_ending(out, (".gif", *_STILL) if subject == "run" else _STILL)
+    ending = check_ending(out, (*_MOVING, *_STILL) if subject == "run" else _STILL)
     refuse_results(out)
     with warnings.catch_warnings():
         if not isinstance(folder, ResultsFolder):
@@ -81,13 +83,14 @@ def save_view(
         return _save(
             draw_network(trial.condition, trial.row, trial.measure), out, f"Network of {trial.title}"
         )
-    if generation is None and individual is None and ending != ".gif":
+    if generation is None and individual is None and ending not in _MOVING:
         name = tally.name_of(condition)
         (drawing,) = draw_tally_paths(tally, name, replicate)
         return _save(drawing, out, f"A run of {name}")
+    if ending in _MOVING:
+        title, trials = choose_moving([tally.folder], None, condition, replicate, generation, individual)
+        return save_movie(trials, out, title=title)
     trial = choose_trial(tally, condition, replicate, generation, individual)
-    if ending == ".gif":
-        return animate_trial(trial, out)
     return _save(draw_chosen_trial(trial), out, trial.title)
 
 
@@ -95,30 +98,34 @@ def _save(drawing: Drawing, out: Path, title: str) -> Path:
     return save_drawing(captioned(drawing, "figure"), out, title=title)
 
 
-def save_arena(out: str | Path, name: str = "paper") -> Path:
-    """Draw an arena, with the robot `jyro` at its start, into a file.
+def save_arena(out: str | Path, name: str | Path = "paper", *, robot: str | Path | None = None) -> Path:
+    """Draw an arena to scale into a file, with a robot at its start.
 
     Args:
         out: ends in .svg, .pdf or .png; a file that is there gives way.
-        name: paper.
+        name: of an arena, or the path of its TOML or SVG file.
+        robot: name or file of the robot; when not given, `jyro` in the paper's arena and else none.
 
     Returns:
         The path of the file.
 
     Raises:
+        DescriptionError: there is no such arena or robot, or its file cannot be used; every mistake.
         RecordError: the file cannot be written.
-        ValueError: there is no such arena or ending.
+        ValueError: there is no such ending.
     """
-    _check_name("arena", name, ["paper"])
-    robot = JyroPlatform()
-    return save_picture(arena_picture(paper_arena(), robot.body, robot.sensors), out)
+    check_ending(Path(out), _STILL)
+    arena = load_arena(name)
+    if robot is None and str(name) == "paper":
+        paper_robot = JyroPlatform()
+        return save_picture(arena_picture(arena, paper_robot.body, paper_robot.sensors), out)
+    return save_picture(arena_picture(arena, None if robot is None else load_robot(robot)), out)
 
 
-def save_robot(out: str | Path, name: str = "jyro") -> Path:
-    """Draw a robot with its dimensions into a file; see `save_arena`."""
-    _check_name("robot", name, ["jyro"])
-    picture: Picture = JyroPlatform().picture()
-    return save_picture(picture, out)
+def save_robot(out: str | Path, name: str | Path = "jyro") -> Path:
+    """Draw a robot by name or from its file into a file, with its sensors and dimensions; see `save_arena`."""
+    check_ending(Path(out), _STILL)
+    return save_picture(model_picture(load_robot(name)), out)
 
 
 def _check_name(what: str, name: str, known: list[str]) -> None:

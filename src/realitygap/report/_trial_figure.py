@@ -1,9 +1,7 @@
-"""One trial: its path, what the sensors read and what the network answered, as a figure or in motion."""
+"""One trial: its path, what the sensors read and what the network answered, as a figure."""
 
 from __future__ import annotations
 
-import io
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +11,7 @@ import polars as pl
 
 from realitygap.drawing import Ink
 from realitygap.errors import whole_number
-from realitygap.records import ResultsFolder, write_whole
+from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     Drawing,
     house_style,
@@ -26,7 +24,6 @@ from realitygap.report._driven import refuse_replay
 from realitygap.report._path_figure import (
     TracedPath,
     arena_extent,
-    body_outline,
     draw_arena,
     draw_path,
     no_such_run,
@@ -35,7 +32,6 @@ from realitygap.report._path_figure import (
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
-from realitygap.world import Pose
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,11 +41,6 @@ _WIDTH = 9.6
 """Of the figure [in]."""
 
 _READINGS = ((Ink.PEN1, "solid"), (Ink.PEN0, (0, (5, 1.5))), (Ink.PEN2, (0, (1.3, 1.5))))
-_MOST_FRAMES = 300
-"""Of an animation; a longer trial shows every second step, or every third, and so on."""
-
-_DOTS = 80
-"""Of an animation, per inch."""
 
 
 @dataclass(frozen=True)
@@ -174,40 +165,6 @@ def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
-def animate_trial(trial: ChosenTrial, path: str | Path) -> Path:
-    """Write a trial in motion as a GIF that lasts as long as the trial did, unless it has very many steps.
-
-    Args:
-        trial: which.
-        path: ends in .gif; a file that is there gives way once the new one is complete.
-
-    Returns:
-        The path.
-
-    Raises:
-        RecordError: the trial comes out otherwise than recorded, or the file cannot be written.
-    """
-    trajectory = _replayed(trial)
-    stride = math.ceil(len(trajectory.commands) / _MOST_FRAMES)
-    with house_style():
-        frames = _frames(trial, trajectory, stride)
-    buffer = io.BytesIO()
-    palette = frames[-1].quantize(64)
-    first, *others = [frame.quantize(palette=palette, dither=0) for frame in frames]
-    each = round(1000 * trajectory.step_s * stride)
-    first.save(
-        buffer,
-        format="GIF",
-        save_all=True,
-        append_images=others,
-        duration=[each] * (len(frames) - 1) + [max(1500, each)],
-        loop=0,
-        comment=f"realitygap: {trial.label}, {trial.title}",
-    )
-    write_whole(Path(path), buffer.getvalue())
-    return Path(path)
-
-
 def _replayed(trial: ChosenTrial) -> Trajectory:
     if trial.condition.is_physical:
         raise refuse_replay(trial.condition.name)
@@ -248,9 +205,9 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     n_sensors = trajectory.readings.shape[1]
     names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
     _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
-    axes[0].set_ylim(0, 1.08 * trial.condition.jyro.sensors.max_range)
+    axes[0].set_ylim(0, 1.08 * trial.condition.simulated_on.sensors.max_range)
     _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, ["obstacle"], "input")
-    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.task.output_names, "command")
+    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.output_names, "command")
     axes[2].set_ylim(-1.1, 1.1)
     for each in axes:
         each.set_xlim(0, times[-1])
@@ -302,57 +259,3 @@ def _stripes(axes: Axes, times: Any, trajectory: Trajectory) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], trajectory.stalled.astype(np.int8), [0]])))
     for start, end in edges.reshape(-1, 2):
         axes.axvspan(times[start] - step, times[end - 1], color=Ink.RULE, alpha=0.6, linewidth=0, zorder=0)
-
-
-def _frames(trial: ChosenTrial, trajectory: Trajectory, stride: int) -> list[Any]:
-    """One picture a step: what stands still is drawn once, what moves over it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL import Image
-
-    arena = trial.condition.arena.arena()
-    body, sensors = trial.condition.tried_on.body, trial.condition.jyro.sensors
-    x_range, y_range = arena_extent(arena)
-    width, head = 8.0, 0.3
-    up = (width - 0.1) * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    figure = new_figure(width, up + head + 0.05)
-    figure.set_facecolor(Ink.GROUND)
-    figure.set_dpi(_DOTS)
-    axes = place_axes(figure, 0.05, head, width - 0.1, up)
-    draw_arena(axes, arena, x_range, y_range)
-    axes.plot([arena.start.x], [arena.start.y], "o", color=Ink.TEXT, markersize=4.0, zorder=7)
-    _head(axes, trial)
-    canvas: Any = FigureCanvasAgg(figure)  # parts of it carry no types
-    canvas.draw()
-    ground = canvas.copy_from_bbox(figure.bbox)
-    rays = [
-        axes.plot([], [], color=Ink.PUBLISHED, linewidth=1.2, linestyle=(0, (3, 1.5)), animated=True)[0]
-        for _ in sensors.mounts
-    ]
-    (line,) = axes.plot([], [], color=Ink.OURS, linewidth=2.0, animated=True)
-    (outline,) = axes.plot([], [], linewidth=1.8, animated=True)
-    clock = axes.text(0.5, 1.006, "", transform=axes.transAxes, ha="center", va="bottom", animated=True)
-    frames = []
-    last = len(trajectory.poses) - 1
-    for step in sorted({*range(0, last + 1, stride), last}):
-        x, y, heading = (float(value) for value in trajectory.poses[step])
-        stalled = bool(trajectory.stalled[step])
-        placed = body_outline(body, Pose(x, y, heading))
-        outline.set_data(placed[:, 0], placed[:, 1])
-        outline.set_color(Ink.REACH if stalled else Ink.TEXT)
-        outline.set_linestyle((0, (2, 1)) if stalled else "solid")
-        line.set_data(trajectory.poses[: step + 1, 0], trajectory.poses[: step + 1, 1])
-        for ray, (forward, left, direction), reading in zip(
-            rays, sensors.mounts, trajectory.readings[step], strict=True
-        ):
-            sine, cosine = math.sin(heading), math.cos(heading)
-            from_x, from_y = x + forward * cosine - left * sine, y + forward * sine + left * cosine
-            angle = heading + direction
-            ray.set_data(
-                [from_x, from_x + reading * math.cos(angle)], [from_y, from_y + reading * math.sin(angle)]
-            )
-        clock.set_text(f"{step * trajectory.step_s:.1f} s" + (", blocked" if stalled else ""))
-        canvas.restore_region(ground)
-        for artist in (*rays, line, outline, clock):
-            axes.draw_artist(artist)
-        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()))
-    return frames

@@ -3,14 +3,20 @@
 from ._classical import TaskRun, run_task
 from ._condition import NAME_PATTERN, Condition, Selection
 from ._evolution import Asked, Evolution, Told
+from ._mazes import MAZE_REWARDS, MazePath, MazeReward, MazeRun, MazeTrials, run_maze
 from ._replay import genome_of, replay
 from ._runs import frame_of, prepare_kernels, run_replicates, run_rows
 
 __all__ = [
+    "MAZE_REWARDS",
     "NAME_PATTERN",
     "Asked",
     "Condition",
     "Evolution",
+    "MazePath",
+    "MazeReward",
+    "MazeRun",
+    "MazeTrials",
     "Selection",
     "TaskRun",
     "Told",
@@ -18,6 +24,7 @@ __all__ = [
     "genome_of",
     "prepare_kernels",
     "replay",
+    "run_maze",
     "run_replicates",
     "run_rows",
     "run_task",

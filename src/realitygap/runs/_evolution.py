@@ -7,16 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from realitygap.evolution import (
-    Genome,
-    NearestArchive,
-    PaperArchive,
-    Population,
-    genome_record,
-    sorted_cells_distance,
-)
+from realitygap.evolution import Genome, NoveltyArchive, Population, genome_record
 from realitygap.kernels._genome import first_genomes, make_genomes
 
 from ._condition import Condition
@@ -75,7 +67,11 @@ class Evolution:
             N_INPUTS, N_OUTPUTS, condition.neat, replicate=replicate, bias=bias, key=condition.key
         )
         self._grid = condition.arena.arena().grid
-        self._archive = self._make_archive()
+        grid = self._grid
+        is_novelty = condition.selection == "novelty"
+        self._archive = (
+            NoveltyArchive(condition.novelty, columns=grid.columns, rows=grid.rows) if is_novelty else None
+        )
 
     def ask(self) -> list[Asked]:
         """This generation, in the order in which `tell` wants their cells."""
@@ -104,7 +100,7 @@ class Evolution:
         if self._archive is None:
             told = Told(tuple(coverage), (None,) * n)
         else:
-            novelty = tuple(float(value) for value in self._archive(cells))
+            novelty = tuple(float(value) for value in self._archive.update(cells))
             told = Told(novelty, novelty)
         if self._condition.selection != "random":
             self._population.tell(told.fitness)
@@ -120,27 +116,3 @@ class Evolution:
         first_genomes(genomes, rules, np.uint64(self._condition.key), self._replicate, self.generation)
         bias_value = float(self._condition.neat.bias_value)
         return [Genome(genomes, row, rules, bias_value) for row in range(self._condition.neat.population)]
-
-    def _make_archive(self) -> Any:
-        """From the behaviors of a generation to their novelty; None where selection is something else."""
-        if self._condition.selection != "novelty":
-            return None
-        settings, grid = self._condition.novelty, self._grid
-        if settings.kind == "paper":
-            return PaperArchive(settings, columns=grid.columns, rows=grid.rows).update
-
-        def distance(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-            cells = [np.flatnonzero(each) for each in (one, other)]
-            return sorted_cells_distance(*cells, columns=grid.columns, rows=grid.rows, sort=settings.sort)
-
-        nearest = NearestArchive(
-            distance, k=settings.neighbors, threshold=settings.threshold, patience=settings.patience
-        )
-
-        def update(behaviors: Sequence[Sequence[int]]) -> NDArray[np.float64]:
-            visited = np.zeros((len(behaviors), grid.n_cells))
-            for row, cells in enumerate(behaviors):
-                visited[row, list(cells)] = 1.0
-            return nearest.update(visited)
-
-        return update

@@ -3,6 +3,7 @@
 from ._bench import measure_speed
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
+from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
@@ -12,6 +13,7 @@ from ._template import study_template
 
 __all__ = [
     "DEFAULT_NEAT",
+    "MAZE_SEEDS",
     "SECTIONS",
     "ConditionNotes",
     "PhysicalResult",
@@ -26,6 +28,7 @@ __all__ = [
     "drive_study",
     "load_study",
     "machine_facts",
+    "measure_maze",
     "measure_speed",
     "measure_task",
     "named_studies",

@@ -122,14 +122,31 @@ def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
     rules = jyro_rules(condition.jyro, noise=condition.noise, bias_input=False, bias_value=1.0)
     rows = np.arange(TRIALS_PER_CALL, dtype=np.int32)
     nothing = make_trace(scene.heading, scene.sensors.shape[0], neat.n_inputs, -1, 1)
+    no_ends = np.zeros((0, scene.columns * scene.rows), np.uint8)
 
     def work(call: int) -> int:
         cells = np.zeros((TRIALS_PER_CALL, scene.columns * scene.rows), np.uint8)
         counts = np.zeros((TRIALS_PER_CALL, 3), np.int32)
+        ended = np.zeros((TRIALS_PER_CALL, 2))
         lanes, wiring = make_block(scene, neat, networks.place.shape[1])
         counters = counters_of(NoiseKey(0, replicate=call), TRIALS_PER_CALL)
         key = np.uint64(condition.key)
-        run_trials(scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, counts, nothing)
+        run_trials(
+            scene,
+            rules,
+            neat,
+            networks,
+            rows,
+            key,
+            counters,
+            lanes,
+            wiring,
+            cells,
+            no_ends,
+            ended,
+            counts,
+            nothing,
+        )
         return TRIALS_PER_CALL * condition.jyro.steps
 
     return work

@@ -13,16 +13,20 @@ from pydantic import BaseModel, ValidationError
 
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import Condition
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
 from ._problems import Problems
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
-PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform, "scribbler": ScribblerPlatform}
+PLATFORMS: dict[str, type[BaseModel]] = {
+    "jyro": JyroPlatform,
+    "sim": SimPlatform,
+    "scribbler": ScribblerPlatform,
+}
 SECTIONS: dict[str, type[BaseModel]] = {
     "arena": ArenaSettings,
     "task": CoverageTask,
@@ -97,12 +101,24 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
     problems = Problems()
+    _look_beside(data, origin)
     study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyError("\n  ".join([head, *problems.lines]))
     return study
+
+
+def _look_beside(data: dict[str, Any], origin: str) -> None:
+    """Arena files that are named without a folder lie beside the study file."""
+    listed = data.get("condition", [])
+    for part in [data, *(listed if isinstance(listed, list) else [])]:
+        arena = part.get("arena") if isinstance(part, dict) else None
+        file = arena.get("file") if isinstance(arena, dict) else None
+        if isinstance(arena, dict) and isinstance(file, str) and Path(origin).is_file():
+            beside = Path(origin).parent / file
+            arena["file"] = str(beside) if beside.is_file() else file
 
 
 def _plain(number: Any) -> Any:

@@ -74,15 +74,26 @@ def task_settings(
     """
     if task not in CLASSICAL_TASKS:
         raise StudyError(f"Unknown task {task!r}. {did_you_mean(task, CLASSICAL_TASKS)}")
+    own = CLASSICAL_TASKS[task].settings
+    if settings == "stanley-2002":
+        own = {**own, **CLASSICAL_TASKS[task].published_settings}
+    return checked_settings(settings, own, changes)
+
+
+def checked_settings(
+    settings: str, own: Mapping[str, Any], changes: Mapping[str, Any] | None
+) -> NeatSettings:
+    """NEAT's settings of a named set, of a task, and changed.
+
+    Raises:
+        StudyError: No such set, or a setting that cannot be.
+    """
     if settings not in NAMED_SETTINGS:
         raise StudyError(f"Unknown NEAT settings {settings!r}. {did_you_mean(settings, NAMED_SETTINGS)}")
     if "settings" in (changes or {}):
         raise StudyError(f"The set is {settings!r} already; name another one in its place (--settings).")
-    chosen = {**NAMED_SETTINGS[settings], **CLASSICAL_TASKS[task].settings}
-    if settings == "stanley-2002":
-        chosen |= CLASSICAL_TASKS[task].published_settings
     problems = Problems()
-    checked = problems.check(NeatSettings, {**chosen, **(changes or {})}, "")
+    checked = problems.check(NeatSettings, {**NAMED_SETTINGS[settings], **own, **(changes or {})}, "")
     if checked is None:
         raise StudyError("These settings cannot be:\n  " + "\n  ".join(problems.lines))
     return checked

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from realitygap.evolution import NAMED_SETTINGS
 from realitygap.runs import NAME_PATTERN, Condition
+from realitygap.settings import is_hidden
 
 from ._file import DEFAULT_NEAT, PLATFORMS, SECTIONS
 from ._study import ConditionNotes, ReportSection, StudySection, TrialsSection
@@ -22,6 +23,7 @@ _EXAMPLES = {
     "published_source": "Table 2",
     "baseline": "coverage-10",
     "change": "trials begin in the center",
+    "file": "arena.toml",
 }
 
 
@@ -101,11 +103,13 @@ def _section(
 ) -> str:
     lines = [f"[{place}]"]
     for key, info in model.model_fields.items():
+        if is_hidden(info):
+            continue
         lines.append(_comment(info.description or ""))
         if key in written:
             lines.append(f"{key} = {_toml(written[key])}")
         else:
-            default = (defaults or {}).get(key, info.default)
+            default = (defaults or {}).get(key, _EXAMPLES.get(key) if info.default is None else info.default)
             lines.append(f"# {key} = {_toml(default)}")
     return "\n".join(lines)
 

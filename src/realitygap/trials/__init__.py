@@ -1,32 +1,31 @@
 """One controller on one robot, or a population on a platform."""
 
-from ._jyro import (
-    NoiseKey,
-    Trajectory,
-    TrialBatch,
-    counters_of,
-    jyro_rules,
-    jyro_scene,
-    poses_of,
-    trace_genome,
-    try_genomes,
-)
+from ._batch import NoiseKey, PlatformTrials, Trajectory, TrialBatch, counters_of, poses_of
+from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
-from ._operator import Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
+from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
+from ._sim import SimTrials
+from ._sim_scene import SimScene, sim_scene
+from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
+    "PATH_PARTS",
     "Card",
     "DrivenTrial",
     "EndReason",
     "JyroRobot",
+    "JyroTrials",
     "NoiseKey",
     "Operator",
+    "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimScene",
+    "SimTrials",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",
@@ -37,12 +36,16 @@ __all__ = [
     "drive_trial",
     "jyro_rules",
     "jyro_scene",
+    "open_trials",
     "poses_of",
     "preflight",
     "retry_genomes",
+    "sim_scene",
     "simulate_case",
     "simulate_file",
     "trace_genome",
+    "trace_genomes",
+    "trajectories_of",
     "trial_seed",
     "try_genomes",
 ]

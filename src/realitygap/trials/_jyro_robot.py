@@ -13,7 +13,8 @@ from realitygap.kernels._fleet import make_fleet, read_robots, start_robots, ste
 from realitygap.robots import STEP_S, Command, JyroPlatform, Label, Observation, check_command
 from realitygap.world import Arena, Pose, paper_arena
 
-from ._jyro import NoiseKey, counters_of, jyro_rules, jyro_scene, poses_of
+from ._batch import NoiseKey, counters_of, poses_of
+from ._jyro import jyro_rules, jyro_scene
 
 
 class JyroRobot:

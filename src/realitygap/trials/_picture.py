@@ -10,7 +10,7 @@ import numpy as np
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text
 
 if TYPE_CHECKING:
-    from ._jyro import Trajectory
+    from ._batch import Trajectory
 
 _MARGIN = 0.06  # around the path [m]
 _LEAST = 0.5  # shown from left to right, so that a robot that hardly moves looks so [m]

@@ -9,20 +9,21 @@ import numpy as np
 
 from realitygap.evolution import Genome
 from realitygap.kernels._philox import MAX_REPEATS
-from realitygap.robots import JyroPlatform
 from realitygap.world import Arena
 
-from ._jyro import NoiseKey, TrialBatch, _check_sizes, counters_of, run_all
+from ._batch import NoiseKey, TrialBatch, check_genomes, counters_of
+from ._try import Platform, try_all
 
 
 def retry_genomes(
-    platform: JyroPlatform,
+    platform: Platform,
     arena: Arena,
     genomes: Sequence[Genome],
     *,
     noise: float,
     noise_keys: Sequence[NoiseKey],
     repeats: range,
+    inputs: Sequence[str] | None = None,
 ) -> TrialBatch:
     """Try each of n genomes once for each number in `repeats`, r in all.
 
@@ -33,6 +34,7 @@ def retry_genomes(
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
+        inputs: What the networks see, as in `try_genomes`.
 
     Returns:
         n * r trials, those of a genome together: `coverage_line.reshape(n, r)` has a row per genome.
@@ -41,7 +43,7 @@ def retry_genomes(
         ValueError: No genome, one with other inputs or outputs, genomes of several kinds, another number of
             keys than of genomes, a repeat below 0 or beyond 4095, or noise that is not a finite number from 0 on.
     """
-    _check_sizes(genomes)
+    check_genomes(genomes, inputs)
     if len(noise_keys) != len(genomes):
         raise ValueError(f"There are {len(noise_keys)} noise keys, expected {len(genomes)}: one a genome.")
     if len(repeats) and not 0 <= min(repeats) <= max(repeats) < MAX_REPEATS:
@@ -56,15 +58,9 @@ def retry_genomes(
         firsts = np.concatenate([counters_of(replace(noise_keys[row], repeat=0)) for row in rows])
         counters = np.repeat(firsts, n_repeats, axis=0)
         counters[:, 1] |= np.tile(np.array(repeats, np.uint32), len(rows))
-        batch, _ = run_all(
-            platform,
-            arena,
-            genomes,
-            np.repeat(np.array(rows, np.int32), n_repeats),
-            noise,
-            key,
-            counters,
-        )
+        which = np.repeat(np.array(rows, np.int32), n_repeats)
+        _, tried = try_all(platform, arena, genomes, which, key, counters, inputs=inputs, noise=noise)
+        batch = tried.batch
         cells[rows] = batch.cells.reshape(len(rows), n_repeats, -1)
         counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))
     return TrialBatch(cells.reshape(-1, arena.grid.n_cells), *counts.reshape(3, -1))

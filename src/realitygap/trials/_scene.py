@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import CaseError, RecordError
 from ..kernels import _scene as kernel
-from ..world._case import Case, CaseDevice
+from ..world._case import Case, CaseBody, CaseDevice
 
 _LIGHTS = {
     "linear": kernel.SENSOR_LIGHT_LINEAR,
@@ -145,7 +145,7 @@ def _as_arrays(case: Case) -> kernel.Scene:
     networks = [robot.controller for robot in robots]
     layers = [layer for network in networks if network for layer in network.layers]
     names = [robot.name for robot in robots]
-    bodies = [robot.bounding_box for robot in robots]
+    bodies = [_edges(robot.bounding_box) for robot in robots]
     commands = np.zeros((case.steps, len(robots), 2))
     scales = np.ones((len(robots), 3))
     for i, robot in enumerate(robots):
@@ -158,8 +158,8 @@ def _as_arrays(case: Case) -> kernel.Scene:
         lights=_table(case.world.lights, 3),
         starts=_table([[robot.start.x, robot.start.y, robot.start.heading] for robot in robots], 3),
         names=np.array([names.index(name) for name in names], np.int64),
-        corners=_table([corner for body in bodies for corner in zip(body.x, body.y, strict=True)], 2),
-        corner_rows=_row_starts(len(body.x) for body in bodies),
+        edges=_table([edge for body in bodies for edge in body], 4),
+        edge_rows=_row_starts(len(body) for body in bodies),
         mounts=_table([mount for mount, _, _ in sensors], 3),
         sensors=np.array([kind for _, kind, _ in sensors], np.int64),
         reaches=np.array([reach for _, _, reach in sensors], np.float64),
@@ -178,6 +178,12 @@ def _as_arrays(case: Case) -> kernel.Scene:
         input_rows=_row_starts(len(network.inputs) if network else 0 for network in networks),
         scales=scales,
     )
+
+
+def _edges(body: CaseBody) -> list[tuple[float, float, float, float]]:
+    """Forward and left of both ends of each edge [m]: each corner is joined to the one before."""
+    corners = list(zip(body.x, body.y, strict=True))
+    return [(*corner, *corners[i - 1]) for i, corner in enumerate(corners)]
 
 
 def _all_sensors(devices: list[CaseDevice]) -> list[tuple[list[float], int, float]]:

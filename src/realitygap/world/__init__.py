@@ -1,34 +1,55 @@
 """Plain descriptions of arenas, bodies and sensors; nothing here moves."""
 
 from ._arena import (
-    INCH,
     NAMED_STARTS,
     Arena,
     Grid,
     Pose,
-    check_start,
-    is_inside,
     paper_arena,
 )
+from ._arena_file import ArenaFile
 from ._case import Case
+from ._distribution import Distribution
+from ._floor import Floor, FloorImage
+from ._library import arena_names, load_arena, load_robot, robot_names
+from ._obstacle import Goal, Light, Obstacle
+from ._part import Part
 from ._pictures import arena_picture, robot_picture
+from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
+from ._robot_model import RobotModel
+from ._robot_picture import model_picture
 from ._settings import ArenaSettings
+from ._units import INCH
 
 __all__ = [
     "INCH",
     "JYRO_SCRIBBLER",
     "NAMED_STARTS",
     "Arena",
+    "ArenaFile",
     "ArenaSettings",
     "Body",
     "Case",
+    "Distribution",
+    "Floor",
+    "FloorImage",
+    "Goal",
     "Grid",
+    "Light",
+    "Obstacle",
+    "Part",
     "Pose",
     "RangeSensors",
+    "RobotModel",
+    "arena_names",
     "arena_picture",
     "check_start",
     "is_inside",
+    "load_arena",
+    "load_robot",
+    "model_picture",
     "paper_arena",
+    "robot_names",
     "robot_picture",
 ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
-from ._robot import Body
-
-INCH = 0.0254  # [m]
+from ._distribution import Distribution
+from ._floor import BARE_FLOOR, Floor
+from ._obstacle import Goal, Light, Obstacle, Segment
+from ._units import INCH
 
 
 class Pose(NamedTuple):
@@ -46,23 +47,70 @@ class Grid:
 
 @dataclass(frozen=True)
 class Arena:
-    """Straight walls, a grid of reachable cells and a start.
+    """Straight walls, a grid of reachable cells, a start, and what else there may be.
 
     Attributes:
         name: What to call it.
         walls: (w, 4) x1, y1, x2, y2 of each wall [m].
         grid: The reachable cells.
         start: Where every trial begins.
+        obstacles: What stands in it.
+        lights: What shines.
+        floor: What is on the floor.
+        goal: What is to be reached; None where nothing is.
+        vary: Which of its numbers are drawn, by dotted name ("arena.start.x"); the fields have their centers.
     """
 
     name: str
     walls: tuple[tuple[float, float, float, float], ...]
     grid: Grid
     start: Pose
+    obstacles: tuple[Obstacle, ...] = ()
+    lights: tuple[Light, ...] = ()
+    floor: Floor = BARE_FLOOR
+    goal: Goal | None = None
+    vary: Mapping[str, Distribution] = field(default_factory=dict, hash=False)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """(w, 4) walls and the straight sides of obstacles [m]."""
+        return (*self.walls, *(edge for obstacle in self.obstacles for edge in obstacle.edges()))
 
     def to_dict(self) -> dict[str, Any]:
-        """The arena as plain values."""
-        return asdict(self) | {"start": tuple(self.start)}
+        """The arena as plain values; of what may be there, only what is."""
+        values: dict[str, Any] = {
+            "name": self.name, "walls": self.walls, "grid": asdict(self.grid), "start": tuple(self.start)
+        }  # fmt: skip
+        if self.obstacles:
+            values["obstacles"] = [asdict(obstacle) for obstacle in self.obstacles]
+        if self.lights:
+            values["lights"] = [asdict(light) for light in self.lights]
+        if self.floor != BARE_FLOOR:
+            values["floor"] = self.floor.to_dict()
+        if self.goal is not None:
+            values["goal"] = asdict(self.goal)
+        if self.vary:
+            values["vary"] = {name: drawn.to_dict() for name, drawn in self.vary.items()}
+        return values
+
+    def numbers(self) -> dict[str, float | Distribution]:
+        """Every number that may be drawn, by its dotted name: "arena.start.x" and so on."""
+        from ._arena_file import ArenaFile
+
+        return ArenaFile.of(self).arena_numbers()
+
+    def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Arena:
+        """The same arena with other numbers.
+
+        Args:
+            values: Numbers, distributions or these as plain values, by dotted name.
+
+        Raises:
+            ValueError: There is no such number, or it cannot be this; every mistake.
+        """
+        from ._arena_file import ArenaFile
+
+        return ArenaFile.of(self).with_arena_numbers(values).arena()
 
     def _repr_svg_(self) -> str:
         from ._pictures import arena_picture
@@ -72,11 +120,20 @@ class Arena:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Arena:
         """The arena that `to_dict` described."""
+        obstacles = (
+            Obstacle(**{**each, "corners": tuple((x, y) for x, y in each["corners"])})
+            for each in values.get("obstacles", ())
+        )
         return cls(
             values["name"],
-            tuple(tuple(wall) for wall in values["walls"]),
+            tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in values["walls"]),
             Grid(**values["grid"]),
             Pose(*values["start"]),
+            tuple(obstacles),
+            tuple(Light(**each) for each in values.get("lights", ())),
+            Floor.from_dict(values.get("floor", {})),
+            Goal(**values["goal"]) if "goal" in values else None,
+            {name: Distribution(**drawn) for name, drawn in values.get("vary", {}).items()},
         )
 
 
@@ -102,30 +159,3 @@ NAMED_STARTS = {
     "center": Pose(21 * INCH, 12 * INCH, 0.0),  # on a junction of cells: belongs to the upper right one
     "left": Pose(7.5 * INCH, 12 * INCH, 0.0),  # on a border of cells: belongs to the upper one
 }
-
-
-def check_start(arena: Arena, body: Body) -> None:
-    """Refuse a start at which the body would not lie within the walls.
-
-    Raises:
-        ValueError: a corner of it lies beyond a wall.
-    """
-    pose = arena.start
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    for forward, left in body.corners:
-        x = pose.x + forward * cosine - left * sine
-        y = pose.y + forward * sine + left * cosine
-        if not is_inside(arena, x, y):
-            raise ValueError(
-                f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
-                f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
-            )
-
-
-def is_inside(arena: Arena, x: float, y: float) -> bool:
-    """Whether a point lies inside the arena's walls (an odd number of walls to its right)."""
-    crossings = 0
-    for x1, y1, x2, y2 in arena.walls:
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            crossings += 1
-    return crossings % 2 == 1

@@ -73,6 +73,7 @@ DEVICES: dict[str, dict[str, Any]] = {
         "type": "light",
         "geometry": _mounts((0.225, 0.175, 0), (0.225, 0.0875, 0), (0.225, -0.0875, 0), (0.225, -0.175, 0)),
     },
+    "MyroLightSensors": {"type": "light", "geometry": _mounts((0.18, 0.13, 0), (0.18, -0.13, 0))},
 }
 DEVICES["RangeSensor"] = DEVICES["range"]
 DEVICES["LightSensor"] = DEVICES["light"]

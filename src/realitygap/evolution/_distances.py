@@ -1,0 +1,248 @@
+"""Distances of behaviors by name: what each compares, what it costs, and whether it is a metric."""
+
+from __future__ import annotations
+
+import functools
+import reprlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from realitygap.errors import did_you_mean
+from realitygap.kernels import _distances
+from realitygap.kernels._distances import Behaviors, Measure
+
+Cells = Sequence[int] | NDArray[np.integer]
+Sort = Literal["x-then-y", "y-then-x"]
+DistanceName = Literal["paper", "ordered", "jaccard", "hamming", "final", "edit", "alignment"]
+
+
+@dataclass(frozen=True)
+class BehaviorDistance:
+    """A distance of two behaviors.
+
+    Attributes:
+        name: what study files call it.
+        compares: what of a trial it looks at: the cells that it visited, or the position where it ended.
+        needs_order: whether it matters in which order cells were visited first; a drawing on squared paper, scored by
+            hand, does not say.
+        is_metric: whether, of what it compares, 0 means equal, order of the two does not matter, and no way over a
+            third is shorter.
+        unit: of the number: cells, m, or 1 for a share.
+        cost: steps that one distance takes, of behaviors of n and m cells in a grid of c.
+        description: what it is, in a sentence.
+        source: who described it.
+    """
+
+    name: DistanceName
+    compares: Literal["cells", "position"]
+    needs_order: bool
+    is_metric: bool
+    unit: Literal["cells", "m", "1"]
+    cost: str
+    description: str
+    source: str
+
+    def distances(
+        self,
+        behaviors: Sequence[Cells] | ArrayLike,
+        others: Sequence[Cells] | ArrayLike | None = None,
+        *,
+        columns: int = 12,
+        rows: int = 6,
+        sort: Sort = "x-then-y",
+    ) -> NDArray[np.float64]:
+        """Of each behavior to each of some others.
+
+        Args:
+            behaviors: n lists of cells, numbered columns * row + column, in the order in which they were visited; of
+                a cell that comes again only the first visit counts. Where positions are compared: (n, 2) [m].
+            others: m of them; those of `behaviors` where none are given.
+            columns, rows: Size of the grid.
+            sort: How `paper` sorts cells.
+
+        Returns:
+            (n, m) float64, in the distance's unit. Two that visit nothing are equal.
+
+        Raises:
+            TypeError: A cell that is not a whole number.
+            ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
+        """
+        measure = measure_of(self.name, columns, rows, sort)
+        one = pack_behaviors(measure, behaviors, columns, rows)
+        other = one if others is None else pack_behaviors(measure, others, columns, rows)
+        found = np.empty((len(one.n_cells), len(other.n_cells)))
+        _distances.distances_between(measure, one, other, found)
+        return found
+
+
+DISTANCES: dict[str, BehaviorDistance] = {
+    each.name: each
+    for each in (
+        BehaviorDistance(
+            "paper",
+            compares="cells",
+            needs_order=False,
+            is_metric=True,
+            unit="cells",
+            cost="n + m + c",
+            description="The distances of the cells at equal places of the two sorted lists, added up; each cell "
+            "that only the longer list has counts with the largest distance in the grid.",
+            source="Rosenzweig & Remy, section 2.4.",
+        ),
+        BehaviorDistance(
+            "ordered",
+            compares="cells",
+            needs_order=True,
+            is_metric=True,
+            unit="cells",
+            cost="n + m",
+            description="The same, with the cells in the order in which they were visited first.",
+            source="Rosenzweig & Remy, section 4: “by not sorting the behaviors”.",
+        ),
+        BehaviorDistance(
+            "jaccard",
+            compares="cells",
+            needs_order=False,
+            is_metric=True,
+            unit="1",
+            cost="c / 31",
+            description="Of the cells that either visited, the share that one of the two visited alone.",
+            source="Jaccard (1912), New Phytologist 11(2), 37-50; a metric: Levandowsky & Winter (1971), Nature "
+            "234, 34-35.",
+        ),
+        BehaviorDistance(
+            "hamming",
+            compares="cells",
+            needs_order=False,
+            is_metric=True,
+            unit="cells",
+            cost="c / 31",
+            description="How many cells one of the two visited alone.",
+            source="Hamming (1950), Bell System Technical Journal 29(2), 147-160.",
+        ),
+        BehaviorDistance(
+            "final",
+            compares="position",
+            needs_order=False,
+            is_metric=True,
+            unit="m",
+            cost="1",
+            description="How far apart the two ended, in a straight line.",
+            source="Lehman & Stanley (2011): where a trial in a maze ends.",
+        ),
+        BehaviorDistance(
+            "edit",
+            compares="cells",
+            needs_order=True,
+            is_metric=True,
+            unit="cells",
+            cost="n m",
+            description="The fewest cells to put in, leave out or put for another to make one list, in the order of "
+            "first visits, the other.",
+            source="Levenshtein (1966), Soviet Physics Doklady 10(8), 707-710.",
+        ),
+        BehaviorDistance(
+            "alignment",
+            compares="cells",
+            needs_order=True,
+            is_metric=True,
+            unit="1",
+            cost="n m",
+            description="The two lists, in the order of first visits, are aligned at the least cost d: a cell against "
+            "another costs their distance in cells, a cell against a gap 1. Of that 2 d / (n + m + d): 0 where they "
+            "are equal, 1 where nothing is aligned.",
+            source="Needleman & Wunsch (1970), J. Mol. Biol. 48(3), 443-453, with costs in place of scores; the share, "
+            "a metric: Li & Liu (2007), IEEE TPAMI 29(6), 1091-1095. Proposed by Rosenzweig & Remy, section 5.",
+        ),
+    )
+}
+"""The distances that `novelty.distance` names."""
+
+_KINDS = {
+    "paper": _distances.PAPER,
+    "ordered": _distances.ORDERED,
+    "jaccard": _distances.JACCARD,
+    "hamming": _distances.HAMMING,
+    "final": _distances.FINAL,
+    "edit": _distances.EDIT,
+    "alignment": _distances.ALIGNMENT,
+}
+
+
+def behavior_distance(name: str) -> BehaviorDistance:
+    """The distance of that name.
+
+    Raises:
+        ValueError: There is none.
+    """
+    if name not in DISTANCES:
+        raise ValueError(f"Unknown distance {name!r}. {did_you_mean(name, DISTANCES)}")
+    return DISTANCES[name]
+
+
+def distance_kind(name: str) -> int:
+    """Its number in kernels."""
+    return _KINDS[name]
+
+
+@functools.cache
+def _made(name: str, columns: int, rows: int, sort: Sort) -> Measure:
+    measure: Measure = _distances.make_measure(_KINDS[name], columns, rows, sort == "x-then-y")
+    return measure
+
+
+def measure_of(name: str, columns: int, rows: int, sort: Sort) -> Measure:
+    """The distance in the form that kernels read, with room of its own: threads may have one each."""
+    return _made(name, columns, rows, sort)._replace(room=np.zeros(columns * rows + 1))
+
+
+def pack_behaviors(
+    measure: Measure, behaviors: Sequence[Cells] | ArrayLike, columns: int, rows: int
+) -> Behaviors:
+    """Behaviors in the form that a measure reads.
+
+    Raises:
+        TypeError: A cell that is not a whole number.
+        ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
+    """
+    if measure.kind == _distances.FINAL:
+        return _pack_positions(behaviors)
+    lists: list[Any] = list(behaviors)  # type: ignore[arg-type]  # one number alone is no list, as Python says
+    packed: Behaviors = _distances.make_behaviors(len(lists), columns * rows)
+    for row, cells in enumerate(lists):
+        visited = first_visits(cells, columns, rows)
+        _distances.describe(measure, visited, len(visited), 0.0, 0.0, packed, row)
+    return packed
+
+
+def first_visits(cells: Any, columns: int, rows: int) -> NDArray[np.int64]:
+    """The cells of a behavior, each once, in the order in which they come first.
+
+    Raises:
+        TypeError: A cell that is not a whole number.
+        ValueError: A cell outside the grid.
+    """
+    given = np.asarray(cells)
+    if given.size and given.dtype.kind not in "iu":
+        raise TypeError(f"A behavior is {reprlib.repr(cells)}, expected whole numbers: those of its cells.")
+    numbers, first = np.unique(given.astype(np.int64), return_index=True)
+    if numbers.size and (numbers[0] < 0 or numbers[-1] >= columns * rows):
+        raise ValueError(
+            f"A behavior names cell {numbers[0] if numbers[0] < 0 else numbers[-1]}, "
+            f"expected 0 to {columns * rows - 1}: the grid has {columns} columns and {rows} rows."
+        )
+    return numbers[np.argsort(first)]
+
+
+def _pack_positions(positions: Sequence[Cells] | ArrayLike) -> Behaviors:
+    points = np.ascontiguousarray(positions, np.float64)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise ValueError(
+            f"Behaviors have shape {points.shape}, expected (n, 2) finite numbers: where each trial ended [m]."
+        )
+    n = len(points)
+    return Behaviors(np.zeros((n, 1), np.int32), np.zeros(n, np.int32), points)

@@ -1,0 +1,156 @@
+"""What a range sensor of the platform `sim` answers to the distances along its rays, before noise.
+
+A reading is 0 where nothing is within reach, and grows to 1 as things come near. A cone is several rays, evenly
+spaced from one edge of it to the other. What measures a time of flight (`linear`, `table`) answers the nearest
+ray: the first echo. What measures how much light returns (`ir`, `pulses`) adds the rays up, weighted by a lobe
+that has half its power at the edge of the cone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._compile import inlined, stage
+from ._lanes import LANES, fill
+from ._math import LOG2_E, exp2
+
+STEEP = 1e30  # [1/m]: any distance times it is beyond the limits of `exp2`
+
+
+@inlined
+def unit_of(word, like):
+    """A number in (0, 1) from the upper 23 bits of a word, centered, exact in the precision of `like`."""
+    real = type(like)
+    return (real(np.int32(word >> np.uint32(9))) + real(0.5)) * real(1.0 / (1 << 23))
+
+
+@stage
+def rate_of(width, rate):
+    """log2(e) / width: what `exp2` wants for e^(d / width). A width of 0 makes a step of it.
+
+    Args:
+        width: (LANES,) [m].
+        rate: Written [1/m].
+    """
+    real = width.dtype.type
+    for lane in range(LANES):
+        one = width[lane]
+        none = one == real(0.0)
+        divisor = real(1.0) if none else one
+        rate[lane] = real(STEEP) if none else real(LOG2_E) / divisor
+
+
+@stage
+def nearest_ray(distances, near):
+    """The least of distances (rays, LANES) [m]."""
+    for lane in range(LANES):
+        near[lane] = distances[0, lane]
+    for ray in range(1, distances.shape[0]):
+        for lane in range(LANES):
+            one = distances[ray, lane]
+            least = near[lane]
+            near[lane] = one if one < least else least
+
+
+@stage
+def linear_response(near, reach, reading):
+    """(R - d) / R, the paper's.
+
+    Args:
+        near: (LANES,) d, distance to what is nearest [m], not above the reach.
+        reach: R [m].
+        reading: Written.
+    """
+    for lane in range(LANES):
+        reading[lane] = (reach[lane] - near[lane]) / reach[lane]
+
+
+@inlined
+def lobe_of(ray, rays):
+    """The weight of a ray of a cone: 1 in the middle, half at its edges."""
+    part = 2.0 * ray / (rays - 1) - 1.0 if rays > 1 else 0.0
+    return 1.0 - 0.5 * part * part
+
+
+@stage
+def _add_return(distance, reach, rate, weight, reading):
+    real = reading.dtype.type
+    for lane in range(LANES):
+        d = distance[lane]
+        back = real(weight) * exp2(-d * rate[lane])
+        so_far = reading[lane]
+        reading[lane] = so_far + back if d < reach[lane] else so_far
+
+
+@stage
+def ir_response(distances, reach, amplitude, rate, reading):
+    """A * e^(-d / L), the mean over the rays by their weights; a ray that meets nothing within reach adds 0.
+
+    Args:
+        distances: (rays, LANES) d [m].
+        reach: [m].
+        amplitude: A, 1 for full scale. Not limited here: a sensor may be saturated up to some distance.
+        rate: log2(e) / L [1/m].
+        reading: Written.
+    """
+    real = reading.dtype.type
+    rays = distances.shape[0]
+    fill(reading, real(0.0))
+    whole = 0.0
+    for ray in range(rays):
+        weight = lobe_of(ray, rays)
+        whole += weight
+        _add_return(distances[ray], reach, rate, weight, reading)
+    for lane in range(LANES):
+        reading[lane] = reading[lane] * (amplitude[lane] * real(1.0 / whole))
+
+
+@stage
+def prepare_table(table):
+    """Turn a table's readings into what `table_response` adds per meter, in place.
+
+    Args:
+        table: (2 * entries, LANES) distance [m] and reading in turn, distances rising.
+
+    The first reading stays what it is; reading k becomes the slope that leads to it, 0 where two distances are equal.
+    """
+    real = table.dtype.type
+    for k in range(table.shape[0] // 2 - 1, 0, -1):
+        for lane in range(LANES):
+            across = table[2 * k, lane] - table[2 * k - 2, lane]
+            up = table[2 * k + 1, lane] - table[2 * k - 1, lane]
+            none = not across > real(0.0)
+            divisor = real(1.0) if none else across
+            table[2 * k + 1, lane] = real(0.0) if none else up / divisor
+
+
+@stage
+def table_response(near, table, reading):
+    """What a table of measured readings says, straight between its entries and level beyond them.
+
+    Args:
+        near: (LANES,) distance to what is nearest [m].
+        table: (2 * entries, LANES) of `prepare_table`.
+        reading: Written.
+    """
+    real = reading.dtype.type
+    for lane in range(LANES):
+        reading[lane] = table[1, lane]
+    for k in range(1, table.shape[0] // 2):
+        for lane in range(LANES):
+            start = table[2 * k - 2, lane]
+            past = near[lane] - start
+            most = table[2 * k, lane] - start
+            past = past if past < most else most
+            past = past if past > real(0.0) else real(0.0)
+            reading[lane] = reading[lane] + table[2 * k + 1, lane] * past
+
+
+@stage
+def limit(reading):
+    """Limited to 0..1."""
+    real = reading.dtype.type
+    for lane in range(LANES):
+        one = reading[lane]
+        one = one if one < real(1.0) else real(1.0)
+        reading[lane] = one if one > real(0.0) else real(0.0)

@@ -1,0 +1,80 @@
+"""How far the same controller's trials on two platforms come apart, step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Posed(Protocol):
+    """A trial of which the poses are known, such as a `Trajectory` or a `MovingTrial`."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start."""
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """How far n pairs of trials are apart after each of t steps; row 0 is the start.
+
+    Attributes:
+        distance: (n, t + 1) between the two robots [m].
+        heading: (n, t + 1) between their headings, the short way round [rad, 0 to pi].
+    """
+
+    distance: NDArray[np.float64]
+    heading: NDArray[np.float64]
+
+    @property
+    def n_pairs(self) -> int:
+        """How many pairs of trials."""
+        return len(self.distance)
+
+    @property
+    def n_steps(self) -> int:
+        """How many steps of them."""
+        return int(self.distance.shape[1]) - 1
+
+
+def measure_divergence(one: Sequence[Posed], other: Sequence[Posed]) -> Divergence:
+    """How far trial k of the one is from trial k of the other, after each step that both have.
+
+    A step is one command on every platform, whatever time it lasts there, so trials are compared by steps.
+
+    Args:
+        one: n trials.
+        other: n trials, each beside one of those.
+
+    Raises:
+        ValueError: There is none, or there are more of the one than of the other.
+    """
+    if not one or len(one) != len(other):
+        raise ValueError(
+            f"There are {len(one)} trials beside {len(other)}, expected as many of both, and at least one."
+        )
+    n_rows = min(len(trial.poses) for trial in (*one, *other))
+    first, second = (np.array([trial.poses[:n_rows] for trial in trials]) for trials in (one, other))
+    apart = second - first
+    turned = np.abs(apart[..., 2] - math.tau * np.rint(apart[..., 2] / math.tau))
+    return Divergence(np.hypot(apart[..., 0], apart[..., 1]), turned)
+
+
+def own_divergence(trials: Sequence[Posed]) -> Divergence:
+    """How far repeats on one platform are from each other: each from the next, the last from the first.
+
+    It is what noise alone does, to which the divergence of two platforms has to be compared.
+
+    Raises:
+        ValueError: There are fewer than two.
+    """
+    if len(trials) < 2:
+        raise ValueError(
+            f"There is {len(trials)} trial, expected two or more: one alone is not apart from itself."
+        )
+    return measure_divergence(trials, [*trials[1:], trials[0]])

@@ -1,0 +1,300 @@
+"""A trial that can be shown in motion, whatever platform it was on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.kernels._coverage import to_grid, visit, visit_line
+from realitygap.world import Arena, Body, Grid, RangeSensors
+
+Outline = tuple[tuple[float, float], ...]
+"""(b, 2) corners, forward and left of the robot's origin [m]."""
+
+
+class Driven(Protocol):
+    """What a platform keeps of a trial step by step, such as a `Trajectory`; row 0 is the start."""
+
+    @property
+    def step_s(self) -> float:
+        """How long a step lasts [s]."""
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(t + 1, 3) x [m], y [m], heading [rad]."""
+
+    @property
+    def readings(self) -> NDArray[np.float64]:
+        """(t + 1, s) what each range sensor measures: distances [m]."""
+
+    @property
+    def stalled(self) -> NDArray[np.bool_]:
+        """(t + 1,) whether the step was blocked."""
+
+
+class Ranging(Protocol):
+    """A robot's outline and range sensors, such as a `JyroPlatform`."""
+
+    @property
+    def body(self) -> Body:
+        """What collides."""
+
+    @property
+    def sensors(self) -> RangeSensors:
+        """Its rays."""
+
+
+@dataclass(frozen=True)
+class RobotShape:
+    """What is drawn of a robot.
+
+    Attributes:
+        outlines: its parts, each a polygon.
+        mounts: (s, 3) of each range sensor: forward [m], left [m] and direction [rad, positive to the left].
+        reach: (s,) how far each of them sees [m].
+    """
+
+    outlines: tuple[Outline, ...]
+    mounts: tuple[tuple[float, float, float], ...]
+    reach: tuple[float, ...]
+
+    @property
+    def front(self) -> float:
+        """How far it extends ahead of its origin [m]."""
+        return max(forward for outline in self.outlines for forward, _ in outline)
+
+    @classmethod
+    def of(cls, robot: Ranging) -> RobotShape:
+        """The shape of a robot of one part."""
+        mounts = robot.sensors.mounts
+        return cls((robot.body.corners,), mounts, (robot.sensors.max_range,) * len(mounts))
+
+
+@dataclass(frozen=True)
+class MovingTrial:
+    """Where a robot was and what it saw, step by step; row 0 is the start.
+
+    Attributes:
+        title: which trial it is.
+        label: SIM, TWIN, EMULATED or REAL.
+        arena: where.
+        shape: of the robot.
+        step_s: how long a step lasts [s].
+        poses: (t + 1, 3) x [m], y [m], heading [rad].
+        rays: (t + 1, s) how far each ray is drawn [m]: what the sensor reads, as a distance. NaN: not known.
+        stalled: (t + 1,) whether the step was blocked.
+        cells: (n,) cells visited in order of first visit, columns * row + column.
+        visited_at: (n,) the row by which each has been visited.
+        parts: rows a step; t = parts * the number of steps.
+    """
+
+    title: str
+    label: str
+    arena: Arena
+    shape: RobotShape
+    step_s: float
+    poses: NDArray[np.float64]
+    rays: NDArray[np.float64]
+    stalled: NDArray[np.bool_]
+    cells: tuple[int, ...]
+    visited_at: tuple[int, ...]
+    parts: int = 1
+
+    @classmethod
+    def of_rows(
+        cls,
+        title: str,
+        label: str,
+        arena: Arena,
+        shape: RobotShape,
+        step_s: float,
+        poses: NDArray[np.float64],
+        rays: NDArray[np.float64],
+        stalled: NDArray[np.bool_],
+        parts: int = 1,
+    ) -> MovingTrial:
+        """The trial with these rows, whose cells are found in its line; see the attributes."""
+        cells, rows, _ = first_visits(poses, arena.grid)
+        visited = tuple(cells.tolist()), tuple(rows.tolist())
+        return cls(title, label, arena, shape, step_s, poses, rays, stalled, *visited, parts)
+
+    @property
+    def n_steps(self) -> int:
+        """How many steps it has."""
+        return (len(self.poses) - 1) // self.parts
+
+    @property
+    def duration_s(self) -> float:
+        """How long it lasted [s]."""
+        return self.n_steps * self.step_s
+
+    def named(self, title: str) -> MovingTrial:
+        """The same under another title."""
+        return replace(self, title=title)
+
+    def at(self, time: float) -> Moment:
+        """Where the robot is at a time since the start [s]; straight on between steps, and at the end afterwards."""
+        last = len(self.poses) - 1
+        place = min(max(time / self.step_s * self.parts, 0.0), float(last))
+        row = min(math.floor(place + 1e-9), last)
+        share, onward = max(place - row, 0.0), min(row + 1, last)
+        here, there = self.poses[row], self.poses[onward]
+        turn = math.remainder(there[2] - here[2], math.tau)
+        pose = (
+            float(here[0] + share * (there[0] - here[0])),
+            float(here[1] + share * (there[1] - here[1])),
+            float(here[2] + share * turn),
+        )
+        rays = self.rays[row] + share * (self.rays[onward] - self.rays[row])
+        n_cells = int(np.searchsorted(self.visited_at, row, "right"))
+        return Moment(row, row // self.parts, pose, rays, bool(self.stalled[row]), n_cells)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One moment of a trial.
+
+    Attributes:
+        row: the last row of the trial that is over.
+        step: steps that are over.
+        pose: x [m], y [m], heading [rad].
+        rays: (s,) lengths [m].
+        stalled: whether the last step was blocked.
+        n_cells: cells visited so far.
+    """
+
+    row: int
+    step: int
+    pose: tuple[float, float, float]
+    rays: NDArray[np.float64]
+    stalled: bool
+    n_cells: int
+
+
+def in_motion(
+    trajectory: Driven,
+    arena: Arena,
+    robot: Ranging | RobotShape,
+    *,
+    title: str = "trial",
+    label: str = "SIM",
+) -> MovingTrial:
+    """A trial made ready to be shown.
+
+    Args:
+        trajectory: the trial step by step.
+        arena: where.
+        robot: whose outline and rays are drawn.
+        title: what to call it.
+        label: SIM, TWIN, EMULATED or REAL.
+
+    Raises:
+        ValueError: the trajectory has other readings than the robot has sensors.
+    """
+    shape = robot if isinstance(robot, RobotShape) else RobotShape.of(robot)
+    rays = np.asarray(trajectory.readings, np.float64)
+    if rays.shape != (len(trajectory.poses), len(shape.mounts)):
+        raise ValueError(
+            f"readings has shape {rays.shape}, expected ({len(trajectory.poses)}, {len(shape.mounts)}): a row for the "
+            "start and one for each step, and a reading of each range sensor of the robot."
+        )
+    return MovingTrial.of_rows(
+        title,
+        label,
+        arena,
+        shape,
+        float(trajectory.step_s),
+        np.asarray(trajectory.poses, np.float64),
+        rays,
+        np.asarray(trajectory.stalled, np.bool_),
+    )
+
+
+def all_trials(trials: MovingTrial | Iterable[MovingTrial]) -> list[MovingTrial]:
+    """The trials that are shown together.
+
+    Raises:
+        TypeError: one is something else.
+        ValueError: there is none, or they are in different arenas.
+    """
+    listed = [trials] if isinstance(trials, MovingTrial) else list(trials)
+    if not listed:
+        raise ValueError("No trial to show, expected at least one.")
+    for trial in listed:
+        if not isinstance(trial, MovingTrial):
+            raise TypeError(
+                f"A trial to show is a {type(trial).__name__}, expected a MovingTrial: realitygap.playback.in_motion("
+                "trajectory, arena, robot) makes one."
+            )
+    first = listed[0].arena
+    for trial in listed[1:]:
+        if (trial.arena.walls, trial.arena.grid) != (first.walls, first.grid):
+            raise ValueError(
+                f"{trial.title} is in the arena {trial.arena.name!r}, {listed[0].title} in {first.name!r}: trials "
+                "that are shown together need one arena. Show them in pictures of their own."
+            )
+    return listed
+
+
+def first_visits(
+    poses: NDArray[np.float64], grid: Grid
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """When a trial comes to its cells, counted as the trial itself counts them.
+
+    Args:
+        poses: (t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start.
+        grid: The reachable cells.
+
+    Returns:
+        (n,) cells along the line in order of first visit, columns * row + column; (n,) the step at whose end
+        each has been visited, 0 for the start; (m,) the same of cells in which steps end.
+    """
+    shape = (grid.columns, grid.rows)
+    along, at_ends = np.zeros((2, grid.n_cells), np.bool_)
+    order, order_ends = np.zeros((2, grid.n_cells), np.uint8)
+    at = [(to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell)) for x, y, _ in poses.tolist()]
+    n, n_ends = [0] * len(at), [0] * len(at)
+    for step, (u, v) in enumerate(at):
+        column, row = int(np.floor(u)), int(np.floor(v))
+        if step == 0:
+            n[0] = visit(column, row, *shape, along, order, 0)
+            n_ends[0] = visit(column, row, *shape, at_ends, order_ends, 0)
+        elif at[step] == at[step - 1]:
+            n[step], n_ends[step] = n[step - 1], n_ends[step - 1]
+        else:
+            u0, v0 = at[step - 1]
+            n[step] = visit_line(u0, v0, u, v, *shape, along, order, n[step - 1])
+            n_ends[step] = visit(column, row, *shape, at_ends, order_ends, n_ends[step - 1])
+    steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))
+    return order[: n[-1]].astype(np.int64), steps, end_steps
+
+
+def placed(points: Sequence[tuple[float, float]], pose: tuple[float, float, float]) -> NDArray[np.float64]:
+    """(n, 2) points of the robot, forward and left [m], as x and y in the arena [m]."""
+    x, y, heading = pose
+    sine, cosine = math.sin(heading), math.cos(heading)
+    turned: NDArray[np.float64] = np.asarray(points, np.float64) @ np.array([[cosine, sine], [-sine, cosine]])
+    turned += (x, y)
+    return turned
+
+
+def ray_ends(shape: RobotShape, moment: Moment) -> NDArray[np.float64]:
+    """(s, 2, 2) where each ray begins and ends [m]."""
+    x, y, heading = moment.pose
+    ends: list[Any] = []
+    starts = placed([(forward, left) for forward, left, _ in shape.mounts], (x, y, heading))
+    for start, (_, _, direction), length in zip(starts, shape.mounts, moment.rays, strict=True):
+        angle = heading + direction
+        ends.append([start, start + length * np.array([math.cos(angle), math.sin(angle)])])
+    return np.array(ends, np.float64).reshape(-1, 2, 2)
+
+
+def nearness(shape: RobotShape, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(s,) how near what each sensor sees is: 0 nothing within its reach, 1 touching."""
+    reach = np.array(shape.reach, np.float64)
+    return np.clip(1.0 - np.nan_to_num(lengths, nan=np.inf) / reach, 0.0, 1.0)

@@ -1,0 +1,364 @@
+"""The picture of one moment: an arena in which robots leave trails, with what they see and have visited."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.drawing import PENS, Ink
+from realitygap.world import Arena
+
+from ._moving import Moment, MovingTrial, nearness, placed, ray_ends
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+DOTS = 100
+"""Per inch; all sizes here are for a picture of 8 in, and grow and shrink with it."""
+
+LABEL_COLORS = {"SIM": Ink.OURS, "TWIN": Ink.PEN3, "EMULATED": Ink.PEN5, "REAL": Ink.REACH}
+LETTERS = "ABCDEFGH"
+"""Of the pens, as on the page of a report."""
+
+MOST_TRIALS = len(LETTERS)
+"""Shown together: one a pen."""
+
+FAR, MIDDLE, NEAR = "#a9b4c2", "#e39a1b", "#c2182b"
+"""Of a ray, by how near what it meets is."""
+
+TILE, TILE_VISITED, TILE_OFTEN = "#f3f5f8", "#cfe0f1", "#7fb0dd"
+"""A cell that nobody visited, one visited by the only robot or by one of several, and by all of several."""
+
+_EDGE, _HEAD, _FOOT, _ROW = 0.12, 0.36, 0.26, 0.21
+_ACROSS = 4
+"""Names side by side below the arena."""
+
+_FAN = 0.045
+"""How far from a robot's middle its letter stands where several robots stand on one spot [m]."""
+
+
+_DOT = 1e-4
+"""A line so short is a dot [m]."""
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Red, green and blue, 0 to 255, of #rrggbb."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def paler(color: str, share: float) -> tuple[int, int, int]:
+    """A color, 0 to 255, of which only a share covers the ground."""
+    red, green, blue = (round(255 * part) for part in _mixed(Ink.GROUND, color, share))
+    return red, green, blue
+
+
+def _mixed(one: str, other: str, share: float) -> tuple[float, float, float]:
+    """A color between two, 0 to 1."""
+    red, green, blue = (
+        (first + share * (second - first)) / 255 for first, second in zip(rgb(one), rgb(other), strict=True)
+    )
+    return red, green, blue
+
+
+def ray_color(near: float) -> tuple[float, float, float]:
+    """The color of a ray that meets something as near as this, 0 (nothing) to 1 (touching)."""
+    if near <= 0:
+        return _mixed(FAR, FAR, 0.0)
+    return _mixed(FAR, MIDDLE, 2 * near) if near < 0.5 else _mixed(MIDDLE, NEAR, 2 * near - 1)
+
+
+@contextmanager
+def plain_style() -> Iterator[None]:
+    """Draw with matplotlib's own settings, whatever the user's are, in the font that comes with it."""
+    import matplotlib as mpl
+
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update({"font.family": ["DejaVu Sans"], "text.parse_math": False})
+        yield
+
+
+class Screen:
+    """Draws moments of trials as pictures of one size; use under `plain_style`.
+
+    What stands still is drawn once, and what moves over it.
+
+    Args:
+        trials: at most eight, in one arena.
+        width: of the pictures [px].
+        title: in the head; the first trial's own where there is one trial.
+    """
+
+    def __init__(self, trials: Sequence[MovingTrial], width: int, title: str = "") -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self.trials = trials
+        self.n_steps = max(trial.n_steps for trial in trials)
+        self.duration_s = max(trial.duration_s for trial in trials)
+        self._several = len(trials) > 1
+        self._title = title or (trials[0].title if len(trials) == 1 else f"{len(trials)} trials")
+        left, right, bottom, top = extent(trials[0].arena)
+        rows = math.ceil(len(trials) / _ACROSS) if self._several else 0
+        across = 8.0 - 2 * _EDGE
+        up = across * (top - bottom) / (right - left)
+        height = _HEAD + up + _ROW * rows + _FOOT + 0.02
+        dots = width / 8.0
+        pixels = [2 * round(width / 2), 2 * round(height * dots / 2)]  # video wants even numbers
+        self._figure = Figure(figsize=(pixels[0] / dots, pixels[1] / dots), dpi=dots, facecolor=Ink.GROUND)
+        canvas: Any = FigureCanvasAgg(self._figure)
+        self._canvas = canvas
+        height = pixels[1] / dots
+        self._all: Any = self._figure.add_axes((0, 0, 1, 1))
+        self._all.set(xlim=(0, 8.0), ylim=(height, 0))
+        self._all.set_axis_off()
+        box = (_EDGE / 8, 1 - (_HEAD + up) / height, across / 8, up / height)
+        self._field: Any = self._figure.add_axes(box)
+        self._field.set(xlim=(left, right), ylim=(bottom, top))
+        self._field.set_axis_off()
+        self._moving: list[tuple[Any, Any]] = []
+        self._draw_arena(trials[0].arena)
+        self._draw_head()
+        self._robots = [_Robot(trial, pen, several=self._several) for pen, trial in enumerate(trials)]
+        for layer in zip(*(robot.artists for robot in self._robots), strict=True):
+            for artist in layer:
+                self._add(self._field, artist)
+        self._draw_names(_HEAD + up + 0.06)
+        self._draw_foot(height - _FOOT + 0.02)
+        canvas.draw()
+        self._ground = canvas.copy_from_bbox(self._figure.bbox)
+
+    def picture(self, time: float) -> Image:
+        """The moment at a time since the start [s]."""
+        from PIL import Image
+
+        moments = [trial.at(time) for trial in self.trials]
+        self._move_cells(moments)
+        for robot, trial, moment in zip(self._robots, self.trials, moments, strict=True):
+            robot.move(trial, moment)
+        self._move_letters(moments)
+        self._move_words(time, moments)
+        self._canvas.restore_region(self._ground)
+        for axes, artist in self._moving:
+            axes.draw_artist(artist)
+        return Image.fromarray(np.asarray(self._canvas.buffer_rgba())[..., :3].copy())
+
+    # --- what stands still --------------------------------------------------------------------------------
+
+    def _draw_arena(self, arena: Arena) -> None:
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        grid, gap = arena.grid, 0.035 * arena.grid.cell
+        tiles = []
+        for cell in range(grid.n_cells):
+            row, column = divmod(cell, grid.columns)
+            x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
+            tiles.append([(x + dx, y + dy) for dx in (gap, grid.cell - gap) for dy in (gap, grid.cell - gap)])
+        corners = np.array(tiles)[:, [0, 1, 3, 2]]
+        self._tiles = PolyCollection(list(corners), linewidths=0)
+        self._add(self._field, self._tiles)
+        walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in arena.walls]
+        self._field.add_artist(
+            LineCollection(walls, colors=Ink.TEXT, linewidths=3.2, capstyle="projecting", clip_on=False)
+        )
+
+    def _draw_head(self) -> None:
+        x = _EDGE
+        for label in dict.fromkeys(trial.label for trial in self.trials):
+            badge = self._all.text(
+                x + 0.07,
+                _HEAD / 2 + 0.01,
+                label,
+                fontsize=8.5,
+                weight="bold",
+                color=Ink.GROUND,
+                va="center_baseline",
+                bbox={
+                    "boxstyle": "round,pad=0.32",
+                    "facecolor": LABEL_COLORS.get(label, Ink.MUTED),
+                    "edgecolor": "none",
+                },
+            )
+            box = badge.get_window_extent(self._canvas.get_renderer())
+            x = box.x1 / self._figure.dpi + 0.2
+        self._all.text(
+            x, _HEAD / 2 + 0.01, self._title, fontsize=10, weight="bold", color=Ink.TEXT, va="center_baseline"
+        )
+        self._clock = self._all.text(
+            8.0 - _EDGE, _HEAD / 2 + 0.01, "", fontsize=9.5, color=Ink.MUTED, ha="right", va="center_baseline"
+        )
+        self._add(self._all, self._clock)
+
+    def _draw_names(self, top: float) -> None:
+        """Below the arena: letter, pen and name of each trial, and the coverage that it has come to."""
+        self._words: list[Any] = []
+        if not self._several:
+            return
+        wide = (8.0 - 2 * _EDGE) / _ACROSS
+        for pen, trial in enumerate(self.trials):
+            x, y = _EDGE + wide * (pen % _ACROSS), top + _ROW * (pen // _ACROSS) + 0.09
+            color, dashes = PENS[pen]
+            self._all.plot([x, x + 0.28], [y, y], color=color, lw=2.0, dashes=dashes or (1, 0))
+            name = f"{LETTERS[pen]}  {_short(trial.title, 16)}"
+            self._all.text(x + 0.36, y, name, fontsize=8.2, color=Ink.TEXT, va="center_baseline")
+            word = self._all.text(
+                x + wide - 0.14, y, "", fontsize=8.2, color=Ink.MUTED, ha="right", va="center_baseline"
+            )
+            self._words.append(word)
+            self._add(self._all, word)
+
+    def _draw_foot(self, top: float) -> None:
+        """A line that fills as time goes by, and what the colors of rays mean."""
+        from matplotlib.collections import LineCollection
+
+        y = top + 0.1
+        has_rays = any(trial.shape.mounts and np.isfinite(trial.rays).any() for trial in self.trials)
+        right = 8.0 - _EDGE
+        if has_rays:
+            xs = np.linspace(right - 0.84, right - 0.36, 17)
+            pieces = [[(x, y), (onward, y)] for x, onward in itertools.pairwise(xs)]
+            colors = [ray_color((k + 0.5) / len(pieces)) for k in range(len(pieces))]
+            self._all.add_artist(LineCollection(pieces, colors=colors, linewidths=3.0))
+            for x, text in ((right, "near"), (right - 0.9, "rays: far")):
+                self._all.text(x, y, text, fontsize=7.5, color=Ink.MUTED, ha="right", va="center_baseline")
+            right -= 1.65
+        self._bar = (_EDGE, right)
+        self._all.plot([_EDGE, right], [y, y], color=Ink.RULE, lw=2.4, solid_capstyle="round")
+        (self._progress,) = self._all.plot([], [], color=Ink.OURS, lw=2.4, solid_capstyle="round")
+        self._bar_y = y
+        self._add(self._all, self._progress)
+
+    # --- what moves ---------------------------------------------------------------------------------------
+
+    def _add(self, axes: Any, artist: Any) -> Any:
+        artist.set_animated(True)
+        if artist.axes is None:
+            axes.add_artist(artist)
+        self._moving.append((axes, artist))
+        return artist
+
+    def _move_cells(self, moments: Sequence[Moment]) -> None:
+        visits = np.zeros(self.trials[0].arena.grid.n_cells)
+        for trial, moment in zip(self.trials, moments, strict=True):
+            visits[list(trial.cells[: moment.n_cells])] += 1.0
+        most = max(len(self.trials) - 1, 1)
+        self._tiles.set_facecolor(
+            [_mixed(TILE_VISITED, TILE_OFTEN, (n - 1) / most) if n else _mixed(TILE, TILE, 0) for n in visits]
+        )
+
+    def _move_letters(self, moments: Sequence[Moment]) -> None:
+        """Letters stand on the robots, and around the spot where several robots stand on one."""
+        places = np.array([moment.pose[:2] for moment in moments])
+        for pen, robot in enumerate(self._robots):
+            crowd = np.hypot(*(places - places[pen]).T) < _FAN
+            angle = math.pi / 2 - math.tau * pen / len(self._robots)
+            away = _FAN if crowd.sum() > 1 else 0.0
+            robot.move_letter(places[pen] + away * np.array([math.cos(angle), math.sin(angle)]))
+
+    def _move_words(self, time: float, moments: Sequence[Moment]) -> None:
+        n_cells = self.trials[0].arena.grid.n_cells
+        for word, moment in zip(self._words, moments, strict=False):
+            blocked = "× " if moment.stalled else ""
+            word.set_text(f"{blocked}{moment.n_cells / n_cells:.3f}".replace("0.", ".", 1))
+            word.set_color(Ink.REACH if moment.stalled else Ink.MUTED)
+        step = max(moment.step for moment in moments)
+        parts = [f"step {step} of {self.n_steps}", f"{min(time, self.duration_s):.1f} s"]
+        if not self._several:
+            parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}".replace("0.", ".", 1))
+            if moments[0].stalled:
+                parts.insert(0, "× blocked")
+        self._clock.set_text(" · ".join(parts))
+        left, right = self._bar
+        share = min(time / self.duration_s, 1.0) if self.duration_s else 1.0
+        self._progress.set_data([left, left + share * (right - left)], [self._bar_y] * 2)
+
+
+class _Robot:
+    """The artists of one robot: trail, places where it was blocked, rays, outline, nose and letter."""
+
+    def __init__(self, trial: MovingTrial, pen: int, *, several: bool) -> None:
+        from matplotlib.collections import LineCollection, PolyCollection
+        from matplotlib.lines import Line2D
+        from matplotlib.text import Text
+
+        color, dashes = PENS[pen] if several else (Ink.OURS, ())
+        width = 2.0
+        self._color = color
+        self._blocked_color = color if several else Ink.REACH
+        self._front = trial.shape.front
+        self._trail = Line2D([], [], color=color, lw=width, zorder=4, dash_capstyle="butt")
+        if dashes:
+            self._trail.set_dashes([0.8 * part for part in dashes])
+        self._trail.set_solid_joinstyle("round")
+        self._blocked = Line2D(
+            [],
+            [],
+            ls="",
+            marker="x",
+            color=Ink.REACH,
+            markersize=4.0 if several else 5.5,
+            markeredgewidth=1.1 if several else 1.5,
+        )
+        self._rays = LineCollection([], linewidths=1.3 if several else 1.8, capstyle="round")
+        self._hits = LineCollection([], linewidths=3.6 if several else 5.5, capstyle="round")
+        self._body = PolyCollection([], linewidths=1.5 if several else 1.8, edgecolors=color)
+        self._body.set_facecolor("none" if several else (*_mixed(Ink.GROUND, color, 0.3), 0.5))
+        self._nose = Line2D([], [], color=color, lw=1.8, solid_joinstyle="round", solid_capstyle="round")
+        self._letter = Text(
+            0, 0, LETTERS[pen] if several else "", fontsize=8.5, weight="bold", color=Ink.GROUND
+        )
+        self._letter.set(ha="center", va="center_baseline")
+        self._letter.set_bbox({"boxstyle": "circle,pad=0.22", "facecolor": color, "edgecolor": Ink.GROUND})
+        self.artists: list[Any] = [self._trail, self._body, self._blocked, self._rays, self._hits, self._nose]
+        if several:
+            self.artists.append(self._letter)
+
+    def move(self, trial: MovingTrial, moment: Moment) -> None:
+        """Put it where it is at a moment."""
+        driven = np.vstack([trial.poses[: moment.row + 1, :2], moment.pose[:2]])
+        self._trail.set_data(driven[:, 0], driven[:, 1])
+        blocked = trial.poses[: moment.row + 1][trial.stalled[: moment.row + 1], :2]
+        self._blocked.set_data(blocked[:, 0], blocked[:, 1])
+        self._move_rays(trial, moment)
+        self._body.set_verts([placed(outline, moment.pose) for outline in trial.shape.outlines])
+        self._body.set_edgecolor(self._blocked_color if moment.stalled else self._color)
+        self._body.set_linestyle((0, (2.0, 1.0)) if moment.stalled else "solid")
+        nose = [(0.55 * self._front, 0.28 * self._front), (0.85 * self._front, 0.0)]
+        nose.append((nose[0][0], -nose[0][1]))
+        tip = placed(nose, moment.pose)
+        self._nose.set_data(tip[:, 0], tip[:, 1])
+        self._nose.set_color(self._blocked_color if moment.stalled else self._color)
+
+    def _move_rays(self, trial: MovingTrial, moment: Moment) -> None:
+        known = np.isfinite(moment.rays)
+        near = nearness(trial.shape, moment.rays)
+        ends: NDArray[np.float64] = ray_ends(trial.shape, moment)
+        colors = [ray_color(float(share)) for share in near]
+        self._rays.set_segments(list(ends[known]))
+        self._rays.set_color([color for color, there in zip(colors, known, strict=True) if there])
+        meets = known & (near > 0)
+        self._hits.set_segments([[end, end + _DOT] for end in ends[meets, 1]])
+        self._hits.set_color([color for color, there in zip(colors, meets, strict=True) if there])
+
+    def move_letter(self, place: NDArray[np.float64]) -> None:
+        """Put its letter at a place in the arena [m]."""
+        self._letter.set_position((float(place[0]), float(place[1])))
+
+
+def extent(arena: Arena) -> tuple[float, float, float, float]:
+    """Left, right, lower and upper end of what is shown of an arena [m]."""
+    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
+    margin = 0.012 * float(np.ptp(walls[:, [0, 2]]))
+    xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
+    return xs.min() - margin, xs.max() + margin, ys.min() - margin, ys.max() + margin
+
+
+def _short(text: str, n_letters: int) -> str:
+    plain = "".join(letter if letter.isprintable() else " " for letter in text)
+    return plain if len(plain) <= n_letters else plain[: n_letters - 1] + "…"

@@ -1,0 +1,379 @@
+"""One network on two platforms, side by side, and how far they come apart."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from realitygap.drawing import Ink
+from realitygap.errors import did_you_mean, whole_number
+from realitygap.evolution import Genome
+from realitygap.playback import Divergence, MovingTrial, in_motion, measure_divergence, own_divergence
+from realitygap.playback._moving import placed, ray_ends
+from realitygap.records import ResultsFolder, refuse_results
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    draw_line,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.report._driven import refuse_replay
+from realitygap.report._formats import captioned, check_ending, save_drawing
+from realitygap.report._path_figure import arena_extent, draw_arena
+from realitygap.report._tally import Tally, read_tally, settings_of
+from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.runs import Condition, genome_of
+from realitygap.trials import NoiseKey, trace_genome
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLORS = (Ink.OURS, Ink.PUBLISHED)
+_DASHES: tuple[Any, Any] = ("solid", (0, (5, 1.5)))
+"""Of the two platforms."""
+
+_GHOSTS = 7
+"""Robots drawn along a path."""
+
+_MOST_TRAILS = 30
+"""Repeats whose paths are drawn; more would be a blot."""
+
+PLATFORMS = ("jyro",)
+"""That a network can be tried on beside its own, with their defaults."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two platforms.
+
+    Attributes:
+        name: what to call it.
+        trials: repeats of one network on it, each on noise of its own; the first is drawn with its robot.
+    """
+
+    name: str
+    trials: tuple[MovingTrial, ...]
+
+
+def save_divergence(
+    results: ResultsFolder | str | Path,
+    path: str | Path,
+    *,
+    against: str,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    repeats: int = 30,
+) -> Path:
+    """Draw one network's trials beside its trials elsewhere, and how far they come apart, into a file.
+
+    Args:
+        results: the results of a study, or the path to them.
+        path: ends in .svg, .pdf or .png; a file that is there gives way.
+        against: what the network is tried on beside its own condition: another condition of the study, or a platform
+            with its defaults.
+        condition: whose network it is; the first one when not given.
+        replicate: of which run; the typical one when not given.
+        generation: of the run; that of its best trial when not given.
+        individual: of the generation; the one of highest coverage when not given.
+        repeats: trials on each side, each on fresh noise, 2 to 1000.
+
+    Returns:
+        The path.
+
+    Raises:
+        RecordError: there are no such results, or a robot drove one of the two; or the file cannot be written.
+        ValueError: there is no such trial, condition, platform or ending, or the number of repeats is out of range.
+    """
+    path = Path(path)
+    check_ending(path, (".pdf", ".png", ".svg"))
+    refuse_results(path)
+    sides = compare_trials(
+        results,
+        against=against,
+        condition=condition,
+        replicate=replicate,
+        generation=generation,
+        individual=individual,
+        repeats=repeats,
+    )
+    title = f"{sides[0].name} and {sides[1].name}"
+    return save_drawing(captioned(draw_divergence(*sides), "divergence"), path, title=title)
+
+
+def compare_trials(
+    results: ResultsFolder | str | Path,
+    *,
+    against: str,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    repeats: int = 30,
+) -> tuple[Side, Side]:
+    """One network tried again on its own platform and elsewhere, each time on noise of its own.
+
+    Arguments and errors as in `save_divergence`.
+    """
+    whole_number("repeats", repeats, 2, 1000)
+    tally = read_tally(results)
+    trial = choose_trial(tally, condition, replicate, generation, individual)
+    other = _beside(tally, trial.condition, against)
+    for each in (trial.condition, other):
+        if each.is_physical:
+            raise refuse_replay(each.name)
+    genome = genome_of(trial.condition, trial.row)
+    return (
+        _try_again(trial, trial.condition, trial.condition.name, genome, repeats),
+        _try_again(trial, other, against, genome, repeats),
+    )
+
+
+def _beside(tally: Tally, own: Condition, against: str) -> Condition:
+    """What the network is tried on for comparison."""
+    names = [condition["name"] for condition in tally.conditions]
+    if against in names:
+        return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
+    if against in PLATFORMS:
+        fresh = Condition(name=own.name)
+        return own.model_copy(update={"platform": against, against: getattr(fresh, against)})
+    raise ValueError(
+        f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
+    )
+
+
+def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, repeats: int) -> Side:
+    row, arena = trial.row, trial.condition.arena.arena()
+    key = NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"])
+    trials = []
+    for repeat in range(1, repeats + 1):
+        trajectory = trace_genome(
+            on.tried_on,  # type: ignore[arg-type]  # a robot was refused
+            arena,
+            genome,
+            noise=on.noise,
+            noise_key=replace(key, repeat=repeat),
+        )
+        trials.append(in_motion(trajectory, arena, on.tried_on, title=name, label=on.label))
+    return Side(name, tuple(trials))
+
+
+# --- drawing ------------------------------------------------------------------------------------------------
+
+
+def draw_divergence(one: Side, other: Side, *, width: float = WIDE) -> Drawing:
+    """Trials of one network on two platforms, side by side, and how far they come apart step by step.
+
+    Args:
+        one, other: as many repeats of both; repeat k of the one is compared with repeat k + 1 of the other, so that
+            the two never drew the same noise, and the comparison is fair to that of repeats on one platform.
+        width: of the figure [in].
+
+    Raises:
+        ValueError: there are more repeats of the one than of the other, or fewer than two.
+    """
+    between = measure_divergence(one.trials, [*other.trials[1:], other.trials[0]])
+    within = tuple(own_divergence(side.trials) for side in (one, other))
+    n, last = between.n_pairs, between.n_steps
+    distance, turned = (values[:, last].mean() for values in (between.distance, between.heading))
+    own = [float(each.distance[:, last].mean()) for each in within]
+    labels = " and ".join(dict.fromkeys(side.trials[0].label for side in (one, other)))
+    steps = " and ".join(
+        f"{side.trials[0].n_steps} steps of {side.trials[0].step_s:g} s ({side.name})"
+        for side in (one, other)
+    )
+    shown = f" of the first {_MOST_TRAILS} repeats" if n > _MOST_TRAILS else ""
+    caption = (
+        f"One network, tried {n} times on {one.name} and {n} times on {other.name}, each on noise of its own; "
+        f"{labels}, {steps}. Above: all paths{shown}; the first "
+        "with its robot, what it sees and the cells that it visits. Below: how far repeat k on the one is from repeat "
+        f"k + 1 on the other after each step, mean and 10th to 90th percentile of n = {n}; thin lines: what noise "
+        f"alone does, the mean between repeat k and k + 1 on one platform. After {last} steps {distance:.2f} m apart, "
+        f"{own[0]:.2f} m on {one.name} alone and {own[1]:.2f} m on {other.name} alone; headings differ by "
+        f"{turned:.2f} rad (unrelated ones by 1.57 on average)."
+    )
+    alt = (
+        f"Paths of one network on {one.name} and on {other.name}, and curves of the distance and of the difference in "
+        f"heading between them, which rise to {distance:.2f} m and {turned:.2f} rad on average."
+    )
+    with house_style():
+        figure = _draw((one, other), between, within, width)
+        return Drawing(to_svg(figure, "divergence", alt), caption, alt, figure)
+
+
+def _draw(
+    sides: tuple[Side, Side], between: Divergence, within: tuple[Divergence, ...], width: float
+) -> Figure:
+    arena = sides[0].trials[0].arena
+    x_range, y_range = arena_extent(arena)
+    gap, head, foot = 0.3, 0.34, 0.42
+    across = (width - gap - 0.06) / 2
+    up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
+    curve = 1.35
+    figure = new_figure(width, head + up + 0.46 + curve + foot)
+    for k, side in enumerate(sides):
+        axes = place_axes(figure, 0.03 + k * (across + gap), head, across, up)
+        draw_arena(axes, side.trials[0].arena, x_range, y_range)
+        _draw_side(axes, side, _COLORS[k])
+    left = 0.52
+    wide = (width - 0.06 - gap) / 2 - left + 0.03
+    for k, (name, unit) in enumerate((("distance", "apart [m]"), ("heading", "headings apart [rad]"))):
+        axes = place_axes(figure, left + k * (across + gap), head + up + 0.46, wide, curve)
+        _draw_curves(axes, sides, between, within, name)
+        axes.set_ylabel(unit, labelpad=3)
+    return figure
+
+
+def _draw_side(axes: Axes, side: Side, color: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    first = side.trials[0]
+    grid = first.arena.grid
+    for cell in first.cells:
+        row, column = divmod(cell, grid.columns)
+        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
+        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+    for trial in side.trials[1:_MOST_TRAILS]:
+        draw_line(
+            axes, trial.poses[:, 0], trial.poses[:, 1], color=color, linewidth=0.5, alpha=0.22, zorder=4
+        )
+    draw_line(
+        axes,
+        first.poses[:, 0],
+        first.poses[:, 1],
+        color=color,
+        linewidth=1.7,
+        zorder=6,
+        solid_joinstyle="round",
+    )
+    rows = np.unique(np.linspace(0, len(first.poses) - 1, _GHOSTS).round().astype(int))
+    for row in rows:
+        _draw_robot(axes, first, int(row), color, strong=row == rows[-1])
+    ends = np.array([trial.poses[-1, :2] for trial in side.trials])
+    draw_line(
+        axes,
+        ends[1:, 0],
+        ends[1:, 1],
+        marker="o",
+        linestyle="",
+        color=color,
+        markersize=2.2,
+        alpha=0.7,
+        markeredgewidth=0,
+        zorder=7,
+    )
+    _write_head(axes, side, color)
+
+
+def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong: bool) -> None:
+    moment = trial.at(row / trial.parts * trial.step_s)
+    for outline in trial.shape.outlines:
+        corners = placed([*outline, outline[0]], moment.pose)
+        draw_line(
+            axes,
+            corners[:, 0],
+            corners[:, 1],
+            color=color if strong else Ink.BODY,
+            linewidth=1.6 if strong else 0.6,
+            zorder=8 if strong else 5,
+        )
+    if not strong:
+        return
+    for (x1, y1), (x2, y2) in ray_ends(trial.shape, moment):
+        draw_line(axes, [x1, x2], [y1, y2], color=Ink.RUN, linewidth=0.9, linestyle=(0, (3, 1.5)), zorder=8)
+    front = trial.shape.front
+    nose = placed([(0.5 * front, 0.3 * front), (0.85 * front, 0.0), (0.5 * front, -0.3 * front)], moment.pose)
+    draw_line(axes, nose[:, 0], nose[:, 1], color=color, linewidth=1.4, zorder=8)
+
+
+def _write_head(axes: Axes, side: Side, color: str) -> None:
+    n_cells = side.trials[0].arena.grid.n_cells
+    mean = np.mean([len(trial.cells) for trial in side.trials]) / n_cells
+    for x, text, align, ink, weight in (
+        (0.0, shorten(side.name, 30), "left", color, "bold"),
+        (
+            1.0,
+            f"{side.trials[0].label}, n = {len(side.trials)}, mean coverage {mean:.2f}",
+            "right",
+            Ink.MUTED,
+            "normal",
+        ),
+    ):
+        axes.annotate(
+            text,
+            (x, 1.0),
+            (0, 5),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=9.5 if weight == "bold" else 8.0,
+            weight=weight,
+            color=ink,
+            annotation_clip=False,
+        )
+
+
+def _draw_curves(
+    axes: Axes, sides: tuple[Side, Side], between: Divergence, within: tuple[Divergence, ...], name: str
+) -> None:
+    values: npt.NDArray[np.float64] = getattr(between, name)
+    steps = np.arange(values.shape[1])
+    low, high = np.percentile(values, [10, 90], axis=0)
+    axes.fill_between(steps, low, high, color=Ink.BAND, alpha=0.55, linewidth=0)
+    axes.plot(steps, values.mean(axis=0), color=Ink.TEXT, linewidth=1.8)
+    for own, color, dashes in zip(within, _COLORS, _DASHES, strict=True):
+        mean = getattr(own, name).mean(axis=0)
+        axes.plot(np.arange(len(mean)), mean, color=color, linewidth=1.0, linestyle=dashes)
+    top = math.pi if name == "heading" else 1.08 * max(float(high.max()), 0.02)
+    axes.set_ylim(0, top)
+    axes.set_xlim(0, steps[-1])
+    if name == "heading":
+        axes.set_yticks([0, math.pi / 2, math.pi], ["0", "π/2", "π"])
+        axes.axhline(math.pi / 2, color=Ink.RULE, linewidth=0.8, zorder=0)
+    axes.set_xlabel("step", labelpad=2)
+    if name == "distance":
+        _legend(axes, sides)
+
+
+def _legend(axes: Axes, sides: tuple[Side, Side]) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Any] = [
+        Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="between the two"),
+        Patch(facecolor=Ink.BAND, alpha=0.55, label="10th to 90th percentile"),
+    ]
+    handles += [
+        Line2D(
+            [],
+            [],
+            color=color,
+            linestyle=dashes,
+            linewidth=1.0,
+            label=f"{shorten(side.name, 16)}, noise alone",
+        )
+        for side, color, dashes in zip(sides, _COLORS, _DASHES, strict=True)
+    ]
+    axes.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.03),
+        ncols=4,
+        frameon=False,
+        fontsize=7.5,
+        handlelength=1.8,
+        borderaxespad=0.1,
+        columnspacing=2.2,
+    )

@@ -1,0 +1,256 @@
+"""Trials of results in motion: recomputed from their rows, or as an emulator's witness saw them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+import polars as pl
+
+from realitygap.errors import RecordError, did_you_mean
+from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in_motion, play, save_movie
+from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
+from realitygap.report._driven import driven_paths, refuse_replay
+from realitygap.report._path_figure import no_such_run, typical_replicate
+from realitygap.report._tally import Tally, read_tally
+from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.robots import Robot
+from realitygap.runs import replay
+from realitygap.trials import PATH_PARTS
+
+Each = Literal["individual", "generation", "condition"]
+"""Of what several trials are shown: each individual of a generation, the best of each generation or condition."""
+
+Results = ResultsFolder | str | Path
+
+_SURPLUS: dict[Each, tuple[str, ...]] = {
+    "individual": ("individual",),
+    "generation": ("generation", "individual"),
+    "condition": ("condition", "generation", "individual"),
+}
+"""Which numbers mean nothing where several trials are shown."""
+
+_MIXED = "Results and trials are given together, expected the ones or the others."
+
+_MOST = 8
+"""Trials shown together."""
+
+
+def write_movie(
+    results: Results | MovingTrial | Iterable[Results | MovingTrial],
+    path: str | Path,
+    *,
+    each: Each | None = None,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    speed: float = 1.0,
+    width: int = WIDTH,
+) -> Path:
+    """Write trials in motion as GIF or MP4: rays, trails in the pens' colors, and the cells that they visit.
+
+    Args:
+        results: the results of a study, or the path to them; or several, of each of which one trial is shown, or
+            trials that `realitygap.playback.in_motion` made.
+        path: ends in .gif or .mp4; a file that is there gives way once the new one is complete.
+        each: show several trials: each individual of a generation (the first eight), the best one of each generation,
+            or of each condition. Not given: one trial of each results.
+        condition: of which; the first one when not given.
+        replicate: which run; the typical one when not given, whose best coverage is the median.
+        generation: of the run; that of its best trial when not given.
+        individual: of the generation; the one of highest coverage when not given.
+        speed: 1 is as fast as it was; 2 is twice as fast.
+        width: of the pictures [px].
+
+    Returns:
+        The path.
+
+    Raises:
+        RealityGapError: for an .mp4 there is no ffmpeg.
+        RecordError: results are damaged or hold no trials yet, a trial comes out otherwise than recorded, or what a
+            robot drove was not seen; or the file cannot be written.
+        TypeError: a number is not whole, or something else than results or trials is given.
+        ValueError: there is no such trial or ending; speed or width is out of range; the arenas differ.
+    """
+    path = Path(path)
+    refuse_results(path)
+    many = _listed(results)
+    ready = [one for one in many if isinstance(one, MovingTrial)]
+    if ready and len(ready) < len(many):
+        raise TypeError(_MIXED)
+    if ready:
+        return save_movie(ready, path, speed=speed, width=width)
+    folders = [one for one in many if not isinstance(one, MovingTrial)]
+    title, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    return save_movie(trials, path, speed=speed, title=title, width=width)
+
+
+def choose_moving(
+    folders: Sequence[Results],
+    each: Each | None = None,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+) -> tuple[str, list[MovingTrial]]:
+    """Trials by their numbers, and what to call them together; arguments as in `write_movie`."""
+    if each is not None and each not in get_args(Each):
+        raise ValueError(f"Unknown each {each!r}. {did_you_mean(each, list(get_args(Each)))}")
+    numbers = (condition, replicate, generation, individual)
+    if len(folders) != 1 and each is not None:
+        raise ValueError(
+            f"{len(folders)} results with each {each!r}, expected one: of several, one trial each is shown."
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", RecordWarning)
+        tallies = [read_tally(folder) for folder in folders]
+    if each is not None:
+        return _several(tallies[0], each, *numbers)
+    chosen = [(tally, choose_trial(tally, *numbers)) for tally in tallies]
+    if len(chosen) == 1:
+        (one,) = chosen
+        return one[1].title, [_moving(*one, one[1].title)]
+    return f"{len(chosen)} studies", [
+        _moving(tally, trial, str(tally.description.get("name", tally.folder.path.name)))
+        for tally, trial in chosen
+    ]
+
+
+def _several(
+    tally: Tally,
+    each: Each,
+    condition: str | None,
+    replicate: int | None,
+    generation: int | None,
+    individual: int | None,
+) -> tuple[str, list[MovingTrial]]:
+    given = {"condition": condition, "generation": generation, "individual": individual}
+    named = [name for name in _SURPLUS[each] if given[name] is not None]
+    if named:
+        raise ValueError(f"Of no meaning with each {each!r}: {', '.join(named)}. Leave that out.")
+    if each == "condition":
+        names = list(dict.fromkeys(tally.runs["condition"].to_list()))[:_MOST]
+        trials = [choose_trial(tally, name, replicate) for name in names]
+        study = str(tally.description.get("name", "study"))
+        return f"{study}: the best of each condition", [
+            _moving(tally, trial, trial.row["condition"]) for trial in trials
+        ]
+    name = tally.name_of(condition)
+    tally.condition(name)
+    replicate = typical_replicate(tally, name) if replicate is None else replicate
+    rows = tally.folder.read(name, [replicate])
+    if rows.is_empty():
+        raise ValueError(no_such_run(tally, name, replicate))
+    if each == "individual":
+        first = choose_trial(tally, name, replicate, generation)
+        generation = int(first.row["generation"])
+        count = rows.filter(pl.col("generation") == generation).height
+        trials = [choose_trial(tally, name, replicate, generation, k) for k in range(min(count, _MOST))]
+        title = f"{name}, run {replicate}, generation {generation}"
+    else:
+        last = int(rows["generation"].max())  # type: ignore[arg-type]
+        shown = np.unique(np.linspace(0, last, min(last + 1, _MOST)).round().astype(int)).tolist()
+        trials = [choose_trial(tally, name, replicate, k) for k in shown]
+        title = f"{name}, run {replicate}: the best of each generation"
+    return title, [_moving(tally, trial, f"{each} {trial.row[each]}") for trial in trials]
+
+
+def moving_trial(tally: Tally, trial: ChosenTrial) -> MovingTrial:
+    """A chosen trial made ready to be shown."""
+    return _moving(tally, trial, trial.title)
+
+
+def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
+    if trial.condition.is_physical:
+        return _driven(tally, trial, title)
+    condition = trial.condition
+    return in_motion(
+        replay(condition, trial.row),
+        condition.arena.arena(),
+        condition.simulated_on,
+        title=title,
+        label=condition.simulated_on.label,
+    )
+
+
+def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
+    """What the emulator's witness saw; of a robot on paper there is no more than cells.
+
+    Raises:
+        RecordError: nobody saw where it drove.
+    """
+    name, replicate = trial.condition.name, int(trial.row["replicate"])
+    which = (int(trial.row["generation"]), int(trial.row["individual"]))
+    poses = driven_paths(tally.folder, name, replicate).get(which)
+    if poses is None:
+        raise refuse_replay(name)
+    steps = _steps_of(tally, name, replicate, which)
+    robot = trial.condition.scribbler
+    shape, arena = RobotShape.of(robot), trial.condition.arena.arena()
+    n_rows = len(poses)
+    rays = np.full((n_rows, len(shape.mounts)), np.nan)
+    stalled = np.zeros(n_rows, np.bool_)
+    for k, step in enumerate(steps):
+        rows = slice(PATH_PARTS * k, PATH_PARTS * (k + 1))
+        if len(step.readings) == len(shape.mounts):
+            rays[rows] = (1.0 - np.array(step.readings)) * shape.reach
+        stalled[rows] = step.stalled
+    times = [step.time for step in steps]
+    step_s = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else robot.wait_s
+    return MovingTrial.of_rows(
+        title, trial.label, arena, shape, step_s, poses, rays, stalled, parts=PATH_PARTS
+    )
+
+
+def _steps_of(tally: Tally, name: str, replicate: int, which: tuple[int, int]) -> list[Step]:
+    with Ledger.open(tally.folder.path / LEDGER_NAME, writable=False) as ledger:
+        for trial in ledger.trials(name, replicate, states=["scored"]):
+            if (trial.generation, trial.individual) == which:
+                return ledger.steps(trial.trial)
+    raise RecordError(f"The ledger has no scored trial of generation {which[0]}, individual {which[1]}.")
+
+
+def watch(
+    what: Robot | Results | MovingTrial | Iterable[Results | MovingTrial],
+    *,
+    each: Each | None = None,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    speed: float = 1.0,
+) -> Any:
+    """Show trials, or a robot while it is used, below a notebook's cell.
+
+    Args:
+        what: results or trials, as in `write_movie`; or a robot, which is shown while the program drives it.
+        each, condition, replicate, generation, individual: which trials of results; see `write_movie`.
+        speed: to begin with: 0.25, 0.5, 1, 2, 4 or 8.
+
+    Returns:
+        A widget; of a robot a `realitygap.playback.WatchedRobot`, which is used in place of the robot.
+
+    Raises:
+        RealityGapError: anywidget is not there (the extra `notebook`).
+        RecordError: results are damaged or hold no trials yet, or a trial comes out otherwise than recorded.
+        ValueError: there is no such trial; the arenas differ; the speed is none of these.
+    """
+    if isinstance(what, Robot):
+        return WatchedRobot(what, speed=speed)
+    many = _listed(what)
+    ready = [one for one in many if isinstance(one, MovingTrial)]
+    if ready and len(ready) < len(many):
+        raise TypeError(_MIXED)
+    if ready:
+        return play(ready, speed=speed)
+    folders = [one for one in many if not isinstance(one, MovingTrial)]
+    title, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    return play(trials, title=title, speed=speed)
+
+
+def _listed(what: Results | MovingTrial | Iterable[Results | MovingTrial]) -> list[Results | MovingTrial]:
+    return [what] if isinstance(what, ResultsFolder | str | Path | MovingTrial) else list(what)

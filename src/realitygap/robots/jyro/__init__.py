@@ -1,0 +1,64 @@
+"""Jyro's world with all of its robots and devices, one step at a time: to teach with, and to try things out.
+
+A `JyroWorld` holds walls, boxes, lamps and robots; robots carry devices. Lengths in meters, headings in radians
+counter-clockwise from +x. The physics is that of `realitygap simulate` and compiled; devices are Python, and one of
+your own is a class of a few lines (`Device`). Studies with many trials use the platform `jyro` instead.
+"""
+
+from ._camera import Camera, Column, DepthCamera, LampSeen
+from ._device import Device, Edge, Mount
+from ._driven import DrivenRobot
+from ._gripper import Gripper
+from ._light import LightMode, LightSensor
+from ._mounted import MountedSensors
+from ._range import Bumper, RangeSensor
+from ._robot import SceneRobot
+from ._robots import Blimp, Pioneer, Puck, Scribbler
+from ._stock import (
+    MyroBumper,
+    MyroIR,
+    MyroLightSensors,
+    Pioneer4FrontLightSensors,
+    Pioneer4Sonars,
+    Pioneer16Sonars,
+    PioneerBackSonars,
+    PioneerFrontLightSensors,
+    PioneerFrontSonar,
+    PioneerFrontSonars,
+)
+from ._world import Area, JyroWorld, Lamp
+
+__all__ = [
+    "Area",
+    "Blimp",
+    "Bumper",
+    "Camera",
+    "Column",
+    "DepthCamera",
+    "Device",
+    "DrivenRobot",
+    "Edge",
+    "Gripper",
+    "JyroWorld",
+    "Lamp",
+    "LampSeen",
+    "LightMode",
+    "LightSensor",
+    "Mount",
+    "MountedSensors",
+    "MyroBumper",
+    "MyroIR",
+    "MyroLightSensors",
+    "Pioneer",
+    "Pioneer4FrontLightSensors",
+    "Pioneer4Sonars",
+    "Pioneer16Sonars",
+    "PioneerBackSonars",
+    "PioneerFrontLightSensors",
+    "PioneerFrontSonar",
+    "PioneerFrontSonars",
+    "Puck",
+    "RangeSensor",
+    "SceneRobot",
+    "Scribbler",
+]

@@ -1,0 +1,103 @@
+"""A robot of a `JyroWorld` under the contract that a physical one meets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from realitygap.errors import RobotError
+from realitygap.world import Pose
+
+from .._contract import Command, Label, Observation, check_command
+from ._range import RangeSensor
+from ._robot import SceneRobot
+
+
+class DrivenRobot:
+    """One robot of a world as a controller drives it; the others follow their brains or their last command.
+
+    | command | least | most | unit |
+    |---|---|---|---|
+    | move | -1 | 1 | `speed` |
+    | turn | -1 | 1 | `turn_rate`, to the left |
+
+    | observation | from 0 | to 1 | raw |
+    |---|---|---|---|
+    | each ray of the range sensors | nothing within range | touching | distance [m] |
+
+    Args:
+        robot: Which; it is in a world and has a range sensor.
+        sensors: Which of its range sensors are observed; all when not given.
+        speed: Of a full command [m/s].
+        turn_rate: Of a full command [rad/s].
+
+    Raises:
+        RobotError: It is in no world, or has no range sensor.
+    """
+
+    label: Label = "SIM"
+
+    def __init__(
+        self,
+        robot: SceneRobot,
+        sensors: Sequence[RangeSensor] | None = None,
+        *,
+        speed: float = 1.0,
+        turn_rate: float = 1.0,
+    ) -> None:
+        self.robot, self.world = robot, robot.world
+        self.speed, self.turn_rate = speed, turn_rate
+        given = robot.devices if sensors is None else sensors
+        self.sensors = [sensor for sensor in given if isinstance(sensor, RangeSensor)]
+        self.n_sensors = sum(len(sensor) for sensor in self.sensors)
+        self.step_s = self.world.step_s
+        self._is_open = True
+        if not self.n_sensors:
+            raise RobotError(
+                f"{robot.name} has no range sensor: give it one with robot.add(RangeSensor(...))."
+            )
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Begin a trial: the whole world as at first, and this robot at a pose if one is given."""
+        self._check_open()
+        self.world.reset()
+        if pose is not None:
+            self.robot.place(pose)
+
+    def observe(self) -> Observation:
+        """The readings after the last step."""
+        self._check_open()
+        raw = np.concatenate([sensor.readings for sensor in self.sensors])
+        near = np.concatenate([sensor.nearness for sensor in self.sensors])
+        return Observation(tuple(near.tolist()), self.robot.stalled, tuple(raw.tolist()))
+
+    def drive(self, command: Command) -> None:
+        """Carry out one command, for one step of the world."""
+        self._check_open()
+        move, turn = check_command(command)
+        self.robot.move(move * self.speed, turn * self.turn_rate)
+        self.world.step()
+
+    def stop(self) -> None:
+        """Stop it."""
+        self.robot.stop()
+
+    def close(self) -> None:
+        """Stop it and let go of it; safe to call twice."""
+        self.robot.stop()
+        self._is_open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise RobotError("This simulated robot is closed: make a new one.")

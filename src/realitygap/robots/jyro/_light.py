@@ -1,0 +1,85 @@
+"""Light sensors: how much light arrives from all lamps, half of it in a shadow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, get_args
+
+from realitygap.drawing import Disc, Shape
+from realitygap.kernels import _scene as kernel
+
+from ._mounted import MountedSensors
+
+LightMode = Literal["linear", "ambient", "direct"]
+_MODES = {
+    "linear": kernel.SENSOR_LIGHT_LINEAR,
+    "ambient": kernel.SENSOR_LIGHT_AMBIENT,
+    "direct": kernel.SENSOR_LIGHT_DIRECT,
+}
+
+
+class LightSensor(MountedSensors):
+    """The light at each of several points on the robot: the sum over lamps of intensity times brightness.
+
+    At a distance d [m] the intensity is 1 - d / max_range (linear, 0 beyond), 0.2 / d (ambient) or its square
+    (direct), d limited to 0.2..max_range in the last two. It is half of that where a wall or another robot stands
+    between, unless `world.light_above_walls` lets it pass over walls. It comes from all directions alike.
+
+    Args:
+        mounts: (s, 3) forward, left [m] of each; the direction is not used.
+        max_range: Where linear light has faded [m].
+        mode: How light fades.
+        groups: Names of parts of the sensors.
+        own_shadow: Whether the robot's own body throws a shadow on them.
+        shadows: Whether other robots do.
+
+    Source: Jyro 0.3.2.
+    """
+
+    kind = "light"
+
+    def __init__(
+        self,
+        mounts: Sequence[Sequence[float]],
+        max_range: float,
+        *,
+        mode: LightMode = "linear",
+        groups: Mapping[str, Sequence[int]] | None = None,
+        own_shadow: bool = False,
+        shadows: bool = True,
+    ) -> None:
+        super().__init__(mounts, max_range, groups)
+        self.mode = mode
+        self.own_shadow, self.shadows = own_shadow, shadows
+
+    @property
+    def mode(self) -> LightMode:
+        """How light fades; it may be changed at any time."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: LightMode) -> None:
+        if mode not in _MODES:
+            raise ValueError(f"Unknown mode {mode!r}, expected one of: {', '.join(get_args(LightMode))}.")
+        self._mode: LightMode = mode
+
+    def read(self) -> None:
+        """Refresh the readings."""
+        world = self.robot.world
+        stops = 0 if world.light_above_walls else kernel.WALLS
+        stops += kernel.OWN_BODY if self.own_shadow else 0
+        stops += kernel.OTHER_BODIES if self.shadows else 0
+        self._readings = world.light_at(
+            self.robot, self.mounts, _MODES[self.mode], self.max_range, int(stops)
+        )
+
+    def shapes(self) -> list[Shape]:
+        """Where they are."""
+        return [
+            Disc(*self.robot.point(forward, left), 2.0, "#ffa500", "#ffff00", 0.6)
+            for forward, left, _ in self.mounts.tolist()
+        ]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Mounts, range, mode, groups and readings, as plain values."""
+        return super().to_dict() | {"mode": self.mode}

@@ -1,0 +1,319 @@
+"""A robot in a `JyroWorld`: where it is, how it is driven, what it carries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.drawing import Ink, Line, Picture, Point, Shape, Text, hex_of
+from realitygap.errors import RobotError
+from realitygap.kernels._scene import START_ENERGY
+from realitygap.world import Pose
+
+from ._device import Device, Edge
+
+if TYPE_CHECKING:
+    from ._world import JyroWorld
+
+Part = Literal["trails", "rays", "bodies", "devices", "speech"]
+"""What a robot is drawn of."""
+_PORTRAIT = 1.0  # side of the picture of one robot [m]
+AnyDevice = TypeVar("AnyDevice", bound=Device)
+
+
+class SceneRobot:
+    """A robot with any outline, or none: then it collides with nothing and is seen by nobody.
+
+    Args:
+        x, y: Where it begins [m].
+        heading: Where it faces [rad, counter-clockwise from +x].
+        name: What `world[name]` finds it by; the kind and a number when not given.
+        color: An X11 name or `#rrggbb`: what it looks like, to cameras too.
+        body: Corners of a closed outline in order, forward and left of the center [m].
+        segments: Single edges that belong to the body as well, forward and left of both ends [m].
+        brain: Called with the robot in each step, when its turn to move has come.
+
+    Attributes:
+        speed: Commanded speed ahead [m/s].
+        sideways: Commanded speed to the left [m/s].
+        turn_rate: Commanded rate of turn to the left [rad/s].
+        speed_scale: Factor of both speeds, not of turning.
+        stalled: Whether its last step was blocked.
+        energy: 10000, less 1 for each step with a command other than 0; nothing depends on it.
+        keep_trail: Whether poses are kept in `trail`.
+        trail: Poses after each step or `place`, where they changed.
+        devices: What it carries, in the order of adding.
+
+    Source: Jyro 0.3.2, `Robot`. Differs: odometry is right for sideways motion too; sideways is to the left, as all of
+    our numbers are; what it says can be drawn.
+    """
+
+    kind = "robot"
+
+    def __init__(
+        self,
+        x: float,
+        y: float,
+        heading: float = 0.0,
+        *,
+        name: str | None = None,
+        color: str = "red",
+        body: Sequence[Sequence[float]] = (),
+        segments: Sequence[Sequence[float]] = (),
+        brain: Callable[[Any], object] | None = None,
+    ) -> None:
+        hex_of(color)  # refused here, not in the middle of a step
+        self.name = name
+        self.color = color
+        self.body = tuple((float(forward), float(left)) for forward, left in body)
+        self.brain = brain
+        self.devices: list[Device] = []
+        self.keep_trail = False
+        self.speed_scale = 1.0
+        self._segments = _segments(segments)
+        self._start = Pose(float(x), float(y), float(heading))
+        self._row = to_jyro(self._start)
+        self._world: JyroWorld | None = None
+        self.reset()
+
+    # -- where it is ------------------------------------------------------------------------------------------
+
+    @property
+    def world(self) -> JyroWorld:
+        """The world it is in; asking for it where there is none is a RobotError."""
+        if self._world is None:
+            raise RobotError(
+                f"The {self.kind} {self.name or ''} is in no world: call world.add(robot) first."
+            )
+        return self._world
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is; the heading lies in -pi..pi."""
+        return from_jyro(self._row)
+
+    def place(self, pose: Sequence[float]) -> None:
+        """Put it somewhere, whatever stands there; odometry does not notice."""
+        self._row[:] = to_jyro(pose)
+        self._row[2] %= 2 * math.pi
+        if self._world is not None:
+            self._world._is_placed(self)
+        self._leave_trail()
+
+    def point(self, forward: float, left: float) -> Point:
+        """Where a point of the robot is in the world [m]."""
+        here = self.pose
+        sine, cosine = math.sin(here.heading), math.cos(here.heading)
+        return here.x + forward * cosine - left * sine, here.y + forward * sine + left * cosine
+
+    @property
+    def odometry(self) -> Pose:
+        """The pose as reckoned from its own motion since `localize`, or since the start: exact, without drift."""
+        return self._odometry
+
+    def localize(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Set the odometry: x ahead [m], y to the left [m], heading [rad] in a frame of the robot's own."""
+        self._odometry = Pose(x, y, heading)
+
+    # -- driving ----------------------------------------------------------------------------------------------
+
+    def move(self, speed: float, turn_rate: float) -> None:
+        """Drive at a speed [m/s] and turn to the left at a rate [rad/s] from now on, without any limit."""
+        self.speed, self.turn_rate = speed, turn_rate
+
+    def translate(self, speed: float) -> None:
+        """Set the speed alone [m/s]."""
+        self.speed = speed
+
+    def rotate(self, turn_rate: float) -> None:
+        """Set the rate of turn alone [rad/s]."""
+        self.turn_rate = turn_rate
+
+    def stop(self) -> None:
+        """Stop."""
+        self.move(0.0, 0.0)
+        self.sideways = 0.0
+
+    def say(self, text: str) -> None:
+        """Show a text beside it in pictures; nothing is shown for an empty one."""
+        self.speech = text
+
+    def reset(self) -> None:
+        """Back to the start, stopped, with full energy and without a trail; its devices too."""
+        self._row[:] = to_jyro(self._start)
+        self._odometry = Pose(0.0, 0.0, 0.0)
+        self.speed = self.sideways = self.turn_rate = 0.0
+        self.stalled = False
+        self.energy = START_ENERGY
+        self.trail: list[Pose] = []
+        self.speech = ""
+        for device in self.devices:
+            device.reset()
+        if self._world is not None:
+            self._world._is_placed(self)
+
+    # -- devices ----------------------------------------------------------------------------------------------
+
+    def add(self, device: AnyDevice) -> AnyDevice:
+        """Give it a device, and get that device back.
+
+        Raises:
+            RobotError: The device is on a robot already.
+        """
+        if hasattr(device, "robot"):
+            raise RobotError(f"This {device.kind} is on {device.robot.name} already: make another one.")
+        device.robot = self
+        self.devices.append(device)
+        if self._world is not None:
+            self._world._has_changed()
+        return device
+
+    def __getitem__(self, kind: str) -> Any:
+        """The device of a kind that was added last.
+
+        Raises:
+            KeyError: It has none.
+        """
+        for device in reversed(self.devices):
+            if device.kind == kind:
+                return device
+        kinds = sorted({device.kind for device in self.devices})
+        raise KeyError(f"{self.name} has no device {kind!r}; it has: {', '.join(kinds) or 'none'}.")
+
+    # -- what the world asks ----------------------------------------------------------------------------------
+
+    def edges(self, *, ahead: bool = False) -> NDArray[np.float64]:
+        """(e, 4) all edges of body and devices, forward and left of both ends [m].
+
+        Args:
+            ahead: Whether devices are taken as they will be after their next move.
+        """
+        rows: list[Sequence[float]] = [
+            (*corner, *self.body[i - 1]) for i, corner in enumerate(self.body)
+        ]  # each corner is joined to the one before, as in Jyro
+        rows += self._segments
+        for device in self.devices:
+            rows += device.edges(ahead=ahead)
+        return np.array(rows, np.float64).reshape(-1, 4)
+
+    def _has_stepped(self, before: NDArray[np.float64]) -> None:
+        """Take note of a step that was not blocked: odometry, trail, devices."""
+        for device in self.devices:
+            device.move()
+        self._odometry = _reckoned(self._odometry, from_jyro(before), self.pose)
+        self._leave_trail()
+
+    def _leave_trail(self) -> None:
+        if self.keep_trail and self.trail[-1:] != [self.pose]:
+            self.trail.append(self.pose)
+
+    # -- showing ----------------------------------------------------------------------------------------------
+
+    def outlines(self) -> list[Shape]:
+        """The body as it is drawn."""
+        return [self.polygon(self.body, self.color)] if self.body else []
+
+    def polygon(self, corners: Sequence[Sequence[float]], fill: str, line: str | None = Ink.TEXT) -> Line:
+        """A filled polygon that is fixed to the robot: corners forward and left [m], an X11 color."""
+        points = tuple(self.point(forward, left) for forward, left in corners)
+        return Line(points, line, 0.8, closed=True, fill=hex_of(fill))
+
+    def parts(self) -> dict[Part, list[Shape]]:
+        """What it looks like, part by part, from the hindmost to the foremost."""
+        return {
+            "trails": self._trail_shapes(),
+            "rays": [shape for device in self.devices if device.active for shape in device.rays()],
+            "bodies": self._body_shapes(),
+            "devices": [shape for device in self.devices for shape in device.shapes()],
+            "speech": self._speech_shapes(),
+        }
+
+    def _trail_shapes(self) -> list[Shape]:
+        if len(self.trail) < 2:
+            return []
+        return [Line(tuple((pose.x, pose.y) for pose in self.trail), hex_of(self.color), 0.9)]
+
+    def _body_shapes(self) -> list[Shape]:
+        shapes = self.outlines()
+        for ax, ay, bx, by in self._segments:
+            shapes.append(Line((self.point(ax, ay), self.point(bx, by)), Ink.TEXT, 1.0))
+        head = (self.point(0.0, 0.012), self.point(0.03, 0.0), self.point(0.0, -0.012))
+        shapes.append(Line(head, None, closed=True, fill=Ink.TEXT))
+        return shapes
+
+    def _speech_shapes(self) -> list[Shape]:
+        if not self.speech:
+            return []
+        x, y = self.point(0.0, 0.0)
+        return [Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True)]
+
+    def _repr_svg_(self) -> str:
+        """The robot alone, with what it carries and without what it sees, in a square of 1 m."""
+        x, y = self.point(0.0, 0.0)
+        parts = self.parts()
+        shapes = (*parts["bodies"], *parts["devices"], *parts["speech"])
+        half = _PORTRAIT / 2
+        about = f"The {self.kind} {self.name or ''} with {len(self.devices)} devices."
+        return Picture(self.kind, about, x - half, y - half, x + half, y + half, shapes).to_svg(180.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What it is and does, devices and their readings included, as plain values."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "color": self.color,
+            "pose": list(self.pose),
+            "odometry": list(self.odometry),
+            "speed": self.speed,
+            "sideways": self.sideways,
+            "turn_rate": self.turn_rate,
+            "stalled": self.stalled,
+            "energy": self.energy,
+            "devices": [device.to_dict() for device in self.devices],
+        }
+
+
+def to_jyro(pose: Sequence[float]) -> NDArray[np.float64]:
+    """(3,) x, y [m], heading counter-clockwise from +y [rad]: Jyro's.
+
+    Raises:
+        ValueError: The pose is not three finite numbers.
+    """
+    row = np.array(tuple(pose), np.float64)
+    if row.shape != (3,) or not np.isfinite(row).all():
+        raise ValueError(f"The pose is {tuple(pose)}, expected three numbers: x [m], y [m], heading [rad].")
+    row[2] -= math.pi / 2
+    return row
+
+
+def from_jyro(row: NDArray[np.float64]) -> Pose:
+    """The pose of x, y [m] and Jyro's heading [rad]; its own lies in -pi..pi."""
+    return Pose(float(row[0]), float(row[1]), math.remainder(float(row[2]) + math.pi / 2, 2 * math.pi))
+
+
+def _segments(segments: Sequence[Sequence[float]]) -> list[Edge]:
+    edges: list[Edge] = []
+    for edge in segments:
+        if len(edge) != 4:
+            raise ValueError(
+                f"A segment is {edge!r}, expected forward and left of both ends [m]: four numbers."
+            )
+        edges.append((float(edge[0]), float(edge[1]), float(edge[2]), float(edge[3])))
+    return edges
+
+
+def _reckoned(odometry: Pose, before: Pose, after: Pose) -> Pose:
+    """Odometry carried on by the motion from one pose to another."""
+    turn = odometry.heading - before.heading
+    sine, cosine = math.sin(turn), math.cos(turn)
+    dx, dy = after.x - before.x, after.y - before.y
+    heading = odometry.heading + (after.heading - before.heading)
+    return Pose(
+        odometry.x + dx * cosine - dy * sine,
+        odometry.y + dx * sine + dy * cosine,
+        math.remainder(heading, 2 * math.pi),
+    )

@@ -1,0 +1,389 @@
+"""A world that behaves as Jyro 0.3.2 does: walls, lamps and any number of robots, one step at a time."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.drawing import Ink, Line, Picture, Shape, hex_of
+from realitygap.errors import RobotError
+from realitygap.kernels import _scene as kernel
+from realitygap.world import Arena
+
+from ._robot import SceneRobot
+
+AnyRobot = TypeVar("AnyRobot", bound=SceneRobot)
+STEP_S = 0.1
+
+
+@dataclass
+class Lamp:
+    """A lamp: x, y [m], brightness (1 is usual), color; all may be changed, a reset puts them back."""
+
+    x: float
+    y: float
+    brightness: float = 1.0
+    color: str = "yellow"
+
+
+@dataclass(frozen=True)
+class Area:
+    """What walls stand around and pictures show filled: corners in order [m], and a color."""
+
+    corners: tuple[tuple[float, float], ...]
+    fill: str
+
+
+class JyroWorld:
+    """Walls, boxes, lamps and robots that collide and see each other, as in Jyro 0.3.2.
+
+        world = JyroWorld(paper_arena())
+        robot = world.add(Pioneer(0.5, 0.3))
+        camera = robot.add(Camera())
+        robot.move(0.2, 0.5)
+        world.step(10)
+
+    In a step each robot, in the order of adding, is asked for a command (its `brain`, if it has one) and moved, so that
+    later ones meet earlier ones at their new poses; then all devices are read. A robot that would touch a wall or
+    another robot at the end of its step stays entirely as it was, and stalls.
+
+    Args:
+        arena: Walls, obstacles and lights to begin with; rounded corners are short straight walls. None for an empty
+            world.
+        step_s: Length of a step [s].
+        seed: Of the noise of sensors that have some.
+
+    Attributes:
+        time: Simulated time [s].
+        n_steps: Steps since the start or the last reset.
+        robots: In the order of adding.
+        lights: Likewise; each may be changed at any time.
+        areas: Insides of boxes and obstacles, which pictures show filled.
+        drawn: What else pictures show.
+        light_above_walls: Whether light passes over walls.
+        random: Where sensors take their noise from.
+
+    Source: Jyro 0.3.2, `Physics` and `Simulator`. Differs: robots of one name are refused, where Jyro lets them pass
+    through each other; a reset sets time and devices back too; all sensors are read anew whenever something is added.
+    """
+
+    def __init__(self, arena: Arena | None = None, *, step_s: float = STEP_S, seed: int = 0) -> None:
+        if not (math.isfinite(step_s) and step_s > 0):
+            raise ValueError(f"step_s is {step_s!r}, expected a time above 0 [s].")
+        self.arena = arena
+        self.step_s = step_s
+        self.seed = seed
+        self.robots: list[SceneRobot] = []
+        self.lights: list[Lamp] = []
+        self.areas: list[Area] = []
+        self.drawn: list[Shape] = []
+        self.light_above_walls = False
+        self._walls: list[tuple[float, float, float, float]] = []
+        self._wall_colors: list[str] = []
+        self._first_lights: list[Lamp] = []
+        self._is_ready = False
+        self._begin()
+        if arena is not None:
+            self._furnish(arena)
+
+    def _begin(self) -> None:
+        self.time, self.n_steps = 0.0, 0
+        self.random = np.random.default_rng(self.seed)
+
+    # -- what stands ------------------------------------------------------------------------------------------
+
+    def add_wall(self, x1: float, y1: float, x2: float, y2: float, color: str = "black") -> None:
+        """Put up a wall from one point to another [m]."""
+        hex_of(color)
+        ends = (float(x1), float(y1), float(x2), float(y2))
+        if not np.isfinite(ends).all():
+            raise ValueError(f"The wall is {ends}, expected four finite numbers [m].")
+        self._walls.append(ends)
+        self._wall_colors.append(color)
+        self._has_changed()
+
+    def add_box(
+        self,
+        x1: float,
+        y1: float,
+        x2: float,
+        y2: float,
+        fill: str = "purple",
+        wall_color: str | None = None,
+    ) -> None:
+        """Put up four walls around two opposite corners [m]; robots may be within or without."""
+        color = fill if wall_color is None else wall_color
+        hex_of(fill)
+        left, right, bottom, top = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
+        self.add_wall(left, top, left, bottom, color)
+        self.add_wall(left, top, right, top, color)
+        self.add_wall(left, bottom, right, bottom, color)
+        self.add_wall(right, top, right, bottom, color)
+        self.areas.append(Area(((left, bottom), (right, bottom), (right, top), (left, top)), fill))
+
+    def add_polygon(
+        self, corners: Sequence[Sequence[float]], fill: str = "purple", wall_color: str | None = None
+    ) -> None:
+        """Put up walls around any outline: (c, 2) corners in order [m]."""
+        hex_of(fill)
+        points = tuple((float(x), float(y)) for x, y in corners)
+        if len(points) < 3:
+            raise ValueError(f"The polygon has {len(points)} corners, expected 3 or more.")
+        for start, end in zip(points, (*points[1:], points[0]), strict=True):
+            self.add_wall(*start, *end, fill if wall_color is None else wall_color)
+        self.areas.append(Area(points, fill))
+
+    def _furnish(self, arena: Arena) -> None:
+        for x1, y1, x2, y2 in arena.floor.tape:
+            self.add_shape(Line(((x1, y1), (x2, y2)), Ink.BODY, 3.0))
+        for wall in arena.walls:
+            self.add_wall(*wall)
+        for obstacle in arena.obstacles:
+            self.add_polygon(obstacle.outline(), "gray70", "gray40")
+        for light in arena.lights:
+            self.add_light(light.x, light.y, light.strength)
+
+    def add_light(self, x: float, y: float, brightness: float = 1.0, color: str = "yellow") -> Lamp:
+        """Put up a lamp [m], and get it back."""
+        hex_of(color)
+        lamp = Lamp(x, y, brightness, color)
+        self.lights.append(lamp)
+        self._first_lights.append(Lamp(x, y, brightness, color))
+        self._has_changed()
+        return lamp
+
+    def add_shape(self, shape: Shape) -> None:
+        """Show something in pictures [m]; nothing collides with it and nobody sees it."""
+        self.drawn.append(shape)
+
+    @property
+    def walls(self) -> tuple[tuple[float, float, float, float], ...]:
+        """(w, 4) x1, y1, x2, y2 of all walls [m], those of boxes too."""
+        return tuple(self._walls)
+
+    @property
+    def wall_colors(self) -> tuple[str, ...]:
+        """(w,) the color of each wall."""
+        return tuple(self._wall_colors)
+
+    def add(self, robot: AnyRobot) -> AnyRobot:
+        """Put a robot into the world, and get it back.
+
+        Raises:
+            RobotError: It is in a world already, or its name is taken.
+        """
+        if robot._world is not None:
+            raise RobotError(f"{robot.name} is in a world already: make another robot.")
+        robot.name = robot.name or self._free_name(robot.kind)
+        if any(other.name == robot.name for other in self.robots):
+            raise RobotError(f"There is a robot named {robot.name!r} already: give this one another name.")
+        robot._world = self
+        self.robots.append(robot)
+        self._has_changed()
+        return robot
+
+    def _free_name(self, kind: str) -> str:
+        taken = {robot.name for robot in self.robots}
+        return next(name for k in range(1, len(taken) + 2) if (name := f"{kind}-{k}") not in taken)
+
+    def __getitem__(self, name: str) -> SceneRobot:
+        """The robot of a name.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for robot in self.robots:
+            if robot.name == name:
+                return robot
+        names = ", ".join(str(robot.name) for robot in self.robots)
+        raise KeyError(f"No robot {name!r}; there are: {names or 'none'}.")
+
+    # -- going on ---------------------------------------------------------------------------------------------
+
+    def step(self, n_steps: int = 1, *, brains: bool = True) -> None:
+        """Go on by some steps.
+
+        Args:
+            n_steps: How many.
+            brains: Whether robots are asked for commands; else they go on with those that they have.
+        """
+        self._prepare()
+        for _ in range(n_steps):
+            self.time += self.step_s
+            for number, robot in enumerate(self.robots):
+                if brains and robot.brain is not None:
+                    robot.brain(robot)
+                    self._prepare()
+                self._move(number, robot)
+            self.n_steps += 1
+            self._read()
+
+    def run(self, seconds: float, *, brains: bool = True, real_time: bool = False) -> None:
+        """Go on for a time of the simulation [s], rounded to whole steps.
+
+        Args:
+            seconds: How long.
+            brains: Whether robots are asked for commands.
+            real_time: Whether to take as long as the simulation does.
+        """
+        for _ in range(round(seconds / self.step_s)):
+            began = time.perf_counter()
+            self.step(brains=brains)
+            if real_time:
+                time.sleep(max(0.0, self.step_s - (time.perf_counter() - began)))
+
+    def reset(self) -> None:
+        """Robots, devices, lamps and time as at first."""
+        for lamp, first in zip(self.lights, self._first_lights, strict=True):
+            lamp.x, lamp.y, lamp.brightness, lamp.color = first.x, first.y, first.brightness, first.color
+        self._begin()
+        for robot in self.robots:
+            robot.reset()
+        self._has_changed()
+
+    def _move(self, number: int, robot: SceneRobot) -> None:
+        before = robot._row.copy()
+        stall, cost = kernel.move_robot(
+            self._standing,
+            number,
+            robot.edges(ahead=True),
+            robot._row,
+            robot.speed * robot.speed_scale,
+            -robot.sideways * robot.speed_scale,
+            robot.turn_rate,
+            self.step_s,
+        )
+        robot.stalled = bool(stall)
+        robot.energy -= cost
+        if not stall:
+            robot._has_stepped(before)
+
+    # -- what devices ask -------------------------------------------------------------------------------------
+
+    def look(
+        self, robot: SceneRobot, mounts: NDArray[np.float64], reach: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """What rays from a robot meet first, other than the robot itself.
+
+        Args:
+            robot: Which.
+            mounts: (s, 3) forward, left [m] and direction [rad] of each ray.
+            reach: How far they go [m].
+
+        Returns:
+            distances (s,) [m], `reach` where nothing is met; hits (s,): -1 there, else what `what` takes.
+        """
+        distances, hits = np.empty(len(mounts)), np.empty(len(mounts), np.int64)
+        number = self.robots.index(robot)
+        kernel.read_ranges(self._standing, number, robot._row, mounts, float(reach), distances, hits)
+        return np.minimum(distances, reach), hits
+
+    def what(self, hit: int) -> tuple[str, SceneRobot | None]:
+        """What a ray met: its color, and which robot it is, or None for a wall."""
+        n_walls = len(self._walls)
+        if hit < n_walls:
+            return self._wall_colors[hit], None
+        robot = self.robots[int(np.searchsorted(self._standing.rows, hit - n_walls, "right")) - 1]
+        return robot.color, robot
+
+    def light_at(
+        self, robot: SceneRobot, mounts: NDArray[np.float64], mode: int, reach: float, stops: int
+    ) -> NDArray[np.float64]:
+        """(s,) the light that arrives at `mounts` (s, 3) of a robot; mode and stops as the kernel has them."""
+        lights = np.array([(lamp.x, lamp.y, lamp.brightness) for lamp in self.lights], np.float64).reshape(
+            -1, 3
+        )
+        readings = np.empty(len(mounts))
+        number = self.robots.index(robot)
+        kernel.read_lights(self._standing, lights, number, robot._row, mounts, mode, reach, stops, readings)
+        return readings
+
+    # -- keeping the arrays -----------------------------------------------------------------------------------
+
+    def _has_changed(self) -> None:
+        """Something was added: the arrays are made anew, and all devices are read."""
+        self._is_ready = False
+        self._prepare()
+        self._read()
+
+    def _is_placed(self, robot: SceneRobot) -> None:
+        """A robot was put somewhere."""
+        if robot in self.robots:
+            self._place(robot)
+            self._read_devices(robot)
+
+    def _prepare(self) -> None:
+        if self._is_ready:
+            return
+        counts = [len(robot.edges()) for robot in self.robots]
+        walls = np.empty((len(self._walls), 6))
+        for line, wall in zip(walls, self._walls, strict=True):
+            kernel.set_line(line, *wall)
+        self._standing = kernel.Standing(
+            walls,
+            np.empty((sum(counts), 6)),
+            np.cumsum([0, *counts]).astype(np.int64),
+            np.arange(len(counts), dtype=np.int64),
+        )
+        self._is_ready = True
+        for robot in self.robots:
+            self._place(robot)
+
+    def _place(self, robot: SceneRobot) -> None:
+        number = self.robots.index(robot)
+        x, y, heading = robot._row.tolist()
+        rows = self._standing.rows
+        kernel.place_edges(
+            robot.edges(), x, y, heading, self._standing.bodies[rows[number] : rows[number + 1]]
+        )
+
+    def _read(self) -> None:
+        for robot in self.robots:
+            self._read_devices(robot)
+
+    def _read_devices(self, robot: SceneRobot) -> None:
+        for device in robot.devices:
+            if device.active:
+                device.read()
+
+    # -- showing ----------------------------------------------------------------------------------------------
+
+    def picture(self, hide: Collection[str] = ()) -> Picture:
+        """The world from above, without the parts to hide: "rays", "trails", "devices" and so on."""
+        from ._picture import world_picture
+
+        return world_picture(self, hide)
+
+    def _repr_svg_(self) -> str:
+        return self.picture().to_svg()
+
+    def save(self, path: str | Path, width: int = 720) -> Path:
+        """Write the picture to a file that ends in .svg or .png; see `save_world`."""
+        from ._files import save_world
+
+        return save_world(self, path, width)
+
+    def save_movie(self, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480) -> Path:
+        """Go on by some steps and write what happens as a GIF in real time; see `save_world_movie`."""
+        from ._files import save_world_movie
+
+        return save_world_movie(self, path, n_steps, every=every, width=width)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Time, what stands and what all robots are and do, as plain values."""
+        return {
+            "time": self.time,
+            "n_steps": self.n_steps,
+            "step_s": self.step_s,
+            "walls": [list(wall) for wall in self._walls],
+            "wall_colors": list(self._wall_colors),
+            "lights": [[lamp.x, lamp.y, lamp.brightness, lamp.color] for lamp in self.lights],
+            "robots": [robot.to_dict() for robot in self.robots],
+        }

@@ -1,0 +1,246 @@
+"""Runs of NEAT in a maze, rewarded for novelty or for the distance to the exit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.evolution import Genome, NeatSettings, Population, decode_all
+from realitygap.kernels import _maze
+from realitygap.kernels._novelty import admit
+from realitygap.kernels._points import point_novelty
+from realitygap.tasks import MazeAgent, MazeTask
+from realitygap.world import Arena
+
+MazeReward = Literal["novelty", "objective"]
+MAZE_REWARDS: tuple[MazeReward, ...] = ("novelty", "objective")
+
+TURN = 2 * math.pi
+
+
+class Tried(NamedTuple):
+    """What came of n networks in a maze.
+
+    Attributes:
+        ends: (m, 2) where their trials ended [m]; of those tried, the first m <= n.
+        solver: Which one reached the exit first in their order; -1 where none did.
+    """
+
+    ends: NDArray[np.float64]
+    solver: int
+
+
+class MazePath(NamedTuple):
+    """What one network did in a maze, step by step.
+
+    Attributes:
+        poses: (t + 1, 3) x, y [m] and heading [rad]; row 0 is the start.
+        inputs: (t, i) what it saw, as `MazeAgent.input_names` has it.
+    """
+
+    poses: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+
+
+class MazeTrials:
+    """Trials of networks in one maze, many at a time."""
+
+    def __init__(
+        self,
+        arena: Arena,
+        agent: MazeAgent | None = None,
+        *,
+        precision: Literal["single", "double"] = "single",
+    ) -> None:
+        """Put an agent into a maze.
+
+        Args:
+            arena: Its walls, its start and its goal: nearer than its radius to it is at the exit.
+            agent: The published one when not given.
+            precision: Of the arithmetic.
+
+        Raises:
+            ValueError: The arena has no goal.
+        """
+        if arena.goal is None:
+            raise ValueError(f"Arena {arena.name!r} has no goal, expected one: it is the exit of the maze.")
+        self.agent = agent or MazeAgent()
+        self._arrival = arena.goal.radius
+        self._origin = np.array([arena.start.x, arena.start.y])
+        self._exit = np.array([arena.goal.x, arena.goal.y]) - self._origin
+        real = np.float64 if precision == "double" else np.float32
+        # Rounded, so that quarters of a turn are that and the last bit of a library's cosine does not count.
+        rays = [(round(math.cos(ray), 15), round(math.sin(ray), 15)) for ray in self.agent.rays]
+        self._scene = _maze.MazeScene(
+            walls=(np.array(arena.walls) - np.tile(self._origin, 2)).astype(real),
+            rays=np.array(rays, real),
+            exit=self._exit.astype(real),
+            heading=np.array([arena.start.heading / TURN], real),
+        )
+
+    def distances_to_exit(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far from the exit places (n, 2) are [m]."""
+        x, y = (ends - self._origin - self._exit).T
+        return np.asarray(np.sqrt(x * x + y * y), np.float64)
+
+    def try_all(self, genomes: Sequence[Genome]) -> Tried:
+        """Try networks in their order, up to the block of the first that reaches the exit."""
+        ends, arrived, _ = self._run(genomes, 0)
+        solvers = np.flatnonzero(arrived >= 0)
+        return Tried(ends, int(solvers[0]) if solvers.size else -1)
+
+    def path(self, genome: Genome) -> MazePath:
+        """What one network does."""
+        _, arrived, trace = self._run([genome], 1)
+        n = arrived[0] + 1 if arrived[0] >= 0 else self.agent.steps
+        poses = trace.poses[: n + 1, :, 0].astype(np.float64)
+        poses[:, :2] += self._origin
+        poses[:, 2] *= TURN
+        return MazePath(poses, trace.inputs[:n, :, 0].astype(np.float64))
+
+    def _run(
+        self, genomes: Sequence[Genome], n_kept: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.int32], Any]:
+        neat = genomes[0].rules
+        networks = decode_all(genomes)
+        lanes, wiring = _maze.make_maze_block(self._scene, neat, networks.place.shape[1])
+        trace = _maze.make_maze_trace(
+            self._scene.heading, neat.n_inputs, self.agent.steps if n_kept else -1, max(n_kept, 1)
+        )
+        n = len(genomes)
+        ends = np.zeros((n, 2))
+        arrived = np.full(n, -1, np.int32)
+        n_tried = _maze.run_maze_trials(
+            self._scene,
+            self._rules(genomes[0].bias_value),
+            neat,
+            networks,
+            np.arange(n, dtype=np.int32),
+            lanes,
+            wiring,
+            ends,
+            arrived,
+            trace,
+        )
+        return ends[:n_tried] + self._origin, arrived[:n_tried], trace
+
+    def _rules(self, bias_value: float) -> _maze.MazeRules:
+        agent = self.agent
+        return _maze.MazeRules(
+            n_steps=agent.steps,
+            radius=agent.radius,
+            reach=agent.reach,
+            arrival=self._arrival,
+            push=agent.push,
+            top_speed=agent.top_speed,
+            twist=agent.twist / TURN,
+            top_spin=agent.top_spin / TURN,
+            bias_value=bias_value,
+        )
+
+
+class _EndsArchive:
+    """Lehman & Stanley's novelty of where trials end."""
+
+    def __init__(self, task: MazeTask) -> None:
+        self._neighbors = np.zeros(task.neighbors)
+        self._patience = task.patience
+        self._threshold = np.array([task.threshold])
+        self._counters = np.zeros(2, np.int64)
+        self._places = np.empty((2, 1024))
+        self._n = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    def update(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Novelty (n,) of a generation, of which the novel ones then enter."""
+        points = np.ascontiguousarray(ends.T)
+        n = points.shape[1]
+        novelty, entered = np.empty(n), np.empty(n, np.bool_)
+        point_novelty(points, self._places, self._n, np.empty(n + self._n), self._neighbors, novelty)
+        admit(novelty, self._counters, self._threshold, self._patience, entered)
+        new = points[:, entered]
+        while self._n + new.shape[1] > self._places.shape[1]:
+            self._places = np.concatenate([self._places, np.empty_like(self._places)], axis=1)
+        self._places[:, self._n : self._n + new.shape[1]] = new
+        self._n += new.shape[1]
+        return novelty
+
+
+@dataclass(frozen=True)
+class MazeRun:
+    """What came of one run in a maze.
+
+    Attributes:
+        solved: Whether a network reached the exit.
+        evaluations: Networks tried, up to and with the one that did.
+        archived: Behaviors in the archive at the end.
+        ends: (evaluations, 2) where the trials ended [m], where that was asked for.
+        solver: The network that reached the exit.
+    """
+
+    solved: bool
+    evaluations: int
+    archived: int
+    ends: NDArray[np.float64] = field(repr=False, compare=False)
+    solver: Genome | None = field(repr=False, compare=False)
+
+
+def run_maze(
+    task: MazeTask,
+    trials: MazeTrials,
+    reward: MazeReward,
+    settings: NeatSettings,
+    seed: int,
+    replicate: int,
+    *,
+    keep_ends: bool = False,
+    go_on: Callable[[], bool] = lambda: True,
+) -> MazeRun:
+    """One run in a maze, up to the first network that reaches the exit.
+
+    Fitness is the novelty of where a trial ends, or how much less than the task's `far` its distance from the exit
+    is.
+
+    Args:
+        task: What novelty search has to be there.
+        trials: Of the maze.
+        reward: For what.
+        settings: NEAT's settings, those of the task among them.
+        seed: Of the random numbers.
+        replicate: Which of the runs from that seed.
+        keep_ends: Whether to keep where all trials ended.
+        go_on: Asked before each generation; a run that may not go on ends unsolved.
+    """
+    population = Population(len(trials.agent.input_names) - 1, 2, settings, seed=seed, replicate=replicate)
+    archive = _EndsArchive(task)
+    kept: list[NDArray[np.float64]] = []
+    n_tried = 0
+    for _ in range(settings.generations):
+        if not go_on():
+            break
+        genomes = population.ask()
+        tried = trials.try_all(genomes)
+        n = tried.solver + 1 if tried.solver >= 0 else len(genomes)
+        n_tried += n
+        if keep_ends:
+            kept.append(tried.ends[:n])
+        if tried.solver >= 0:
+            return _outcome(True, n_tried, archive, kept, genomes[tried.solver])
+        if reward == "novelty":
+            population.tell(archive.update(tried.ends))
+        else:
+            population.tell(task.far - trials.distances_to_exit(tried.ends))
+    return _outcome(False, n_tried, archive, kept, None)
+
+
+def _outcome(
+    solved: bool, n_tried: int, archive: _EndsArchive, kept: list[NDArray[np.float64]], solver: Genome | None
+) -> MazeRun:
+    return MazeRun(solved, n_tried, len(archive), np.concatenate([np.empty((0, 2)), *kept]), solver)

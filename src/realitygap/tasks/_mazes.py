@@ -1,0 +1,102 @@
+"""The mazes on which Lehman & Stanley (2011) published novelty search, and their agent."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+UNIT = 0.01
+"""A unit of the published mazes [m]: the agent's radius of 8 of them is about that of a Scribbler."""
+
+
+@dataclass(frozen=True)
+class MazeAgent:
+    """The disc that drives in the mazes; lengths [m], angles [rad], both speeds per step.
+
+    In a step its two outputs, each less one half, are added to the turning and, in `push`, to the speed. It moves
+    along the heading from before and then turns; a move that would end nearer to a wall than its radius is
+    refused as a whole, and the turn is kept.
+
+    Attributes:
+        steps: How long it has.
+        radius: Of the disc.
+        rays: Directions of its range finders from ahead, which look out of its center [rad].
+        reach: Of the range finders; what they read is the distance as a part of it.
+        push: Speed gained in a step for each whole that its second output is above one half.
+        top_speed: Forward or backward.
+        twist: Turning gained in the same way by its first output.
+        top_spin: Left or right.
+
+    Source: Lehman & Stanley (2011), section 4; numbers as in public re-implementations.
+    """
+
+    steps: int = 400
+    radius: float = 8 * UNIT
+    rays: tuple[float, ...] = tuple(math.radians(turn) for turn in (-90, -45, 0, 45, 90, 180))
+    reach: float = 100 * UNIT
+    push: float = UNIT
+    top_speed: float = 3 * UNIT
+    twist: float = math.radians(1)
+    top_spin: float = math.radians(3)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """What the network's inputs are, in order."""
+        ranges = tuple(f"range.{k}" for k in range(len(self.rays)))
+        return (*ranges, "goal.ahead", "goal.left", "goal.behind", "goal.right", "bias")
+
+
+@dataclass(frozen=True)
+class MazeTask:
+    """A maze, what NEAT has to be for it, and what was published.
+
+    Attributes:
+        name: As the command takes it, and of the arena.
+        settings: NEAT's settings that belong to the task: population and generations.
+        neighbors: Nearest behaviors that novelty is averaged over.
+        threshold: Novelty from which on a behavior enters the archive at first [m].
+        patience: Evaluations without an entry after which the threshold falls.
+        far: Distance from the exit that has fitness 0, farther than any place of the maze [m].
+        published: Its results, by what is rewarded.
+        source: Where they stand.
+    """
+
+    name: str
+    settings: Mapping[str, Any]
+    published: Mapping[str, Mapping[str, Any]]
+    neighbors: int = 15
+    threshold: float = 6 * UNIT
+    patience: int = 2500
+    far: float = 300 * UNIT
+    source: str = "Lehman & Stanley (2011)"
+
+
+_SETTINGS = {"population": 250, "generations": 1000}
+
+_TASKS = (
+    MazeTask(
+        "maze-medium",
+        _SETTINGS,
+        {
+            "novelty": {"seeds": 40, "mean_evaluations": 18_274, "sd_evaluations": 20_447},
+            "objective": {"seeds": 40, "mean_evaluations": 56_334, "sd_evaluations": 48_705},
+        },
+    ),
+    MazeTask(
+        "maze-hard",
+        _SETTINGS,
+        {
+            "novelty": {
+                "seeds": 40,
+                "solved": 39,
+                "mean_evaluations": 35_109,
+                "sd_evaluations": 30_236,
+            },
+            "objective": {"seeds": 40, "solved": 3},
+        },
+    ),
+)
+
+MAZE_TASKS: Mapping[str, MazeTask] = {task.name: task for task in _TASKS}

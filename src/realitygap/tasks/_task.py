@@ -1,0 +1,42 @@
+"""The contract of a task: what the networks are told, and what their trials are worth."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.world import Arena
+
+from ._trajectories import Trajectories
+
+
+@runtime_checkable
+class Task(Protocol):
+    """What is rewarded. A task of a study file is also a `Settings`, whose values enter the condition's hash.
+
+    `fitness` is a function of the trials alone: the same trials are worth the same, whatever else is tried in the
+    same call.
+
+    Attributes:
+        name: As `[task] kind` has it.
+        inputs: What the networks see, in order: `obstacle` (the largest of the range readings), `stall`, `time`
+            (step / steps), `bias` (constant, the last if there is one), one sensor's reading `range.K`, `light.K`,
+            `line.K`, `bump.K`, `encoder.K`, `goal_sector.K` (which pie slice the goal is in), `goal_distance`,
+            `last_move`, `last_turn`.
+        needs_trace: Whether `fitness` looks at single steps; where it does not, the arrays of steps have no rows.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def inputs(self) -> tuple[str, ...]: ...
+
+    @property
+    def needs_trace(self) -> bool: ...
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) what each trial is worth, finite; more is better."""
+        ...

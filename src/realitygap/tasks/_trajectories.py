@@ -1,0 +1,134 @@
+"""Trials step by step, many at once: what a task rewards and what films show."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.world import Arena
+
+
+class TraceArrays(NamedTuple):
+    """What kernels keep of n trials of t steps, in the precision of the trials; row 0 is the start.
+
+    A compiled task reads these: nothing is converted or copied for it.
+    """
+
+    poses: NDArray[
+        np.floating
+    ]  # (t + 1, 3, n) x, y [m] from the start, heading [turns, counter-clockwise from +x]
+    readings: NDArray[
+        np.floating
+    ]  # (t + 1, s, n) 0..1, 1: as near, bright or dark as can be told; without noise
+    inputs: NDArray[np.floating]  # (t, i, n) what the networks saw
+    commands: NDArray[np.floating]  # (t, 2, n) move and turn, -1..1
+    stalled: NDArray[np.bool_]  # (t + 1, n)
+    wheels: NDArray[np.floating]  # (t + 1, 2, n) way of the left and the right wheel since the start [m]
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """n trials of t steps in one arena.
+
+    All arrays are made when they are first asked for, in meters and radians, trials first; row 0 of a trial is its
+    start.
+
+    Attributes:
+        arena: Where they were.
+        step_s: How long a step lasts [s].
+        arrays: What the kernels kept, as they kept it.
+        sensors: (s,) names of the readings, such as `range.0`, `light.1`.
+        network_inputs: (i,) names of what the networks saw.
+        coverage_line, coverage_ends: (n,) visited share of the reachable cells, 0..1.
+        n_stalls: (n,) blocked steps.
+    """
+
+    arena: Arena
+    step_s: float
+    arrays: TraceArrays
+    sensors: tuple[str, ...]
+    network_inputs: tuple[str, ...]
+    coverage_line: NDArray[np.float64]
+    coverage_ends: NDArray[np.float64]
+    n_stalls: NDArray[np.int32]
+
+    def __len__(self) -> int:
+        """How many trials."""
+        return int(self.arrays.stalled.shape[1])
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of each trial."""
+        return int(self.arrays.commands.shape[0])
+
+    @cached_property
+    def poses(self) -> NDArray[np.float64]:
+        """(n, t + 1, 3) x [m], y [m], heading [rad, 0 to 2 pi, counter-clockwise from +x]."""
+        start = self.arena.start
+        poses = _trials_first(self.arrays.poses) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
+        poses[..., 2] %= math.tau
+        return poses
+
+    @cached_property
+    def readings(self) -> NDArray[np.float64]:
+        """(n, t + 1, s) what sensors answered, 0 (nothing) to 1 (as near, bright or dark as can be told).
+
+        With their noise on `sim`, without it on `jyro`.
+        """
+        return _trials_first(self.arrays.readings)
+
+    @cached_property
+    def inputs(self) -> NDArray[np.float64]:
+        """(n, t, i) what the networks saw."""
+        return _trials_first(self.arrays.inputs)
+
+    @cached_property
+    def commands(self) -> NDArray[np.float64]:
+        """(n, t, 2) what they answered: move and turn, -1..1."""
+        return _trials_first(self.arrays.commands)
+
+    @cached_property
+    def stalled(self) -> NDArray[np.bool_]:
+        """(n, t + 1) whether the step was blocked."""
+        return np.ascontiguousarray(self.arrays.stalled.T)
+
+    @cached_property
+    def wheels(self) -> NDArray[np.float64]:
+        """(n, t + 1, 2) way of the left and the right wheel since the start [m].
+
+        Raises:
+            ValueError: The platform has no wheels, as `jyro`, which moves and turns as a whole.
+        """
+        if self.arrays.wheels.shape[0] == 0:
+            raise ValueError(
+                "These trials are of a robot without wheels (platform 'jyro' moves and turns as a whole): look at "
+                "`commands` or `poses`, or use platform 'sim'."
+            )
+        return _trials_first(self.arrays.wheels)
+
+    def readings_of(self, kind: str) -> NDArray[np.float64]:
+        """(n, t + 1, k) the readings of the k sensors of a kind: range, light, line or bump.
+
+        Raises:
+            ValueError: The robot has none of this kind.
+        """
+        columns = [k for k, name in enumerate(self.sensors) if name.partition(".")[0] == kind]
+        if not columns:
+            kinds = sorted({name.partition(".")[0] for name in self.sensors})
+            raise ValueError(f"The robot has no sensors of kind {kind!r}, it has {', '.join(kinds)}.")
+        return self.readings[..., columns]
+
+    @property
+    def light(self) -> NDArray[np.float64]:
+        """(n, t + 1, k) the readings of the light sensors, 0..1."""
+        return self.readings_of("light")
+
+
+def _trials_first(array: NDArray[Any]) -> NDArray[np.float64]:
+    """(t, k, n) as the kernels keep it to (n, t, k)."""
+    return np.ascontiguousarray(array.transpose(2, 0, 1), np.float64)

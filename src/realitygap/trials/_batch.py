@@ -1,0 +1,248 @@
+"""What trials are asked and what they answer, on any platform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import whole_number
+from realitygap.evolution import Genome
+from realitygap.kernels._genome import NeatRules
+from realitygap.kernels._network import Networks
+from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
+from realitygap.tasks import TraceArrays
+from realitygap.world import Pose
+
+REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
+
+
+def paper_inputs(rules: NeatRules) -> tuple[str, ...]:
+    """What the paper's networks see, with the constant input where they have one."""
+    return ("obstacle", "stall", "time", *(("bias",) if rules.bias_input >= 0 else ()))
+
+
+def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:
+    """(n, 3) x [m], y [m], heading [rad, 0 to 2 pi] of poses (n, >= 3) as kernels keep them."""
+    seen = poses[:, :3].astype(np.float64) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
+    seen[:, 2] %= math.tau
+    return seen
+
+
+@dataclass(frozen=True)
+class TrialBatch:
+    """What came of n trials in an arena of c reachable cells.
+
+    Attributes:
+        cells: (n, c) uint8; the first `n_line` of a row are the cells along the line in order of first
+            visit, columns * row + column.
+        n_line: (n,) cells that the line crosses; the start counts.
+        n_ends: (n,) cells in which steps end; the start counts.
+        n_stalls: (n,) blocked steps.
+        drawn: (n, d) what was drawn for each trial of the numbers in `drawn_names`; none on `jyro`.
+        drawn_names: (d,) dotted names of the numbers that are drawn.
+    """
+
+    cells: NDArray[np.uint8]
+    n_line: NDArray[np.int32]
+    n_ends: NDArray[np.int32]
+    n_stalls: NDArray[np.int32]
+    drawn: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    drawn_names: tuple[str, ...] = ()
+
+    @property
+    def coverage_line(self) -> NDArray[np.float64]:
+        """(n,) visited share of the reachable cells along the line, 0..1."""
+        return np.divide(self.n_line, self.cells.shape[1])
+
+    @property
+    def coverage_ends(self) -> NDArray[np.float64]:
+        """(n,) visited share of the reachable cells at the ends of steps, 0..1."""
+        return np.divide(self.n_ends, self.cells.shape[1])
+
+    def behavior(self, k: int) -> NDArray[np.uint8]:
+        """The cells that trial k visited along its line, in order of first visit."""
+        return self.cells[k, : self.n_line[k]]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A trial step by step; row 0 is the start.
+
+    Attributes:
+        step_s: How long a step lasts [s].
+        poses: (t + 1, 3) x [m], y [m], heading [rad, counter-clockwise from +x].
+        readings: (t + 1, s) distance each sensor measures [m], without noise.
+        inputs: (t, i) what the network saw: largest noisy reading, stall, time and, where it has one, the
+            constant.
+        commands: (t, 2) what it answered: move and turn.
+        stalled: (t + 1,) whether the step was blocked.
+        coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
+        cells: Cells along the line in order of first visit, columns * row + column.
+        sensors: (s,) names of the range sensors.
+        wheels: (t + 1, 2) way of the left and the right wheel since the start [m]; no rows on `jyro`.
+        answers: (t + 1, a) what the sensors answered, noise and all, 0..1; on `jyro` without noise.
+        answer_names: (a,) names of these, such as `light.0`.
+        drawn: (d,) what was drawn for the trial, of the numbers in `drawn_names`.
+        drawn_names: (d,) dotted names.
+    """
+
+    step_s: float
+    poses: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    stalled: NDArray[np.bool_]
+    coverage_line: float
+    coverage_ends: float
+    cells: tuple[int, ...]
+    sensors: tuple[str, ...] = ()
+    wheels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    answers: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    answer_names: tuple[str, ...] = ()
+    drawn: tuple[float, ...] = ()
+    drawn_names: tuple[str, ...] = ()
+
+    def _repr_svg_(self) -> str:
+        from ._picture import path_picture
+
+        return path_picture(self).to_svg(360.0)
+
+
+@dataclass(frozen=True)
+class NoiseKey:
+    """Which random numbers a trial draws: those of one individual of one run.
+
+    Raises:
+        TypeError: One of them is not a whole number.
+        ValueError: One is out of its range, beyond which numbers would repeat.
+    """
+
+    key: int
+    replicate: int = 0
+    generation: int = 0
+    individual: int = 0
+    repeat: int = 0
+
+    def __post_init__(self) -> None:
+        limits = {
+            "key": 1 << 64,
+            "replicate": 1 << 32,
+            "generation": MAX_GENERATIONS,
+            "individual": MAX_INDIVIDUALS,
+            "repeat": MAX_REPEATS,
+        }
+        for name, limit in limits.items():
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), 0, limit - 1))
+
+
+def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
+    """(n, 3) the fixed words of the random numbers of n individuals from that of the key on."""
+    counters = np.empty((n, 3), np.uint32)
+    counters[:, 0] = np.arange(key.individual, key.individual + n) << 8 | int(PURPOSE_NOISE)
+    counters[:, 1] = key.generation << 12 | key.repeat
+    counters[:, 2] = key.replicate
+    return counters
+
+
+class Tried(NamedTuple):
+    """What a platform makes of n trials.
+
+    Attributes:
+        batch: Of all of them.
+        ends: (n, c) uint8 the cells in which steps end, in ascending order; no rows where they were not asked for.
+        ended: (n, 2) x and y at the end, from the arena's start [m].
+        trace: Every step; its arrays have no rows where it was not asked for.
+        distances: (t + 1, s, n) from each range sensor to what it sees, without noise, in the unit of
+            `PlatformTrials.distance_unit`; likewise.
+    """
+
+    batch: TrialBatch
+    ends: NDArray[np.uint8]
+    ended: NDArray[np.float64]
+    trace: TraceArrays
+    distances: NDArray[np.floating]
+
+
+class PlatformTrials(Protocol):
+    """A platform set up in an arena, ready to try networks of one kind.
+
+    One of these serves one thread. What it hands out may be written over by the next call.
+
+    Attributes:
+        step_s: How long a step lasts [s].
+        n_steps: Of each trial.
+        sensors: Names of the readings in a trace.
+        distance_unit: Of the distances in `Tried` [m].
+        drawn_names: Of the numbers that are drawn for trials, runs or the study.
+    """
+
+    step_s: float
+    n_steps: int
+    sensors: tuple[str, ...]
+    distance_unit: float
+    drawn_names: tuple[str, ...]
+
+    def carry_out(
+        self,
+        networks: Networks,
+        which: NDArray[np.int32],
+        key: int,
+        counters: NDArray[np.uint32],
+        *,
+        ends: bool = False,
+        trace: bool = False,
+    ) -> Tried:
+        """Trial k is one of network `which[k]` with the random numbers of `counters[k]`.
+
+        Args:
+            networks: At least one.
+            which: (n,) int32.
+            key: Of the random numbers.
+            counters: (n, 3) uint32, as `counters_of` makes them.
+            ends: Whether to list the cells at the ends of steps.
+            trace: Whether to keep every step.
+        """
+        ...
+
+
+def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> None:
+    """Refuse genomes that cannot be tried together, or not with these inputs (the paper's when not given).
+
+    Raises:
+        ValueError: No genome, one with other inputs or outputs, or genomes of several kinds.
+    """
+    if not genomes:
+        raise ValueError("No genome to try, expected at least one.")
+    first = _kind(genomes[0])
+    names = ["largest reading", "stall", "time"]
+    if inputs is not None:
+        names = [name for name in inputs if name != "bias"]
+    expected = len(names)
+    # Genomes of one population share their rules: few kinds need a look.
+    kinds = {(id(genome.rules), genome.bias_value): k for k, genome in reversed(list(enumerate(genomes)))}
+    for k in sorted(kinds.values()):
+        rules = genomes[k].rules
+        given = rules.n_inputs - (rules.bias_input >= 0)
+        if given != expected or rules.n_outputs != 2:
+            raise ValueError(
+                f"A genome has {given} inputs and {rules.n_outputs} outputs, expected {expected} inputs "
+                f"({', '.join(names)}; a constant one is extra) and 2 outputs (move, turn)."
+            )
+    for k in sorted(kinds.values()):
+        for name, value in _kind(genomes[k]).items():
+            if value != first[name]:
+                raise ValueError(
+                    f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "
+                    "those of each kind in a call of their own."
+                )
+
+
+def _kind(genome: Genome) -> dict[str, float]:
+    """What all genomes of a call share: the kernels read it once."""
+    names = ("n_inputs", "bias_input", "activation", "activation_slope", "recurrent", "node_bias")
+    return {name: getattr(genome.rules, name) for name in names} | {"bias_value": genome.bias_value}

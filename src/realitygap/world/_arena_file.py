@@ -1,0 +1,304 @@
+"""An arena as a file describes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from realitygap.settings import Settings, shown
+
+from ._arena import Arena, Grid, Pose
+from ._distribution import Distribution
+from ._floor import MOST_PIXELS, Floor, FloorImage
+from ._numbers import Described, NotNegative, Number, Positive, in_si
+from ._obstacle import TAPE_WIDTH, Goal, Light, Obstacle
+from ._part import Corner, box_as_corners, why_no_part
+from ._units import INCH
+
+MOST_CELLS = 256
+MOST_WALLS = 2048
+PREFIX = "arena."
+
+
+FILE_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH}
+NO_LENGTHS = ("heading", "strength", "columns", "rows", "per")
+
+
+def in_meters(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a file in meters and radians: what `unit` says of all lengths, and what keys end in.
+
+    Raises:
+        ValueError: There is no such unit, or a number has another one.
+    """
+    unit = values.get("unit", "m")
+    rest = {key: value for key, value in values.items() if key != "unit"}
+    named = FILE_UNITS.get(unit, 0.0) if isinstance(unit, str) else unit
+    scale = float(named) if type(named) in (int, float) else 0.0
+    if not (scale > 0 and math.isfinite(scale)):
+        names = ", ".join(f"'{name}'" for name in FILE_UNITS)
+        raise ValueError(f"unit: expected {names} or a length in meters, came {shown(unit)}")
+    if scale == 1:
+        return in_si(rest)
+    _refuse_other_units(rest, unit)
+    return {key: _scaled(value, scale, key) for key, value in in_si(rest).items()}
+
+
+def _refuse_other_units(value: Any, unit: object) -> None:
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            if isinstance(key, str) and key.endswith(("_mm", "_cm", "_in")):
+                raise ValueError(
+                    f"{key}: the file has unit = {shown(unit)} for all lengths. Keep one of the two"
+                )
+            _refuse_other_units(part, unit)
+    elif isinstance(value, list):
+        for part in value:
+            _refuse_other_units(part, unit)
+
+
+def _scaled(value: Any, scale: float, key: str) -> Any:
+    """A value with all lengths in it times `scale`; the third number of a start is a heading."""
+    if key in NO_LENGTHS or isinstance(value, bool):
+        return value
+    if isinstance(value, int | float):
+        return value * scale
+    if isinstance(value, Mapping):
+        return {name: _scaled(part, scale, name) for name, part in value.items()}
+    if isinstance(value, list):
+        parts = [_scaled(part, scale, "") for part in value]
+        return [*parts[:2], *value[2:]] if key == "start" else parts
+    return value
+
+
+class Row(Settings):
+    """A table that a file may write as a list of its numbers."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_whole_row(cls, values: Any) -> Any:
+        if isinstance(values, list | tuple):  # one of the right length is a table by now
+            raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
+        return values
+
+
+class WallEntry(Row):
+    """A straight wall from one point to another."""
+
+    x1: Number = Field(description="Where it begins [m].")
+    y1: Number
+    x2: Number = Field(description="Where it ends [m].")
+    y2: Number
+
+
+class ObstacleEntry(Settings):
+    """A box, a convex polygon or a disc."""
+
+    x: Number = Field(0.0, description="Where its own origin is [m].")
+    y: Number = Field(0.0, description="[m].")
+    heading: Number = Field(0.0, description="How far it is turned, counter-clockwise [rad].")
+    corner: tuple[Corner, ...] = Field(
+        (Corner(x=0.0, y=0.0),),
+        min_length=1,
+        max_length=64,
+        description="Corners [x, y] of a polygon around its origin, counter-clockwise, before they are grown; left out "
+        "for a disc. box = [length, width] says the outer size of a box.",
+    )
+    radius: NotNegative = Field(0.0, description="Of a disc, or of rounded corners [m].")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_box(cls, values: Any) -> Any:
+        return box_as_corners(values)
+
+    @model_validator(mode="after")
+    def _is_convex(self) -> Self:
+        problem = why_no_part([(corner.x, corner.y) for corner in self.corner], self.radius)
+        if problem:
+            raise ValueError(problem)
+        return self
+
+
+class LightEntry(Settings):
+    """A light that shines from a point to all sides."""
+
+    x: Number = Field(description="Where [m].")
+    y: Number = Field(description="[m].")
+    strength: NotNegative = Field(
+        1.0, description="What a light sensor of gain 1 reads that looks at it from 1 m."
+    )
+
+
+class TapeEntry(Row):
+    """A dark strip on the floor, along its middle."""
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+
+
+class ImageEntry(Settings):
+    """What the floor is printed with."""
+
+    x: float = Field(0.0, description="Lower left corner [m].")
+    y: float = Field(0.0, description="[m].")
+    width: float = Field(gt=0, description="How wide it lies there [m]; its pixels are square.")
+    file: str = Field("", description="An image file beside the arena file; its brightness counts.")
+    columns: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
+    rows: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
+    pixels: str = Field("", description="The pixels themselves; come from the file.")
+
+
+class FloorEntry(Settings):
+    """What is on the floor, which is light otherwise."""
+
+    tape: tuple[TapeEntry, ...] = Field(
+        (), max_length=MOST_WALLS, description="Dark strips [x1, y1, x2, y2] along their middles [m]."
+    )
+    tape_width: float = Field(TAPE_WIDTH, gt=0, description="Of the strips [m]; 3/4 in is usual.")
+    image: ImageEntry | None = None
+
+
+class GridEntry(Settings):
+    """The cells whose visited share is coverage."""
+
+    x: float = Field(description="Lower left corner [m].")
+    y: float = Field(description="[m].")
+    cell: float = Field(gt=0, description="Size of a cell [m].")
+    columns: int = Field(ge=1, le=MOST_CELLS, description=f"How many; at most {MOST_CELLS} cells in all.")
+    rows: int = Field(ge=1, le=MOST_CELLS)
+
+    @model_validator(mode="after")
+    def _has_not_too_many(self) -> Self:
+        if self.columns * self.rows > MOST_CELLS:
+            raise ValueError(
+                f"{self.columns} columns of {self.rows} rows are {self.columns * self.rows} cells, expected at most "
+                f"{MOST_CELLS} cells"
+            )
+        return self
+
+
+class StartEntry(Row):
+    """Where every trial begins."""
+
+    x: Number = Field(description="[m].")
+    y: Number = Field(description="[m].")
+    heading: Number = Field(0.0, description="From +x, counter-clockwise [rad].")
+
+
+class GoalEntry(Row):
+    """What is to be reached."""
+
+    x: Number = Field(description="Center [m].")
+    y: Number = Field(description="[m].")
+    radius: Positive = Field(description="How near counts [m].")
+
+
+class ArenaFile(Described):
+    """An arena as its file has it, in meters and radians.
+
+    Raises:
+        ValueError: A value is unknown, missing or out of its range; every mistake with its place.
+    """
+
+    name: str = Field(min_length=1, max_length=80, description="What to call it.")
+    description: str = Field("", max_length=2000, description="What it is, in a sentence.")
+    sources: tuple[str, ...] = Field((), description="Where its numbers come from.")
+    wall: tuple[WallEntry, ...] = Field((), max_length=MOST_WALLS, description="Walls [x1, y1, x2, y2].")
+    obstacle: tuple[ObstacleEntry, ...] = Field((), max_length=256)
+    light: tuple[LightEntry, ...] = Field((), max_length=64)
+    floor: FloorEntry = FloorEntry()
+    grid: GridEntry | None = Field(
+        None, description="Left out: 16 cells along the longer side of the walls, in their middle."
+    )
+    start: StartEntry
+    goal: GoalEntry | None = None
+
+    @model_validator(mode="after")
+    def _begins_beside_obstacles(self) -> Self:
+        arena = self.arena()
+        for k, obstacle in enumerate(arena.obstacles):
+            if obstacle.distance(arena.start.x, arena.start.y) < 0:
+                raise ValueError(f"start: lies within obstacle {k}. Move one of the two")
+        return self
+
+    @classmethod
+    def of(cls, arena: Arena) -> Self:
+        """An arena in the form of a file."""
+        obstacles = [
+            {
+                "x": each.x,
+                "y": each.y,
+                "heading": each.heading,
+                "corner": list(each.corners),
+                "radius": each.radius,
+            }
+            for each in arena.obstacles
+        ]
+        return cls(
+            name=arena.name,
+            wall=[list(wall) for wall in arena.walls],
+            obstacle=obstacles,
+            light=[asdict(light) for light in arena.lights],
+            floor=arena.floor.to_dict(),
+            grid=asdict(arena.grid),
+            start=arena.start._asdict(),
+            goal=None if arena.goal is None else asdict(arena.goal),
+            vary={name.removeprefix(PREFIX): drawn for name, drawn in arena.vary.items()},
+        )
+
+    def arena(self) -> Arena:
+        """The arena that it describes."""
+        return Arena(
+            self.name,
+            tuple((wall.x1, wall.y1, wall.x2, wall.y2) for wall in self.wall),
+            self._grid(),
+            Pose(self.start.x, self.start.y, self.start.heading),
+            tuple(
+                Obstacle(each.x, each.y, each.heading, tuple((c.x, c.y) for c in each.corner), each.radius)
+                for each in self.obstacle
+            ),
+            tuple(Light(each.x, each.y, each.strength) for each in self.light),
+            self._floor(),
+            None if self.goal is None else Goal(self.goal.x, self.goal.y, self.goal.radius),
+            {PREFIX + name: drawn for name, drawn in self.vary.items()},
+        )
+
+    def arena_numbers(self) -> dict[str, float | Distribution]:
+        """Every number by its dotted name, which begins with "arena."."""
+        return {PREFIX + name: value for name, value in self.numbers().items()}
+
+    def with_arena_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Self:
+        """The same with other numbers, by names that begin with "arena."."""
+        wrong = [name for name in values if not name.startswith(PREFIX)]
+        if wrong:
+            raise ValueError(
+                "\n".join(f"{name}: expected a name that begins with {PREFIX!r}." for name in wrong)
+            )
+        return self.with_numbers({name.removeprefix(PREFIX): value for name, value in values.items()})
+
+    def _grid(self) -> Grid:
+        if self.grid is not None:
+            return Grid(self.grid.x, self.grid.y, self.grid.cell, self.grid.columns, self.grid.rows)
+        xs = [x for wall in self.wall for x in (wall.x1, wall.x2)] or [self.start.x - 0.5, self.start.x + 0.5]
+        ys = [y for wall in self.wall for y in (wall.y1, wall.y2)] or [self.start.y - 0.5, self.start.y + 0.5]
+        across, up = max(xs) - min(xs), max(ys) - min(ys)
+        cell = max(across, up) / 16 or 1.0 / 16
+        columns, rows = (max(1, math.floor(size / cell + 0.5)) for size in (across, up))
+        return Grid(
+            (min(xs) + max(xs) - columns * cell) / 2,
+            (min(ys) + max(ys) - rows * cell) / 2,
+            cell,
+            columns,
+            rows,
+        )
+
+    def _floor(self) -> Floor:
+        tape = tuple((each.x1, each.y1, each.x2, each.y2) for each in self.floor.tape)
+        image = self.floor.image
+        picture = None if image is None else FloorImage(**image.model_dump(exclude={"file"}))
+        return Floor(tape, self.floor.tape_width, picture)

@@ -1,0 +1,107 @@
+"""What is on the floor: dark tape, or an image."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._obstacle import TAPE_WIDTH, Segment, distance_to_segment
+
+MOST_PIXELS = 512  # across or up: a larger image is more than line sensors see, and would fill records
+
+
+@dataclass(frozen=True)
+class FloorImage:
+    """How bright the floor is, pixel by pixel; beyond the image it goes on as at its edge.
+
+    Attributes:
+        x, y: Lower left corner [m].
+        width: How wide it lies there [m]; pixels are square.
+        columns, rows: Of its pixels.
+        pixels: (rows * columns) bytes, 0 black to 255 white, the top row first, compressed and in letters.
+    """
+
+    x: float
+    y: float
+    width: float
+    columns: int
+    rows: int
+    pixels: str
+
+    @classmethod
+    def of(cls, x: float, y: float, width: float, gray: NDArray[np.uint8]) -> FloorImage:
+        """The image of (rows, columns) bytes, 0 black to 255 white, the top row first."""
+        rows, columns = gray.shape
+        packed = base64.b85encode(zlib.compress(np.ascontiguousarray(gray, np.uint8).tobytes(), 9))
+        return cls(x, y, width, columns, rows, packed.decode())
+
+    @cached_property
+    def gray(self) -> NDArray[np.uint8]:
+        """(rows, columns) 0 black to 255 white, the top row first."""
+        unpacker = zlib.decompressobj()
+        data = unpacker.decompress(base64.b85decode(self.pixels), self.rows * self.columns)
+        return np.frombuffer(data, np.uint8).reshape(self.rows, self.columns)
+
+    @property
+    def height(self) -> float:
+        """How high it lies there [m]."""
+        return self.width * self.rows / self.columns
+
+    @property
+    def brightness(self) -> NDArray[np.float32]:
+        """(rows, columns) 0 black to 1 white, the row of lowest y first."""
+        return np.asarray(self.gray[::-1] / np.float32(255), dtype=np.float32)
+
+    def at(self, x: float, y: float) -> float:
+        """How bright the pixel at a point [m] is, or the nearest one: 0 black, 1 white."""
+        scale = self.columns / self.width
+        column = min(self.columns - 1, max(0, int((x - self.x) * scale)))
+        row = min(self.rows - 1, max(0, int((y - self.y) * scale)))
+        return float(self.gray[self.rows - 1 - row, column]) / 255
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A white floor with black tape on it, or an image.
+
+    Attributes:
+        tape: (k, 4) x1, y1, x2, y2 along the middle of each strip [m].
+        tape_width: Of the strips [m].
+        image: What it is printed with.
+    """
+
+    tape: tuple[Segment, ...] = ()
+    tape_width: float = TAPE_WIDTH
+    image: FloorImage | None = None
+
+    def brightness(self, x: float, y: float) -> float:
+        """How bright the floor is at a point [m]: 0 black, as tape is, to 1 white."""
+        if any(distance_to_segment(x, y, strip) <= self.tape_width / 2 for strip in self.tape):
+            return 0.0
+        return 1.0 if self.image is None else self.image.at(x, y)
+
+    def to_dict(self) -> dict[str, Any]:
+        """It as plain values, without what is not there."""
+        values: dict[str, Any] = {}
+        if self.tape:
+            values |= {"tape": [list(strip) for strip in self.tape], "tape_width": self.tape_width}
+        if self.image is not None:
+            names = ("x", "y", "width", "columns", "rows", "pixels")
+            values["image"] = {name: getattr(self.image, name) for name in names}
+        return values
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Floor:
+        """The floor that `to_dict` described."""
+        tape = tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in values.get("tape", ()))
+        image = FloorImage(**values["image"]) if "image" in values else None
+        return cls(tape, values.get("tape_width", TAPE_WIDTH), image)
+
+
+BARE_FLOOR = Floor()

@@ -1,0 +1,304 @@
+"""Robots and arenas by name, or from files."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import DescriptionError, did_you_mean
+
+from ._arena import NAMED_STARTS, Arena, paper_arena
+from ._arena_file import ArenaFile, in_meters
+from ._floor import MOST_PIXELS, FloorImage
+from ._numbers import in_si
+from ._robot_model import RobotModel
+from ._svg import svg_values
+
+T = TypeVar("T")
+
+LARGEST = 4_000_000  # of a file [bytes]: a drawing of a large maze has some 100,000
+MOST_BASES = 8  # robots that build on robots
+BOARDS = ("fluke1", "fluke2")  # what may be plugged into a Scribbler
+CARDBOARD = "cardboard"  # what may be put around it, last
+
+
+def robot_names() -> list[str]:
+    """The robots that come with realitygap."""
+    alone = _names("robots")
+    scribblers = [name for name in alone if name.startswith("scribbler")]
+    equipped = [f"{name}-{board}" for name in scribblers for board in BOARDS]
+    boxed = [f"{name}-{CARDBOARD}" for name in (*scribblers, *equipped)]
+    return sorted([*alone, *equipped, *boxed])
+
+
+def load_robot(robot: str | Path) -> RobotModel:
+    """A robot by name, or from a TOML file.
+
+    Args:
+        robot: One of `robot_names`, or the path of a file.
+
+    Raises:
+        DescriptionError: There is no such robot or file, or it cannot be used: every mistake with its place.
+    """
+    values, origin = _robot_values(robot, [])
+    return _checked(origin, lambda: RobotModel(**values))
+
+
+def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], str]:
+    """The values of a robot's file laid over those of the robot it builds on, and what to call it."""
+    below, addition = _taken_apart(str(robot))
+    if addition:
+        file = resources.files(__package__) / "robots" / "additions" / f"{addition}.toml"
+        values, origin = _values_of(file, str(robot)), str(robot)
+        values |= {"name": str(robot), "base": below}
+    else:
+        file, origin = _find("robot", robot_names(), robot)
+        values = _values_of(file, origin)
+        values.setdefault("name", Path(origin).stem)
+    if str(file) in chain or len(chain) >= MOST_BASES:
+        raise DescriptionError(
+            f"{origin}: `base` leads back to it, or through more than {MOST_BASES} robots. Expected a robot that "
+            "stands by itself in the end."
+        )
+    return _with_base(values, origin, [*chain, str(file)]), origin
+
+
+def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[str, Any]:
+    """The values of a robot laid over those of its base."""
+    base, turned = values.pop("base", None), values.pop("turned", False)
+    if base is None and not turned:
+        return values
+    if not isinstance(base, str):
+        raise DescriptionError(f"{origin}: base is {base!r}, expected the name of a robot or its file.")
+    if not isinstance(turned, bool):
+        raise DescriptionError(f"{origin}: turned is {turned!r}, expected true or false.")
+    beside = Path(origin).parent / base
+    is_beside = Path(origin).is_file() and beside.is_file()
+    below, _ = _robot_values(beside if is_beside else base, chain)
+    sources = [*_texts(below.get("sources")), *_texts(values.get("sources"))]
+    merged = _laid_over(_turned(below, origin) if turned else below, values)
+    return merged | ({"sources": sources} if sources else {})
+
+
+def _taken_apart(name: str) -> tuple[str, str]:
+    """The robot and the addition that a name is made of, such as scribbler-s2 and fluke2; no addition otherwise."""
+    rest, _, last = name.rpartition("-")
+    is_made = last in (*BOARDS, CARDBOARD) and name in robot_names()
+    return (rest, last) if is_made else (name, "")
+
+
+def _texts(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
+    """The values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind."""
+    values = _checked(origin, lambda: in_si(read_toml(file, origin)))
+    each = values.pop("each", {})
+    if not isinstance(each, dict):
+        raise DescriptionError(f"{origin}: each is {each!r}, expected tables such as [each.range].")
+    for kind, common in each.items():
+        entries = values.get(kind)
+        if not isinstance(entries, list) or not isinstance(common, dict):
+            raise DescriptionError(f"{origin}: [each.{kind}] goes with [[{kind}]], of which there are none.")
+        values[kind] = [common | entry if isinstance(entry, dict) else entry for entry in entries]
+    return values
+
+
+def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables key by key; anything else, lists too, as above."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        both = isinstance(value, Mapping) and isinstance(old, Mapping)
+        merged[key] = _laid_over(old, value) if both and old is not None else value
+    return merged
+
+
+def _turned(values: Mapping[str, Any], origin: str) -> dict[str, Any]:
+    """The values of a robot turned half round: its back is ahead, and its left wheel the right one."""
+    model = _checked(origin, lambda: RobotModel(**values))
+    if model.vary:
+        raise DescriptionError(
+            f"{origin}: turned needs a base of plain numbers, and {', '.join(model.vary)} are drawn in it."
+        )
+    changed: dict[str, float] = {}
+    for name, value in model.numbers().items():
+        last = name.rsplit(".", 1)[-1]
+        if last in ("x", "y", "axle", "idler"):
+            changed[name] = -float(value) or 0.0  # type: ignore[arg-type]
+        elif last == "direction":
+            changed[name] = (float(value) + 2 * math.pi) % (2 * math.pi) - math.pi  # type: ignore[arg-type]
+    for end in ("left", "right"):
+        other = "right" if end == "left" else "left"
+        changed |= {
+            f"drive.{kind}_{end}": getattr(model.drive, f"{kind}_{other}") for kind in ("gain", "bias")
+        }
+    turned = model.with_numbers(changed).model_dump()
+    for key in ("pen", "caster"):
+        if turned["looks"][key] is not None:
+            turned["looks"][key] = tuple(-value or 0.0 for value in turned["looks"][key])
+    prose = {key: values[key] for key in ("description", "sources") if key in values}
+    return turned | prose
+
+
+def arena_names() -> list[str]:
+    """The arenas that come with realitygap."""
+    return sorted({"paper", *_names("arenas")})
+
+
+def load_arena(arena: str | Path) -> Arena:
+    """An arena by name, or from a TOML or SVG file.
+
+    Args:
+        arena: One of `arena_names`, or the path of a file.
+
+    Raises:
+        DescriptionError: There is no such arena or file, or it cannot be used: every mistake with its place.
+    """
+    if str(arena) == "paper":
+        return paper_arena()
+    file, origin = _find("arena", arena_names(), arena)
+    if origin.lower().endswith(".svg"):
+        text = read_text(file, origin)
+        values = _checked(origin, lambda: svg_values(text))
+    else:
+        written = read_toml(file, origin)
+        values = _checked(origin, lambda: in_meters(_in_present_words(written)))
+        _read_image(values, origin)
+    values.setdefault("name", Path(origin).stem)
+    return _checked(origin, lambda: ArenaFile(**values)).arena()
+
+
+def _in_present_words(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of an emulator's scene file of 0.1 in the words of arena files: its walls, lamps, tape and start."""
+    values = dict(values)
+    if "walls" in values and "wall" not in values:
+        values["wall"] = values.pop("walls")
+    lamps = values.pop("lamps", None) if "light" not in values else None
+    if lamps is not None:
+        names = ("x", "y", "strength")
+        rows = lamps if isinstance(lamps, list) else [lamps]
+        values["light"] = [
+            dict(zip(names, row, strict=True)) if isinstance(row, list) and len(row) == len(names) else row
+            for row in rows
+        ]
+    if "tape" in values and "floor" not in values:
+        values["floor"] = {"tape": values.pop("tape")}
+    start = values.get("start")
+    if isinstance(start, str) and start in NAMED_STARTS:
+        values["start"] = list(NAMED_STARTS[start])
+    return values
+
+
+def _read_image(values: dict[str, Any], origin: str) -> None:
+    """Put the pixels of a floor image in place of its file."""
+    floor = values.get("floor")
+    image = floor.get("image") if isinstance(floor, dict) else None
+    if not isinstance(floor, dict) or not isinstance(image, dict) or not isinstance(image.get("file"), str):
+        return  # what is wrong with it is said later
+    path = Path(origin).parent / image["file"]
+    gray = _gray(path, origin)
+    width = image.get("width")
+    if isinstance(width, int | float):
+        made = FloorImage.of(0.0, 0.0, float(width), gray)
+        floor["image"] = image | {"columns": made.columns, "rows": made.rows, "pixels": made.pixels}
+
+
+def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
+    """The brightness of an image file."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            if max(picture.size) > MOST_PIXELS:
+                raise DescriptionError(
+                    f"{origin}: floor.image.file: {path.name} is {picture.width} x {picture.height} pixels, expected "
+                    f"at most {MOST_PIXELS} each way. Make it smaller."
+                )
+            return np.asarray(picture.convert("L"), dtype=np.uint8)
+    except (OSError, UnidentifiedImageError, ValueError) as error:
+        if isinstance(error, DescriptionError):
+            raise
+        raise DescriptionError(
+            f"{origin}: floor.image.file: {path.name} is no image that can be read."
+        ) from None
+
+
+def read_toml(file: Traversable, origin: str) -> dict[str, Any]:
+    """The values of a TOML file.
+
+    Raises:
+        DescriptionError: It cannot be read, is too large, or is no TOML.
+    """
+    text = read_text(file, origin)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"{origin}: not TOML ({error}).") from None
+    except RecursionError:
+        raise DescriptionError(f"{origin}: its lists or tables lie too deep in each other.") from None
+
+
+def read_text(file: Traversable, origin: str) -> str:
+    """The text of a file of sensible size."""
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+    except OSError as error:
+        raise DescriptionError(f"{origin} cannot be read: {error.strerror or error}.") from None
+    if len(data) > LARGEST:
+        raise DescriptionError(
+            f"{origin} is larger than {LARGEST:,} bytes. Expected the file of a robot or arena."
+        )
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise DescriptionError(f"{origin} is not a text file in UTF-8 (byte {error.start} is not).") from None
+
+
+def _names(folder: str) -> list[str]:
+    place = resources.files(__package__) / folder
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in place.iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, str]:
+    """The file of that name or path, and what to call it in messages."""
+    if not isinstance(name, str | Path):
+        raise TypeError(f"{what} is {name!r}, expected the name of one, or the path of its file.")
+    if str(name) in known:
+        return resources.files(__package__) / f"{what}s" / f"{name}.toml", str(name)
+    path = Path(name)
+    if str(name) and path.is_file():
+        return path, str(path)
+    if path.suffix or len(path.parts) > 1:
+        raise DescriptionError(f"There is no {what} file {path}.")
+    endings = ".toml or .svg" if what == "arena" else ".toml"
+    raise DescriptionError(
+        f"Unknown {what} {str(name)!r}. {did_you_mean(str(name), known)} A file ends in {endings}."
+    )
+
+
+def _checked(origin: str, make: Callable[[], T]) -> T:
+    """What is made, or every mistake that was found in doing so, said of a file."""
+    try:
+        return make()
+    except DescriptionError:
+        raise
+    except ValueError as error:
+        lines = [line.split(".", 1)[-1] if line.startswith(("RobotModel.", "ArenaFile.")) else
+                 line.removeprefix("RobotModel: ").removeprefix("ArenaFile: ")
+                 for line in str(error).split("\n")]  # fmt: skip
+        count = len(lines)
+        head = f"{origin} has {count} mistake{'s' if count != 1 else ''}."
+        raise DescriptionError("\n  ".join([head, *lines])) from None

@@ -1,0 +1,292 @@
+"""Descriptions whose numbers have dotted names and may be distributions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Self
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import Field, model_validator
+
+from realitygap.errors import did_you_mean
+from realitygap.settings import Settings
+
+from ._distribution import KINDS, Distribution
+from ._units import INCH
+
+UNITS = {
+    "_mm": lambda value: value / 1000,
+    "_cm": lambda value: value / 100,
+    "_in": lambda value: value * INCH,
+    "_deg": math.radians,
+}
+"""What the end of a key in a file says of its numbers; without one they are in meters or radians."""
+
+ROWS = {
+    "corner": ("x", "y"),
+    "table": ("distance", "reading"),
+    "wall": ("x1", "y1", "x2", "y2"),
+    "tape": ("x1", "y1", "x2", "y2"),
+}
+"""Lists that a file may write as rows of plain numbers."""
+
+SHORT = {"start": ("x", "y", "heading"), "goal": ("x", "y", "radius")}
+"""Tables that a file may write as a list of plain numbers."""
+
+
+class _IsNumber:
+    """Marks the fields that have a dotted name and may be distributions."""
+
+
+NUMBER = _IsNumber()
+Number = Annotated[float, NUMBER]
+Positive = Annotated[float, Field(gt=0), NUMBER]
+NotNegative = Annotated[float, Field(ge=0), NUMBER]
+Share = Annotated[float, Field(ge=0, le=1), NUMBER]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a number may be: from `least` to `most`, where `open_least` says that it is more than `least`."""
+
+    least: float = -math.inf
+    most: float = math.inf
+    open_least: bool = False
+
+
+class Described(Settings):
+    """A description with numbers that have names, each a plain number or a distribution.
+
+    A field's value is a plain float; `vary` says which of them are drawn, and how. Where a distribution is given in
+    place of a number, as files do, its center becomes the field's value and it goes to `vary`.
+    """
+
+    vary: dict[str, Distribution] = Field(
+        default_factory=dict,
+        description="Which numbers are drawn, by dotted name; a file writes the distribution in the number's place.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _takes_distributions(cls, values: Any) -> Any:
+        if not isinstance(values, Mapping):
+            return values
+        plain, vary = _split(in_si(values))
+        return plain | ({"vary": vary | dict(plain.get("vary", {}))} if vary else {})
+
+    @model_validator(mode="after")
+    def _varies_within_limits(self) -> Self:
+        numbers = dict(_walk(self))
+        for name, drawn in list(self.vary.items()):
+            if name not in numbers:
+                raise ValueError(f"{name}: no number of this name. {did_you_mean(name, numbers)}".rstrip("."))
+            self.vary[name] = _limited(name, drawn, numbers[name][1])
+        return self
+
+    def numbers(self) -> dict[str, float | Distribution]:
+        """Every number by its dotted name, in the order of the description."""
+        return {name: self.vary.get(name, value) for name, (value, _) in _walk(self)}
+
+    def limits(self) -> dict[str, Limits]:
+        """What every number may be."""
+        return {name: limits for name, (_, limits) in _walk(self)}
+
+    def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Self:
+        """The same with other numbers.
+
+        Args:
+            values: Numbers, distributions or these as plain values, by dotted name.
+
+        Raises:
+            ValueError: There is no such number, or it cannot be this; every mistake.
+        """
+        known = dict(_walk(self))
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise ValueError(
+                "\n".join(f"{name}: no number of this name. {did_you_mean(name, known)}" for name in unknown)
+            )
+        tree = self.to_dict()
+        vary = tree.pop("vary", {})
+        for name, value in values.items():
+            if isinstance(value, Mapping):
+                vary[name] = _distribution(name, value)
+            elif isinstance(value, Distribution):
+                vary[name] = value
+            else:
+                vary.pop(name, None)
+                _set(tree, name.split("."), value)
+        return type(self)(**tree, vary=vary)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The description as plain values; `from_dict` makes it again."""
+        values = self.model_dump(mode="json", exclude={"vary"})
+        return values | (
+            {"vary": {name: drawn.to_dict() for name, drawn in self.vary.items()}} if self.vary else {}
+        )
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The description that `to_dict` made plain.
+
+        Raises:
+            ValueError: It is none; every mistake with its place.
+        """
+        return cls(**values)
+
+
+def _distribution(place: str, values: Mapping[str, Any]) -> Distribution:
+    """A distribution whose mistakes are told with its place."""
+    try:
+        return Distribution(**values)
+    except ValueError as error:
+        lines = str(error).split("\n")
+        raise ValueError(
+            "\n".join(place + line.removeprefix("Distribution").rstrip(".") for line in lines)
+        ) from None
+
+
+def _walk(model: Settings, place: str = "") -> Iterator[tuple[str, tuple[float, Limits]]]:
+    """Every number with its dotted name and limits."""
+    for key, field in type(model).model_fields.items():
+        value = getattr(model, key)
+        if NUMBER in field.metadata:
+            yield place + key, (value, _limits(field.metadata))
+        elif isinstance(value, Settings):
+            yield from _walk(value, f"{place}{key}.")
+        elif isinstance(value, tuple):
+            for k, part in enumerate(value):
+                if isinstance(part, Settings):
+                    yield from _walk(part, f"{place}{key}.{k}.")
+
+
+def _limits(metadata: list[Any]) -> Limits:
+    least, most, is_open = -math.inf, math.inf, False
+    for rule in metadata:
+        if isinstance(rule, Ge):
+            least = float(rule.ge)  # type: ignore[arg-type]
+        elif isinstance(rule, Gt):
+            least, is_open = float(rule.gt), True  # type: ignore[arg-type]
+        elif isinstance(rule, Le | Lt):
+            most = float(rule.le if isinstance(rule, Le) else rule.lt)  # type: ignore[arg-type]
+    return Limits(least, most, is_open)
+
+
+def _limited(name: str, drawn: Distribution, limits: Limits) -> Distribution:
+    """A distribution that keeps a number's limits; a normal one is cut there.
+
+    Raises:
+        ValueError: It does not.
+    """
+    if drawn.normal is not None and not limits.least <= drawn.normal[0] <= limits.most:
+        raise ValueError(f"{name}: expected a mean {_in_words(limits)}, came {drawn.normal[0]:g}")
+    if drawn.normal is not None and drawn.lowest <= limits.least and limits.open_least:
+        raise ValueError(
+            f"{name}: a normal distribution reaches {limits.least:g}, and this number must be more. Add `least`"
+        )
+    if drawn.normal is not None:
+        low = None if limits.least == -math.inf or drawn.least is not None else limits.least
+        high = None if limits.most == math.inf or drawn.most is not None else limits.most
+        cut = {key: end for key, end in (("least", low), ("most", high)) if end is not None}
+        drawn = drawn.model_copy(update=cut)
+    is_low = drawn.lowest <= limits.least if limits.open_least else drawn.lowest < limits.least
+    if is_low or drawn.highest > limits.most:
+        raise ValueError(
+            f"{name}: expected numbers {_in_words(limits)}, came {drawn.lowest:g} to {drawn.highest:g}"
+        )
+    return drawn
+
+
+def _in_words(limits: Limits) -> str:
+    low = f"{'more than' if limits.open_least else 'of at least'} {limits.least:g}"
+    high = f"at most {limits.most:g}"
+    if limits.least == -math.inf:
+        return high
+    return low if limits.most == math.inf else f"{low} and {high}"
+
+
+def _set(tree: Any, path: list[str], value: Any) -> None:
+    for key in path[:-1]:
+        tree = tree[int(key)] if isinstance(tree, list) else tree[key]
+    tree[path[-1]] = value
+
+
+def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of a file with the units that keys end in taken away: track_mm = 153 becomes track = 0.153.
+
+    Raises:
+        ValueError: A number is given twice, in two units.
+    """
+
+    def plain(value: Any, place: str) -> Any:
+        if isinstance(value, Mapping):
+            found: dict[str, Any] = {}
+            for key, part in value.items():
+                unit = next((unit for unit in UNITS if isinstance(key, str) and key.endswith(unit)), "")
+                name = key.removesuffix(unit) if unit else key
+                if name in found:
+                    raise ValueError(f"{place}{name}: given twice, also as {key}. Keep one")
+                found[name] = plain(_converted(part, unit), f"{place}{name}.")
+            return found
+        if isinstance(value, list | tuple):
+            return [plain(part, f"{place}{k}.") for k, part in enumerate(value)]
+        return value
+
+    converted: dict[str, Any] = plain(values, "")
+    return converted
+
+
+def _converted(value: Any, unit: str) -> Any:
+    if not unit or isinstance(value, bool):
+        return value
+    if isinstance(value, int | float):
+        try:
+            return UNITS[unit](value)
+        except OverflowError:
+            return math.inf
+    if isinstance(value, list | tuple):
+        return [_converted(part, unit) for part in value]
+    if isinstance(value, Mapping):
+        return {key: part if key == "per" else _converted(part, unit) for key, part in value.items()}
+    return value
+
+
+def _split(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Distribution]]:
+    """Values with every distribution replaced by its center, and the distributions by dotted name.
+
+    Raises:
+        ValueError: A distribution is none; every mistake.
+    """
+    vary: dict[str, Distribution] = {}
+    problems: list[str] = []
+
+    def plain(value: Any, place: str) -> Any:
+        if isinstance(value, Mapping) and set(value) & set(KINDS):
+            try:
+                value = _distribution(place, value)
+            except ValueError as error:
+                problems.append(str(error))
+                return 1.0
+        if isinstance(value, Distribution):
+            vary[place] = value
+            return value.center
+        if isinstance(value, Mapping):
+            return {key: plain(part, f"{place}.{key}") for key, part in value.items()}
+        if isinstance(value, list | tuple):
+            if place in SHORT and len(value) == len(SHORT[place]):
+                return plain(dict(zip(SHORT[place], value, strict=True)), place)
+            names = ROWS.get(place.rsplit(".", 1)[-1])
+            return [plain(_row(part, names), f"{place}.{k}") for k, part in enumerate(value)]
+        return value
+
+    found = {key: value if key == "vary" else plain(value, key) for key, value in values.items()}
+    if problems:
+        raise ValueError("\n".join(problems))
+    return found, vary
+
+
+def _row(value: Any, names: tuple[str, ...] | None) -> Any:
+    is_row = names is not None and isinstance(value, list | tuple) and len(value) == len(names)
+    return dict(zip(names, value, strict=True)) if is_row and names else value

@@ -1,0 +1,100 @@
+"""What stands in an arena besides its walls: obstacles, lights, a goal, and what is on the floor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ._part import Points, rounded
+
+TAPE_WIDTH = 0.019  # of a line on the floor [m]: the usual 3/4 in
+Segment = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A convex outline that stands somewhere: a box, a polygon or, with one corner, a disc.
+
+    Attributes:
+        x, y: Where its own origin is [m].
+        heading: How far it is turned [rad, counter-clockwise].
+        corners: (c, 2) in its own frame [m], counter-clockwise.
+        radius: By how much it is grown to all sides [m].
+    """
+
+    x: float
+    y: float
+    heading: float = 0.0
+    corners: Points = ((0.0, 0.0),)
+    radius: float = 0.0
+
+    @property
+    def placed(self) -> Points:
+        """(c, 2) its corners in the arena [m], before they are grown."""
+        return tuple(self._at(x, y) for x, y in self.corners)
+
+    def outline(self, *, step: float = math.pi / 16) -> Points:
+        """(p, 2) points around it in the arena [m], rounded corners as short lines."""
+        return tuple(self._at(x, y) for x, y in rounded(self.corners, self.radius, step=step))
+
+    def edges(self) -> Iterator[Segment]:
+        """Its straight sides in the arena [m], moved out by its radius; a disc has none."""
+        corners = self.placed
+        for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True):
+            length = math.hypot(x2 - x1, y2 - y1)
+            if length:
+                out_x, out_y = self.radius * (y2 - y1) / length, -self.radius * (x2 - x1) / length
+                yield x1 + out_x, y1 + out_y, x2 + out_x, y2 + out_y
+
+    def distance(self, x: float, y: float) -> float:
+        """From a point to it [m]; negative inside."""
+        corners = self.placed
+        ends = list(zip(corners, (*corners[1:], corners[0]), strict=True))
+        inside = len(corners) > 2 and all(
+            (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1) >= 0 for (x1, y1), (x2, y2) in ends
+        )
+        nearest = min(distance_to_segment(x, y, (*first, *last)) for first, last in ends)
+        return (-nearest if inside else nearest) - self.radius
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        sine, cosine = math.sin(self.heading), math.cos(self.heading)
+        return self.x + x * cosine - y * sine, self.y + x * sine + y * cosine
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light that shines from a point to all sides.
+
+    Attributes:
+        x, y: Where [m].
+        strength: What a light sensor with gain 1 reads that looks at it from 1 m.
+    """
+
+    x: float
+    y: float
+    strength: float = 1.0
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A disc that a robot should reach.
+
+    Attributes:
+        x, y: Its center [m].
+        radius: How near counts [m].
+    """
+
+    x: float
+    y: float
+    radius: float
+
+
+def distance_to_segment(x: float, y: float, segment: Segment) -> float:
+    """From a point to a straight line with two ends [m]."""
+    x1, y1, x2, y2 = segment
+    along_x, along_y = x2 - x1, y2 - y1
+    squared = along_x**2 + along_y**2
+    share = 0.0 if not squared else ((x - x1) * along_x + (y - y1) * along_y) / squared
+    share = min(1.0, max(0.0, share))
+    return math.hypot(x - x1 - share * along_x, y - y1 - share * along_y)

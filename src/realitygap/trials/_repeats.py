@@ -69,6 +69,7 @@ def retry_genomes(
         names = batch.drawn_names
         counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))
     all_drawn = np.concatenate([drawn[row] for row in range(len(genomes))]) if drawn else np.empty((0, 0))
+    n_line, n_ends, n_stalls = counts.reshape(3, -1)
     return TrialBatch(
-        cells.reshape(-1, arena.grid.n_cells), *counts.reshape(3, -1), drawn=all_drawn, drawn_names=names
+        cells.reshape(-1, arena.grid.n_cells), n_line, n_ends, n_stalls, drawn=all_drawn, drawn_names=names
     )

@@ -9,6 +9,7 @@ import typer
 from realitygap._version import __version__
 
 from ._audit import audit_results
+from ._audit_distance import audit_distance
 from ._bench import bench
 from ._emulate import emulate
 from ._export import export
@@ -54,6 +55,7 @@ app.command("show")(show)
 app.command("export")(export)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
+app.command("audit-distance")(audit_distance)
 app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)

@@ -88,7 +88,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             needs_order=False,
             is_metric=True,
             unit="cells",
-            cost="n + m, and c to sort",
+            cost="n + m + c",
             description="The distances of the cells at equal places of the two sorted lists, added up; each cell "
             "that only the longer list has counts with the largest distance in the grid.",
             source="Rosenzweig & Remy, section 2.4.",

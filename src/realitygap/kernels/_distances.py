@@ -282,3 +282,16 @@ def distances_between(measure, behaviors, others, distance):
     """
     for row in range(distance.shape[0]):
         distances_to(measure, behaviors, row, others, distance.shape[1], distance[row])
+
+
+@kernel
+def distances_in_pairs(measure, behaviors, distance):
+    """The first behavior against the second, the third against the fourth, and so on.
+
+    Args:
+        measure: As in `distance_of`.
+        behaviors: 2 n of them.
+        distance: (n,) float64, written.
+    """
+    for k in range(distance.size):
+        distance[k] = distance_of(measure, behaviors, 2 * k, behaviors, 2 * k + 1)

@@ -119,6 +119,8 @@ def _keep_state(trace, lanes, first, n_lanes, step):
             trace.wheels[step, w, k] = lanes.wheels[w, lane]
         for s in range(trace.readings.shape[1]):
             trace.readings[step, s, k] = lanes.readings[s, lane]
+        for s in range(trace.distances.shape[1]):
+            trace.distances[step, s, k] = lanes.senses.near[s, lane]
 
 
 @kernel

@@ -78,6 +78,9 @@ class SimTrace(NamedTuple):
     commands: NDArray[np.floating]  # (t, 2, k) what they answered, -1..1
     stalled: NDArray[np.bool_]  # (t + 1, k)
     wheels: NDArray[np.floating]  # (t + 1, 2, k) driven since the start by the left and right wheel [m]
+    distances: NDArray[
+        np.floating
+    ]  # (t + 1, r, k) from each range sensor to what is nearest, without noise [m]
 
 
 def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
@@ -90,6 +93,7 @@ def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
         np.zeros((max(n_steps, 0), 2, n_kept), dtype),
         np.zeros((t, n_kept), np.bool_),
         np.zeros((t, 2, n_kept), dtype),
+        np.zeros((t, shape.row_range.size, n_kept), dtype),
     )
 
 

@@ -406,12 +406,20 @@ def sim_table(
     for name, value in numbers.items():
         table[rows[name]] = value
     for name, row in rows.items():
-        if is_angle(name):
-            table[row] /= math.tau
-        parts = name.split(".")
-        if parts[0] == "arena" and "corner" not in parts and parts[-1] in AXES:
-            table[row] -= origin[AXES[parts[-1]]]
+        table[row] = in_table(name, table[row], origin)
     return table.astype(dtype)
+
+
+def in_table(
+    name: str, values: NDArray[np.float64], origin: Sequence[float] = (0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Values of a number as the table holds them: angles in whole turns, places in the arena from the origin."""
+    if is_angle(name):
+        return values / math.tau
+    parts = name.split(".")
+    if parts[0] == "arena" and "corner" not in parts and parts[-1] in AXES:
+        return values - origin[AXES[parts[-1]]]
+    return values
 
 
 def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:

@@ -20,6 +20,14 @@ from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
+from realitygap.report._distance_audit import (
+    Confound,
+    DistanceAudit,
+    Estimate,
+    audit_distance,
+    distance_notes,
+)
+from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._effects import (
@@ -35,7 +43,7 @@ from realitygap.report._frame_file import export_frame
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
-from realitygap.report._motion import Each, choose_moving, write_movie
+from realitygap.report._motion import Each, choose_moving, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
 from realitygap.report._paper_audit import Finding, audit_paper
@@ -88,6 +96,14 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "DoubtfulValue",
     "audit_paper",
     "Finding",
+    # distances of behaviors
+    "audit_distance",
+    "distance_notes",
+    "DistanceAudit",
+    "Confound",
+    "Estimate",
+    "draw_distance",
+    "save_distance",
     # figures
     "draw_coverage",
     "draw_paths",
@@ -112,6 +128,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_divergence",
     # in motion
     "write_movie",
+    "watch",
     "choose_moving",
     "Each",
     # for other programs

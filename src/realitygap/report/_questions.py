@@ -216,7 +216,7 @@ def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
     name = condition["name"]
     replicates = [int(run) for run in tally.replicates(name)[:MOST_RUNS]]
     rows = tally.folder.read(name, replicates, ["replicate", "cells"])
-    columns, lines = _grid(condition)
+    columns, lines = grid_of(condition)
     points = np.stack(np.divmod(np.arange(columns * lines), lines), axis=1).astype(float)
     rng = np.random.default_rng(SEED)
     lengths = rows["replicate"].rle().struct.field("len").to_list()
@@ -247,7 +247,7 @@ def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_
     return visited
 
 
-def _grid(condition: Mapping[str, Any]) -> tuple[int, int]:
+def grid_of(condition: Mapping[str, Any]) -> tuple[int, int]:
     """Columns and rows of the arena's reachable cells; the paper's where the settings do not say."""
     try:
         grid = ArenaSettings.model_validate(settings_of(condition).get("arena", {})).arena().grid

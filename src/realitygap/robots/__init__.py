@@ -8,6 +8,7 @@ from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
 from ._scribbler_platform import ScribblerPlatform
+from ._sim import SimPlatform
 
 __all__ = [
     "STEP_S",
@@ -21,6 +22,7 @@ __all__ = [
     "Recording",
     "Robot",
     "ScribblerPlatform",
+    "SimPlatform",
     "SystemClock",
     "check_command",
     "export_mcap",

@@ -13,16 +13,20 @@ from pydantic import BaseModel, ValidationError
 
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import Condition
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
 from ._problems import Problems
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
-PLATFORMS: dict[str, type[BaseModel]] = {"jyro": JyroPlatform, "scribbler": ScribblerPlatform}
+PLATFORMS: dict[str, type[BaseModel]] = {
+    "jyro": JyroPlatform,
+    "sim": SimPlatform,
+    "scribbler": ScribblerPlatform,
+}
 SECTIONS: dict[str, type[BaseModel]] = {
     "arena": ArenaSettings,
     "task": CoverageTask,

@@ -8,6 +8,8 @@ from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
+from ._sim import SimTrials
+from ._sim_scene import SimScene, sim_scene
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -22,6 +24,8 @@ __all__ = [
     "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimScene",
+    "SimTrials",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",
@@ -36,6 +40,7 @@ __all__ = [
     "poses_of",
     "preflight",
     "retry_genomes",
+    "sim_scene",
     "simulate_case",
     "simulate_file",
     "trace_genome",

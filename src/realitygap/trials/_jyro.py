@@ -149,7 +149,7 @@ class JyroTrials:
     ) -> None:
         self.n_steps = platform.steps
         self.sensors = tuple(f"range.{k}" for k in range(len(platform.sensors.mounts)))
-        self.reach = np.full(len(self.sensors), platform.sensor_range)
+        self.distance_unit = platform.sensor_range
         self._rules = rules
         self._n_cells = arena.grid.n_cells
         self._hidden_room = -1

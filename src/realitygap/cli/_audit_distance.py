@@ -1,0 +1,66 @@
+"""`realitygap audit-distance`: what a distance of behaviors weighs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from realitygap.errors import RealityGapError
+
+
+def audit_distance(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="paper, ordered, jaccard, hamming, final, edit or alignment."),
+    ],
+    folder: Annotated[
+        Path | None,
+        typer.Argument(metavar="DIR", help="A folder of results, whose trials are compared as well."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Draw it: ends in .svg, .pdf or .png.")
+    ] = None,
+    sort: Annotated[
+        Literal["x-then-y", "y-then-x"],
+        typer.Option(metavar="ORDER", help="How the paper's distance sorts cells: x-then-y or y-then-x."),
+    ] = "x-then-y",
+    straight: Annotated[
+        float,
+        typer.Option(min=0.0, max=1.0, metavar="P", help="How often a random walk goes on as it went."),
+    ] = 0.6,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of random walks and pairs.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+) -> None:
+    """Say what a distance of behaviors weighs: each cell, and how many there are.
+
+    The weight of a cell is what adding it to a random walk, or removing it, does to the distance. The relation with
+    length is the rank correlation of the distance of two behaviors with the difference in visited cells: over random
+    walks and, with a folder, over trials of different runs of each condition.
+
+    Example: realitygap audit-distance paper -o paper.svg
+
+    Example: realitygap audit-distance jaccard results/paper
+
+    In Python: realitygap.report.audit_distance("jaccard", "results/paper")
+    """
+    from realitygap.report import audit_distance as audit_named
+    from realitygap.report import distance_notes, save_distance
+    from realitygap.report._formats import check_ending
+
+    try:
+        if out is not None:
+            check_ending(out, (".pdf", ".png", ".svg"))
+        audit = audit_named(name, folder, seed=seed, sort=sort, straight=straight)
+        path = None if out is None else save_distance(audit, out)
+    except ValueError as error:
+        raise RealityGapError(str(error)) from error
+    if as_json:
+        typer.echo(json.dumps(audit.to_dict(), indent=2))
+    else:
+        for note in distance_notes(audit):
+            typer.echo(note)
+    if path is not None:
+        typer.echo(f"Written: {path}", err=as_json)

@@ -1,0 +1,465 @@
+"""What a distance of behaviors weighs: each cell, and how many there are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+from scipy import special, stats
+
+from realitygap.errors import RecordError, real_number, whole_number
+from realitygap.evolution import BehaviorDistance, behavior_distance
+from realitygap.evolution._distances import Sort, measure_of, pack_behaviors
+from realitygap.kernels import _distances
+from realitygap.records import ResultsFolder
+from realitygap.report._questions import grid_of
+from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._tally import label_of
+
+Values = npt.NDArray[np.float64]
+
+SEED = 1
+N_WALKS = 1000
+"""Random walks to which each cell is added, or from which it is taken."""
+N_PAIRS = 4000
+MOST_STEPS = 87
+"""Of a random walk: those of the paper's simulated trial."""
+STRAIGHT = 0.6
+"""How often a random walk goes on as it went, unless told otherwise."""
+CELL_M = 0.0762
+"""The paper's cell of 3 in, by which final positions of walks are told in meters."""
+_RESAMPLES = 1000
+_TENTH = 1.1
+"""By how much cells must weigh more than others for it to be called a bias."""
+_LEAST_PAIRS = 10
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval.
+
+    Attributes:
+        value: from all walks or pairs.
+        low: lower bound, and
+        high: upper one; NaN where there is none.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Confound:
+    """How far a distance is one of lengths, over pairs of behaviors.
+
+    Attributes:
+        of: `random walks`, or the condition whose trials were compared.
+        label: SIM, TWIN, EMULATED or REAL; empty for random walks.
+        n_pairs: pairs, no behavior in two of them.
+        mean_cells: cells of a behavior, on average.
+        contained: of the cells of the shorter behavior, the share that the longer one visited too, on average [0..1].
+        correlation: Spearman's, of the distance with the difference of the numbers of cells; NaN where either is the
+            same for all pairs. Interval: Bonett & Wright (2000).
+        length_difference: (n_pairs,) [cells].
+        distance: (n_pairs,) in the unit of the distance.
+    """
+
+    of: str
+    label: str
+    n_pairs: int
+    mean_cells: float
+    contained: float
+    correlation: Estimate
+    length_difference: Values
+    distance: Values
+
+    @property
+    def shared(self) -> float:
+        """Of the variance of the ranks of distances, the share that goes with the lengths [0..1]."""
+        return self.correlation.value**2
+
+
+@dataclass(frozen=True)
+class DistanceAudit:
+    """What `audit_distance` finds.
+
+    Attributes:
+        distance: which one.
+        columns, rows: size of the grid; `sort`: how the paper's distance sorts cells.
+        seed: of the random walks; `straight`: how often they go on as they went.
+        n_walks: to which each cell was added, or from which it was taken.
+        leverage: (rows, columns) mean distance from a walk to the walk with, or without, the cell, in the unit of the
+            distance; `leverage_low`, `leverage_high`: its 95 % interval.
+        front_over_back: mean leverage of the first quarter of cells, as the paper sorts them, over the last quarter's.
+        order_correlation: Spearman's, of leverage with the place of the cell in that order.
+        highest_over_lowest: of all cells' leverages; infinite where the lowest is 0.
+        confounds: with length: on random walks first, then on each condition of a study.
+    """
+
+    distance: BehaviorDistance
+    columns: int
+    rows: int
+    sort: Sort
+    seed: int
+    straight: float
+    n_walks: int
+    leverage: Values
+    leverage_low: Values
+    leverage_high: Values
+    front_over_back: Estimate
+    order_correlation: Estimate
+    highest_over_lowest: float
+    confounds: list[Confound]
+
+    @property
+    def relative_leverage(self) -> Values:
+        """(rows, columns) leverage over its mean over cells; NaN where no cell has any."""
+        mean = float(self.leverage.mean())
+        return self.leverage / mean if mean > 0 else np.full_like(self.leverage, math.nan)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the single pairs, as plain values."""
+        found = asdict(self)
+        for name in ("leverage", "leverage_low", "leverage_high"):
+            found[name] = getattr(self, name).tolist()
+        found["most_steps"] = MOST_STEPS
+        found["weight_bias"] = weight_bias(self)
+        for plain, confound in zip(found["confounds"], self.confounds, strict=True):
+            del plain["length_difference"], plain["distance"]
+            plain["shared"] = confound.shared
+        plain_values: dict[str, Any] = _without_nan(found)
+        return plain_values
+
+
+def _without_nan(value: Any) -> Any:
+    """JSON has no such numbers: None in their place."""
+    if isinstance(value, dict):
+        return {key: _without_nan(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def audit_distance(
+    name: str,
+    folder: ResultsFolder | str | Path | None = None,
+    *,
+    seed: int = SEED,
+    straight: float = STRAIGHT,
+    n_walks: int = N_WALKS,
+    n_pairs: int = N_PAIRS,
+    sort: Sort = "x-then-y",
+) -> DistanceAudit:
+    """What a distance of behaviors weighs: each cell, and how many there are.
+
+    A random walk starts in any of the paper's 12 x 6 cells and makes 1 to 87 steps to one of the four next cells, going
+    on as it went in six of ten. A cell's leverage is the mean distance from a walk to the same walk without the cell,
+    or with it where the walk leaves it out: it then comes right after the first visit of the cell nearest to it. Of a
+    metric that is the most by which the cell can change the distance to any behavior.
+
+    Args:
+        name: of the distance.
+        folder: the results of a study, or the path to them, for the relation with length there; trials of different
+            runs are compared.
+        seed: of walks and pairs.
+        straight: how often a random walk goes on as it went, 0 to 1.
+        n_walks: for the leverage, at least 10.
+        n_pairs: of behaviors, for the relation with length, at least 10.
+        sort: how the paper's distance sorts cells.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        TypeError, ValueError: there is no such distance; a number is no whole one or too small; the distance compares
+            where trials ended, which rows do not hold.
+    """
+    distance = behavior_distance(name)
+    seed = whole_number("seed", seed, 0)
+    n_walks = whole_number("n_walks", n_walks, 10, 1_000_000)
+    n_pairs = whole_number("n_pairs", n_pairs, _LEAST_PAIRS, 1_000_000)
+    straight = real_number("straight", straight, 0.0, 1.0)
+    columns, rows = 12, 6
+    rng = np.random.default_rng(seed)
+    walks = [random_walk(rng, columns, rows, straight) for _ in range(max(n_walks, 2 * n_pairs))]
+    leverages = _leverages(distance, walks[:n_walks], columns, rows, sort)
+    order = _order(columns, rows, sort)
+    means, front, trend = _resampled(leverages[:, order], rng)
+    low, high = (np.empty(columns * rows) for _ in range(2))
+    low[order], high[order] = np.quantile(means, _BEYOND, axis=0)
+    mean = leverages.mean(axis=0)
+    confounds = [_confound("random walks", "", distance, walks[: 2 * n_pairs], columns, rows, sort)]
+    if folder is not None:
+        confounds += _confounds_of(folder, distance, rng, n_pairs, sort)
+    return DistanceAudit(
+        distance=distance,
+        columns=columns,
+        rows=rows,
+        sort=sort,
+        seed=seed,
+        straight=straight,
+        n_walks=n_walks,
+        leverage=mean.reshape(rows, columns),
+        leverage_low=low.reshape(rows, columns),
+        leverage_high=high.reshape(rows, columns),
+        front_over_back=Estimate(_front_over_back(mean[order][None])[0], *np.quantile(front, _BEYOND)),
+        order_correlation=Estimate(_trend(mean[order][None])[0], *np.quantile(trend, _BEYOND)),
+        highest_over_lowest=float(mean.max() / mean.min()) if mean.min() > 0 else math.inf,
+        confounds=confounds,
+    )
+
+
+_BEYOND = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
+
+
+# --- random walks -------------------------------------------------------------------------------------------
+
+_WAYS = ((1, 0), (0, 1), (-1, 0), (0, -1))
+
+
+def random_walk(rng: np.random.Generator, columns: int, rows: int, straight: float) -> list[int]:
+    """The cells of a random walk, step by step: the first one, and one after each step."""
+    x, y = int(rng.integers(columns)), int(rng.integers(rows))
+    cells = [columns * y + x]
+    way = (0, 0)
+    for goes_on in rng.random(int(rng.integers(1, MOST_STEPS + 1))) < straight:
+        open_ways = [(a, b) for a, b in _WAYS if 0 <= x + a < columns and 0 <= y + b < rows]
+        if not goes_on or way not in open_ways:
+            way = open_ways[int(rng.integers(len(open_ways)))]
+        x, y = x + way[0], y + way[1]
+        cells.append(columns * y + x)
+    return cells
+
+
+def _as_behavior(distance: BehaviorDistance, walk: Sequence[int], columns: int) -> Any:
+    """What a distance compares of a walk: its cells, or the middle of the last one [m]."""
+    if distance.compares == "cells":
+        return walk
+    row, column = divmod(walk[-1] if walk else 0, columns)
+    return ((column + 0.5) * CELL_M, (row + 0.5) * CELL_M)
+
+
+# --- leverage -----------------------------------------------------------------------------------------------
+
+
+def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
+    """A walk without a cell, or, where it leaves it out, with it: after the first visit of the nearest cell."""
+    if cell in walk:
+        return [each for each in walk if each != cell]
+    y, x = divmod(cell, columns)
+    apart = [(each % columns - x) ** 2 + (each // columns - y) ** 2 for each in walk]
+    after = apart.index(min(apart)) + 1
+    return [*walk[:after], cell, *walk[after:]]
+
+
+def _leverages(
+    distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: Sort
+) -> Values:
+    """(w, c) distance from each walk to itself with each cell changed."""
+    found = np.empty((len(walks), columns * rows))
+    for k, walk in enumerate(walks):
+        variants = [changed_walk(walk, cell, columns) for cell in range(columns * rows)]
+        behaviors = [_as_behavior(distance, each, columns) for each in (walk, *variants)]
+        found[k] = distance.distances(behaviors[:1], behaviors[1:], columns=columns, rows=rows, sort=sort)
+    return found
+
+
+def _order(columns: int, rows: int, sort: Sort) -> npt.NDArray[np.int64]:
+    """(c,) cells as the paper sorts them."""
+    numbers = np.arange(columns * rows).reshape(rows, columns)
+    return (numbers.T if sort == "x-then-y" else numbers).ravel()
+
+
+def _resampled(leverages: Values, rng: np.random.Generator) -> tuple[Values, Values, Values]:
+    """Of walks drawn again with replacement: (b, c) means, (b,) front over back, (b,) correlations with order."""
+    n = len(leverages)
+    weights = rng.multinomial(n, np.full(n, 1 / n), _RESAMPLES) / n
+    means = weights @ leverages
+    return means, _front_over_back(means), _trend(means)
+
+
+def _front_over_back(means: Values) -> Values:
+    """(b,) of (b, c) means in order: those of the first quarter over those of the last."""
+    quarter = max(1, means.shape[1] // 4)
+    back = means[:, -quarter:].mean(axis=1)
+    front = means[:, :quarter].mean(axis=1)
+    ratio: Values = np.divide(front, back, out=np.full(len(means), math.nan), where=back > 0)
+    return ratio
+
+
+def _trend(means: Values) -> Values:
+    """(b,) Spearman's correlation of (b, c) means with their place; NaN where all are equal."""
+    # equal but for the rounding of sums is equal
+    ranks = stats.rankdata(means.round(9), axis=1)
+    ranks -= ranks.mean(axis=1, keepdims=True)
+    place = np.arange(means.shape[1]) - (means.shape[1] - 1) / 2
+    spread = np.sqrt((ranks**2).sum(axis=1) * (place**2).sum())
+    found: Values = np.divide(ranks @ place, spread, out=np.full(len(means), math.nan), where=spread > 0)
+    return found
+
+
+# --- the relation with length -------------------------------------------------------------------------------
+
+
+def _confound(
+    of: str,
+    label: str,
+    distance: BehaviorDistance,
+    behaviors: Sequence[Sequence[int]],
+    columns: int,
+    rows: int,
+    sort: Sort,
+) -> Confound:
+    """Of behaviors two by two: the first with the second, the third with the fourth, and so on."""
+    measure = measure_of(distance.name, columns, rows, sort)
+    packed = pack_behaviors(
+        measure, [_as_behavior(distance, each, columns) for each in behaviors], columns, rows
+    )
+    apart = np.empty(len(behaviors) // 2)
+    _distances.distances_in_pairs(measure, packed, apart)
+    visited = [set(each) for each in behaviors]
+    lengths = np.array([len(each) for each in visited], np.float64)
+    difference = np.abs(lengths[0::2] - lengths[1::2])
+    both = np.array([len(one & other) for one, other in zip(visited[0::2], visited[1::2], strict=True)])
+    return Confound(
+        of=of,
+        label=label,
+        n_pairs=len(apart),
+        mean_cells=float(lengths.mean()),
+        contained=float((both / np.maximum(1, np.minimum(lengths[0::2], lengths[1::2]))).mean()),
+        correlation=spearman(difference, apart),
+        length_difference=difference,
+        distance=apart,
+    )
+
+
+def spearman(one: Values, other: Values) -> Estimate:
+    """Spearman's rank correlation of n pairs, with its interval.
+
+    Source: Bonett & Wright (2000), Psychometrika 65(1), 23-28: Fisher's z with variance (1 + r^2 / 2) / (n - 3).
+    """
+    if len(one) < _LEAST_PAIRS or np.ptp(one) == 0 or np.ptp(other) == 0:
+        return Estimate(math.nan, math.nan, math.nan)
+    # two sums of one distance in another order are one distance
+    value = float(np.corrcoef(stats.rankdata(one.round(9)), stats.rankdata(other.round(9)))[0, 1])
+    if abs(value) >= 1:
+        return Estimate(value, value, value)
+    beyond = special.ndtri(_BEYOND[1]) * math.sqrt((1 + value**2 / 2) / (len(one) - 3))
+    low, high = (math.tanh(math.atanh(value) + side * beyond) for side in (-1, 1))
+    return Estimate(value, low, high)
+
+
+def _confounds_of(
+    folder: ResultsFolder | str | Path,
+    distance: BehaviorDistance,
+    rng: np.random.Generator,
+    n_pairs: int,
+    sort: Sort,
+) -> list[Confound]:
+    """On the trials of each condition of a study."""
+    if distance.compares != "cells":
+        raise ValueError(
+            f"Distance {distance.name!r} compares where trials ended, which the rows of a study do not hold. Audit it "
+            "without a folder, on random walks."
+        )
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    found = []
+    for condition in folder.description["conditions"]:
+        rows = folder.read(condition["name"], columns=["replicate", "cells"])
+        behaviors = _pairs_of_runs(rows, rng, n_pairs)
+        if len(behaviors) >= 2 * _LEAST_PAIRS:
+            columns, lines = grid_of(condition)
+            found.append(
+                _confound(condition["name"], label_of(condition), distance, behaviors, columns, lines, sort)
+            )
+    if not found:
+        raise RecordError(
+            f"{folder.path} holds no condition with {2 * _LEAST_PAIRS} trials of two runs or more, so there is nothing "
+            "to compare. Run the study first."
+        )
+    return found
+
+
+def _pairs_of_runs(rows: pl.DataFrame, rng: np.random.Generator, n_pairs: int) -> list[list[int]]:
+    """Behaviors of trials drawn without replacement, two by two of different runs."""
+    drawn = rng.permutation(rows.height)[: 2 * n_pairs]
+    drawn = drawn[: len(drawn) // 2 * 2]
+    run = rows["replicate"].to_numpy()[drawn].reshape(-1, 2)
+    apart = drawn.reshape(-1, 2)[run[:, 0] != run[:, 1]].ravel()
+    behaviors: list[list[int]] = rows["cells"].gather(apart).to_list()
+    return behaviors
+
+
+# --- words --------------------------------------------------------------------------------------------------
+
+
+def distance_notes(audit: DistanceAudit) -> list[str]:
+    """What an audit says, in sentences, and from what."""
+    distance = audit.distance
+    unit = {"cells": "in cells", "m": "in meters", "1": "0 to 1"}[distance.unit]
+    return [
+        f"{distance.name}, {unit}: {distance.description}",
+        f"It compares {_compared(distance)}, is {'a' if distance.is_metric else 'no'} metric of that, and takes "
+        f"{distance.cost} steps for behaviors of n and m of c cells. Source: {distance.source}",
+        _weight_note(audit),
+        *(_length_note(each) for each in audit.confounds),
+        _used_note(audit),
+    ]
+
+
+def _compared(distance: BehaviorDistance) -> str:
+    if distance.compares == "position":
+        return "where trials ended"
+    return "cells in the order of first visits" if distance.needs_order else "which cells were visited"
+
+
+def _weight_note(audit: DistanceAudit) -> str:
+    front, trend = audit.front_over_back, audit.order_correlation
+    if math.isnan(trend.value):
+        return f"Weight: all cells weigh the same, {audit.leverage.mean():.3g}."
+    lead = {1: "low-numbered cells weigh most", -1: "high-numbered cells weigh most", 0: "cells weigh alike"}
+    return (
+        f"Weight: {lead[weight_bias(audit)]}. The first quarter of cells, as the paper sorts them, counts "
+        f"{front.value:.2f} times as much as the last ({front.low:.2f} to {front.high:.2f}); Spearman's correlation of "
+        f"weight with the place in that order is {in_words(trend)}."
+    )
+
+
+def weight_bias(audit: DistanceAudit) -> int:
+    """1 where low-numbered cells weigh more, -1 where high-numbered ones do, 0 where neither is shown by a tenth."""
+    front = audit.front_over_back
+    if front.low > _TENTH:
+        return 1
+    return -1 if front.high < 1 / _TENTH else 0
+
+
+def _length_note(confound: Confound) -> str:
+    found = confound.correlation
+    where = f"{confound.label}, {confound.of}" if confound.label else confound.of
+    if math.isnan(found.value):
+        return f"Length, {where}: no correlation, all pairs being alike in one of the two."
+    return (
+        f"Length, {where}: Spearman's correlation of distance with the difference in cells is {in_words(found)}, "
+        f"{100 * confound.shared:.0f} % of the variance of ranks. Of the cells of the shorter behavior, the longer "
+        f"visited {100 * confound.contained:.0f} %."
+    )
+
+
+def _used_note(audit: DistanceAudit) -> str:
+    pairs = audit.confounds[0].n_pairs
+    return (
+        f"Used: {audit.n_walks:,} random walks for the weight of cells, {pairs:,} pairs of them for length; seed "
+        f"{audit.seed}. A walk starts in any of {audit.columns} x {audit.rows} cells and makes 1 to {MOST_STEPS} steps "
+        f"to one of the four next cells, going on as it went in {100 * audit.straight:.0f} % of them. Intervals: 95 %."
+    )
+
+
+def in_words(found: Estimate) -> str:
+    """A correlation with its interval."""
+    signs = [f"{value:+.2f}".replace("-", "−") for value in (found.value, found.low, found.high)]
+    return f"{signs[0]} ({signs[1]} to {signs[2]})"

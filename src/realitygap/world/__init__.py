@@ -14,7 +14,7 @@ from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
-from ._pictures import arena_picture, robot_picture
+from ._pictures import arena_picture, obstacle_shapes, robot_picture
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
@@ -50,6 +50,7 @@ __all__ = [
     "load_arena",
     "load_robot",
     "model_picture",
+    "obstacle_shapes",
     "paper_arena",
     "robot_names",
     "robot_picture",

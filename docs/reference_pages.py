@@ -26,7 +26,7 @@ from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import MAZE_REWARDS, Condition
 from realitygap.settings import is_hidden
 from realitygap.study import (
@@ -51,6 +51,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
+    "[platform.sim]": SimPlatform,
     "[platform.scribbler]": ScribblerPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import PENS, Ink
+from realitygap.drawing import PENS, Disc, Ink, Line, Shape
 from realitygap.world import Arena
 
-from ._moving import Moment, MovingTrial, nearness, placed, ray_ends
+from ._moving import Moment, MovingTrial, extent, nearness, placed, ray_ends, things_in
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -39,8 +39,8 @@ _EDGE, _HEAD, _FOOT, _ROW = 0.12, 0.36, 0.26, 0.21
 _ACROSS = 4
 """Names side by side below the arena."""
 
-_FAN = 0.045
-"""How far from a robot's middle its letter stands where several robots stand on one spot [m]."""
+_FAN = 0.042
+"""How far from a robot's middle its letter stands where several robots stand on one spot, as a part of the width."""
 
 
 _DOT = 1e-4
@@ -163,6 +163,8 @@ class Screen:
         corners = np.array(tiles)[:, [0, 1, 3, 2]]
         self._tiles = PolyCollection(list(corners), linewidths=0)
         self._add(self._field, self._tiles)
+        for shape in things_in(arena):
+            _draw_shape(self._field, shape)
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in arena.walls]
         self._field.add_artist(
             LineCollection(walls, colors=Ink.TEXT, linewidths=3.2, capstyle="projecting", clip_on=False)
@@ -255,10 +257,12 @@ class Screen:
     def _move_letters(self, moments: Sequence[Moment]) -> None:
         """Letters stand on the robots, and around the spot where several robots stand on one."""
         places = np.array([moment.pose[:2] for moment in moments])
+        left, right = self._field.get_xlim()
+        fan = _FAN * (right - left)
         for pen, robot in enumerate(self._robots):
-            crowd = np.hypot(*(places - places[pen]).T) < _FAN
+            crowd = np.hypot(*(places - places[pen]).T) < fan
             angle = math.pi / 2 - math.tau * pen / len(self._robots)
-            away = _FAN if crowd.sum() > 1 else 0.0
+            away = fan if crowd.sum() > 1 else 0.0
             robot.move_letter(places[pen] + away * np.array([math.cos(angle), math.sin(angle)]))
 
     def _move_words(self, time: float, moments: Sequence[Moment]) -> None:
@@ -351,12 +355,30 @@ class _Robot:
         self._letter.set_position((float(place[0]), float(place[1])))
 
 
-def extent(arena: Arena) -> tuple[float, float, float, float]:
-    """Left, right, lower and upper end of what is shown of an arena [m]."""
-    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
-    margin = 0.012 * float(np.ptp(walls[:, [0, 2]]))
-    xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
-    return xs.min() - margin, xs.max() + margin, ys.min() - margin, ys.max() + margin
+def _draw_shape(axes: Any, shape: Shape) -> None:
+    """A plain shape of something that stands in the arena."""
+    if isinstance(shape, Line):
+        points = np.array([*shape.points, shape.points[0]] if shape.closed else shape.points)
+        if shape.fill is not None:
+            axes.fill(points[:, 0], points[:, 1], color=shape.fill, linewidth=0, zorder=0.5)
+        if shape.color is not None:
+            dashes = tuple(part / shape.width for part in shape.dash)
+            style = (0, dashes) if dashes else "solid"
+            axes.plot(points[:, 0], points[:, 1], color=shape.color, lw=shape.width, ls=style, zorder=0.6)
+    elif isinstance(shape, Disc):
+        axes.plot([shape.x], [shape.y], "o", color=shape.fill, markersize=2 * shape.radius, mew=0, zorder=0.7)
+    else:
+        axes.annotate(
+            shape.text,
+            (shape.x, shape.y),
+            shape.shift,
+            textcoords="offset points",
+            fontsize=shape.size,
+            color=shape.color,
+            ha="center",
+            va="center",
+            zorder=0.8,
+        )
 
 
 def _short(text: str, n_letters: int) -> str:

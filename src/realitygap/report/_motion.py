@@ -171,9 +171,9 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     return in_motion(
         replay(condition, trial.row),
         condition.arena.arena(),
-        condition.jyro,
+        condition.simulated_on,
         title=title,
-        label=condition.jyro.label,
+        label=condition.label,
     )
 
 

@@ -18,6 +18,7 @@ from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, o
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
+from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
 
@@ -50,6 +51,7 @@ __all__ = [
     "light_shapes",
     "load_arena",
     "load_robot",
+    "model_picture",
     "obstacle_shapes",
     "paper_arena",
     "robot_names",

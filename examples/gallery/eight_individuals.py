@@ -14,7 +14,7 @@ realitygap.write_movie(
     sys.argv[1] if len(sys.argv) > 1 else "eight.gif",
     each="individual",
     condition="novelty-50",
-    generation=2,
+    generation=4,
     speed=2,
     width=400,
 )

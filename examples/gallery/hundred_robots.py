@@ -1,7 +1,7 @@
 """One network, a hundred Scribblers.
 
-No two robots are alike. Track, wheels, drift and delay of each are drawn anew, as the study file's `[platform.sim.set]`
-would say it; the network drives them all. Beside it the same with one and the same robot, whose sensors alone are noisy.
+No two robots are alike. Track, wheels, drift and delay of each are drawn anew, as `[platform.sim.set]` in a study file
+says it, and one network drives them all; beside it a hundred trials of one robot, whose sensors and motors are noisy.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """The hard maze: novelty finds the way out, the objective does not.
 
-Where each of the networks of one run ended, in Lehman & Stanley's hard maze: rewarded for being new, and for being near
-the exit, which is behind a wall.
+Where each network of one run ended in Lehman & Stanley's hard maze, later ones darker: rewarded for ending where nobody
+ended before, and for ending near the exit, which lies behind a wall. The line is the way out.
 """
 
 import sys
@@ -19,10 +19,10 @@ arena = load_arena(task.name)
 settings = NeatSettings.named("default").model_copy(update={"population": 250, "generations": 100})
 trials = MazeTrials(arena)
 
-figure = Figure(figsize=(9.6, 5.0))
+figure = Figure(figsize=(9.6, 5.1))
 for k, reward in enumerate(MAZE_REWARDS):
     run = run_maze(task, trials, reward, settings, 1, 0, keep_ends=True)
-    axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.9))
+    axes = figure.add_axes((0.005 + 0.5 * k, 0.005, 0.49, 0.93))
     axes.add_collection(
         LineCollection([[wall[:2], wall[2:]] for wall in arena.walls], colors="#1c1f24", linewidths=2)
     )
@@ -32,8 +32,10 @@ for k, reward in enumerate(MAZE_REWARDS):
     if run.solver is not None:
         poses = trials.path(run.solver).poses
         axes.plot(poses[:, 0], poses[:, 1], color="#b8480a", linewidth=1.8)
-    outcome = f"out after {run.evaluations:,}" if run.solved else f"not out after {run.evaluations:,}"
-    axes.set_title(f"rewarded for {reward}: {outcome} networks (SIM, one run)", fontsize=9.5, loc="left")
-    axes.set_aspect("equal")
+    outcome = "out" if run.solved else "not out"
+    axes.set_title(
+        f"{reward}: {outcome} after {run.evaluations:,} networks (SIM, n = 1 run)", fontsize=10, loc="left"
+    )
+    axes.set(aspect="equal", xlim=(-0.03, 2.08), ylim=(-0.03, 2.08))
     axes.set_axis_off()
 figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "maze.png", dpi=110)

@@ -32,10 +32,10 @@ def visits_of(selection: str) -> tuple[np.ndarray, int]:
     return visits, len(archive)
 
 
-figure = Figure(figsize=(9.6, 3.1))
+figure = Figure(figsize=(9.6, 2.75))
 for k, selection in enumerate(("novelty", "coverage")):
     visits, n_kept = visits_of(selection)
-    axes = figure.add_axes((0.02 + 0.47 * k, 0.04, 0.44, 0.82))
+    axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.88))
     shown = axes.imshow(visits, origin="lower", cmap="Blues", vmin=0, vmax=8 * GENERATIONS)
     for row, column in np.ndindex(visits.shape):
         color = "white" if visits[row, column] > 4 * GENERATIONS else "#1c1f24"

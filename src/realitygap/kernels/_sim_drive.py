@@ -38,7 +38,7 @@ def _alive(command, dead_band):
 
 @stage
 def _mix_wheels(move, turn, ahead, dead_band, left, right):
-    """left = move - turn, right = move + turn, each limited to -1..1; the wheels are those of the body's frame."""
+    """Left = move - turn, right = move + turn, each limited to -1..1; the wheels are those of the body's frame."""
     real = left.dtype.type
     sign = real(ahead)
     for lane in range(LANES):
@@ -287,7 +287,9 @@ def arc_step(length, turn, heading, sine, cosine):
     s, c = sin_cos_of_turns(half)
     angle = half * real(TWO_PI)
     small = abs(angle) < real(SMALL_TURN)
-    chord = length * (real(1.0) - angle * angle * real(1.0 / 6.0) if small else s / (real(1.0) if small else angle))
+    chord = length * (
+        real(1.0) - angle * angle * real(1.0 / 6.0) if small else s / (real(1.0) if small else angle)
+    )
     dx = chord * (cosine * c - sine * s)
     dy = chord * (sine * c + cosine * s)
     turned = heading + turn

@@ -44,7 +44,9 @@ class SimLanes(NamedTuple):
     targets: Rows  # (2 * (delay_steps + 2),) speeds asked for, latest first, left and right in turn
     wheels: Rows  # (2,) driven since the start, as an encoder without error would say [m]
     commands: Rows  # (2,) of the last step, -1..1
-    moved: Rows  # (4,) what the step asks for: length [m] and turn [turns] by the old command, then the new one
+    moved: (
+        Rows  # (4,) what the step asks for: length [m] and turn [turns] by the old command, then the new one
+    )
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
     readings: Rows  # (n_readings,) 0..1, 1 is near

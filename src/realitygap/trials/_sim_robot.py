@@ -157,7 +157,8 @@ class SimRobot:
     @property
     def distances(self) -> NDArray[np.float64]:
         """(rays,) to what is nearest along the rays of the range sensors in turn, without noise [m]."""
-        return self._room.lanes.distances[:, 0].astype(np.float64)
+        distances: NDArray[np.float64] = self._room.lanes.distances[:, 0].astype(np.float64)
+        return distances
 
     @property
     def encoders(self) -> tuple[float, float]:

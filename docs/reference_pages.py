@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import inspect
 import re
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -42,6 +43,7 @@ from realitygap.world import ArenaSettings
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
 MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
+FEATURES_DATA = Path(__file__).parent / "data" / "jyro-features.toml"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
 CONDITION_KEYS = ("name", "selection", "platform", "noise")
 TABLES: dict[str, type[BaseModel]] = {
@@ -77,6 +79,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/ablations.md"] = ablations()
     pages["parts/mazes.md"] = mazes()
     pages["parts/myro.md"] = myro_functions()
+    pages["parts/jyro-features.md"] = jyro_features()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -126,6 +129,37 @@ def meaning(name: str) -> str:
     first = text.split("\n\n")[0]
     more = f" Differs: {differs[1]}" if differs and "Differs:" not in first else ""
     return " ".join((first + more).split())
+
+
+# --- Jyro ---------------------------------------------------------------------------------------------------
+
+
+def jyro_features() -> str:
+    """Every feature of Jyro: where it is here, and the test that holds it, or why it is left out."""
+    parts = []
+    for group, features in tomllib.loads(FEATURES_DATA.read_text("utf-8")).items():
+        rows = [
+            f"| {name} | {feature_place(entry)} | {feature_test(entry)} |" for name, entry in features.items()
+        ]
+        parts.append("\n".join([f"## {group}", "", "| in Jyro | here | test |", "|---|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def feature_place(entry: Mapping[str, Any]) -> str:
+    """Where a feature is, with what is to be said of it."""
+    if "left_out" in entry:
+        return f"left out: {escape(entry['left_out'])}"
+    names = ", ".join(f"`{name}`" for name in entry["here"])
+    attribute = f" (`{entry['attribute']}`)" if "attribute" in entry else ""
+    return f"{names}{attribute}" + (f". {escape(entry['note'])}" if "note" in entry else "")
+
+
+def feature_test(entry: Mapping[str, Any]) -> str:
+    """The test that holds a feature."""
+    if "test" not in entry:
+        return ""
+    file, name = entry["test"].split("::")
+    return f"`tests/{file}`" + ("" if name == "*" else f": {name.removeprefix('test_').replace('_', ' ')}")
 
 
 # --- settings -----------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sim import SimTrials
+from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
@@ -24,6 +25,7 @@ __all__ = [
     "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimRobot",
     "SimScene",
     "SimTrials",
     "Trajectory",

@@ -10,7 +10,7 @@ from ._arena import (
 from ._arena_file import ArenaFile
 from ._case import Case
 from ._distribution import Distribution
-from ._floor import Floor, FloorImage
+from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
@@ -23,6 +23,7 @@ from ._settings import ArenaSettings
 from ._units import INCH
 
 __all__ = [
+    "BARE_FLOOR",
     "INCH",
     "JYRO_SCRIBBLER",
     "NAMED_STARTS",

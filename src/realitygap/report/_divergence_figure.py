@@ -164,6 +164,7 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
             genome,
             noise=on.noise,
             noise_key=replace(key, repeat=repeat),
+            inputs=on.network_inputs,
         )
         trials.append(in_motion(trajectory, arena, on.tried_on, title=name, label=on.label))
     return Side(name, tuple(trials))

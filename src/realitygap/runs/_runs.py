@@ -79,9 +79,9 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
         enabled=zeros(np.bool_, room),
         hidden=zeros(np.int32, hidden_room),
         bias=zeros(np.float64, 2 + hidden_room),
+        ended=zeros(np.float64, 2),
         drawn=zeros(np.float64, len(condition.drawn_names)),
         task_fitness=zeros(np.float64),
-        ended=zeros(np.float64, 2),
     )
 
 

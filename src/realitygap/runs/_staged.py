@@ -128,7 +128,17 @@ class _Staged:
             )
             scored = self._try(n_runs * rules.population)
             self._select(scored, n_runs)
-            _block.keep_runs(runs, genomes, n_runs, scored.cells, scored.counts, rows, first_row, generation)
+            _block.keep_runs(
+                runs,
+                genomes,
+                n_runs,
+                scored.cells,
+                scored.counts,
+                scored.ended,
+                rows,
+                first_row,
+                generation,
+            )
             self._keep(scored, n_runs, rows, first_row, generation)
             if generation + 1 < rules.n_generations:
                 _block.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
@@ -190,6 +200,5 @@ class _Staged:
         place = (slice(first_row, first_row + n_runs), generation)
         n = self.rules.population
         rows.drawn[place] = scored.drawn.reshape(n_runs, n, -1)
-        rows.ended[place] = scored.ended.reshape(n_runs, n, 2)
         if self.task is not None:
             rows.task_fitness[place] = scored.fitness.reshape(n_runs, n)

@@ -8,10 +8,20 @@ from typing import Any
 from realitygap.errors import did_you_mean
 from realitygap.settings import Settings
 
+from ._avoid import AvoidTask
 from ._coverage import CoverageTask
-from ._python import PREFIX, PythonTask
+from ._goal import GoalTask
+from ._light import LightTask
+from ._python import PYTHON, PythonTask
+from ._wall import WallTask
 
-TASKS: dict[str, type[Settings]] = {"coverage": CoverageTask}
+TASKS: dict[str, type[Settings]] = {
+    "coverage": CoverageTask,
+    "avoid": AvoidTask,
+    "light": LightTask,
+    "wall": WallTask,
+    "goal": GoalTask,
+}
 """What `[task] kind` can be, beside python:FILE.py:function; each is a `Settings` and, but for coverage, a `Task`."""
 
 
@@ -22,7 +32,7 @@ def task_model(values: Mapping[str, Any]) -> type[Settings]:
         ValueError: There is no task of this kind.
     """
     kind = values.get("kind", "coverage")
-    if isinstance(kind, str) and kind.startswith(PREFIX):
+    if isinstance(kind, str) and kind.startswith(PYTHON):
         return PythonTask
     if not isinstance(kind, str) or kind not in TASKS:
         raise ValueError(

@@ -134,7 +134,6 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
 
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:
-    shadows = any(sensor.shadows for sensor in robot.light)
     return {
         "range_response": [sensor.response for sensor in robot.range],
         "range_rays": [sensor.rays for sensor in robot.range],
@@ -142,8 +141,10 @@ def _sensors(robot: RobotModel) -> dict[str, Any]:
         "range_pulses": [sensor.pulses for sensor in robot.range],
         "encoders": robot.encoder is not None,
         "n_light": len(robot.light),
-        "light_shadows": "dark" if shadows else "none",
+        "light_shadows": robot.shadows,
+        "stall": robot.stall.kind,
         "n_line": len(robot.line),
+        "line_levels": [sensor.level for sensor in robot.line],
         "n_bump": len(robot.bump),
     }
 

@@ -18,6 +18,7 @@ from ._pictures import arena_picture, robot_picture
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
+from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
 
@@ -47,6 +48,7 @@ __all__ = [
     "is_inside",
     "load_arena",
     "load_robot",
+    "model_picture",
     "paper_arena",
     "robot_names",
     "robot_picture",

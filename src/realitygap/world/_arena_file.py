@@ -218,6 +218,14 @@ class ArenaFile(Described):
     start: StartEntry
     goal: GoalEntry | None = None
 
+    @model_validator(mode="after")
+    def _begins_beside_obstacles(self) -> Self:
+        arena = self.arena()
+        for k, obstacle in enumerate(arena.obstacles):
+            if obstacle.distance(arena.start.x, arena.start.y) < 0:
+                raise ValueError(f"start: lies within obstacle {k}. Move one of the two")
+        return self
+
     @classmethod
     def of(cls, arena: Arena) -> Self:
         """An arena in the form of a file."""

@@ -46,10 +46,7 @@ def arena_picture(
     if sensors is not None:
         shapes += _rays(sensors, arena.start)
     if isinstance(body, RobotModel):
-        shapes += [
-            Line(tuple(_placed(arena.start, x, y) for x, y in part.outline()), Ink.BODY, 1.4, closed=True)
-            for part in body.body
-        ]
+        shapes += _model_shapes(body, arena.start)
     elif body is not None:
         shapes += _outline(body, arena.start)
     shapes += _start(arena.start, size)
@@ -78,6 +75,20 @@ def arena_picture(
         max(top + 0.02 * size, over + 0.04 * size),
         tuple(shapes),
     )
+
+
+def _model_shapes(model: RobotModel, pose: Pose) -> list[Shape]:
+    """A robot of a file at a pose: its rays, cut off at the size of its body, and its outline."""
+    shapes: list[Shape] = []
+    for sensor in model.range:
+        x, y = _placed(pose, sensor.x, sensor.y)
+        angle, far = pose.heading + sensor.direction, min(sensor.reach, 2 * model.radius)
+        end = (x + far * math.cos(angle), y + far * math.sin(angle))
+        shapes += [Line(((x, y), end), Ink.PUBLISHED, 0.9, (3.0, 1.6)), Disc(x, y, 1.3, None, Ink.PUBLISHED)]
+    for part in model.body:
+        outline = tuple(_placed(pose, x, y) for x, y in part.outline())
+        shapes.append(Line(outline, Ink.BODY, 1.4, closed=True))
+    return shapes
 
 
 def _extent(arena: Arena) -> tuple[float, float, float, float]:

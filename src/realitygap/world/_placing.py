@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 
-SAME_PLACE = 1e-9  # two ends of walls this near [m] are one corner: rounding of their coordinates
+SAME_DIGITS = (
+    7  # ends of walls that are the same to so many digits [m] are one corner: rounding of coordinates
+)
 TOUCHING = 1e-9  # outlines that overlap by less [m] touch, which is allowed at the start
 
 
@@ -49,17 +52,16 @@ def enclosing_walls(walls: Sequence[Segment]) -> list[Segment]:
     """The walls that make closed rounds: what is left after taking away those with a loose end, again and again."""
     left = list(walls)
     while True:
-        ends = [((x1, y1), (x2, y2)) for x1, y1, x2, y2 in left]
-        tied = [wall for k, wall in enumerate(left) if all(_is_shared(end, k, ends) for end in ends[k])]
+        counts = Counter(end for wall in left for end in _ends(wall))
+        tied = [wall for wall in left if all(counts[end] > 1 for end in _ends(wall))]
         if len(tied) == len(left):
             return tied
         left = tied
 
 
-def _is_shared(end: Point, k: int, ends: Sequence[tuple[Point, Point]]) -> bool:
-    return any(
-        j != k and any(math.dist(end, other) <= SAME_PLACE for other in pair) for j, pair in enumerate(ends)
-    )
+def _ends(wall: Segment) -> tuple[Point, Point]:
+    x1, y1, x2, y2 = (round(value, SAME_DIGITS) for value in wall)
+    return (x1, y1), (x2, y2)
 
 
 def _is_within(walls: Sequence[Segment], x: float, y: float) -> bool:

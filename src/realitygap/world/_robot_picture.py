@@ -44,7 +44,7 @@ def model_picture(model: RobotModel) -> Picture:
     shapes += _measure(left, low, left, high, _length(high - low), size=size / 0.6)
     if model.drive.mixing == "wheels":
         half = model.drive.track / 2
-        far = max(right, front) + pad
+        far = max(right, front) + 2 * pad
         shapes += _measure(far, -half, far, half, f"track {_length(model.drive.track)}", size=size / 0.6)
         right = far
     left, right, top = left - 1.4 * pad, max(right, front) + pad, max(top, high) + pad
@@ -54,7 +54,7 @@ def model_picture(model: RobotModel) -> Picture:
 def _size(model: RobotModel) -> float:
     """Length or width of the body, whichever is more [m]."""
     xs, ys = zip(*(point for part in model.body for point in part.outline()), strict=True)
-    return max(max(xs) - min(xs), max(ys) - min(ys))
+    return float(max(max(xs) - min(xs), max(ys) - min(ys)))
 
 
 def _with_words(
@@ -91,11 +91,9 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
         cone = f", cone ±{cones[-1]:g}°" if cones[-1] else ""
         same = len({(sensor.x, sensor.y, sensor.direction) for sensor in model.range}) == 1
         where = " at one place" if same and len(model.range) > 1 else ""
-        is_cut = first.reach > FARTHEST * _size(model)
-        found.append(
-            (f"{_count(len(model.range), 'range sensor')}{where}: {kinds}, reach {_length(first.reach)}{', drawn shorter' if is_cut else ''}{cone}",
-             Ink.TEXT, Ink.PUBLISHED)
-        )  # fmt: skip
+        shorter = ", drawn shorter" if first.reach > FARTHEST * _size(model) else ""
+        how = f"{kinds}, reach {_length(first.reach)}{shorter}{cone}"
+        found.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
     if model.light:
         found.append((_count(len(model.light), "light sensor"), Ink.TEXT, Ink.PEN5))
     if model.line:

@@ -39,8 +39,8 @@ _NAME = 1.9
 _DOTS = 90
 """Of a picture, per inch; one that is smaller than 4.8 in would be in smaller letters."""
 
-_LETTERS = 9.5
-"""Of a title, per inch."""
+_ROOMY = 6.0
+"""A picture of this width has room for words in its head [in]."""
 
 _FAN = 0.042
 """How far from a robot's middle its letter stands where several robots stand on one spot, as a part of the width."""
@@ -194,11 +194,13 @@ class Screen:
             )
             box = badge.get_window_extent(self._canvas.get_renderer())
             x = box.x1 / self._figure.dpi + 0.2
+        size, room = (10.0, 2.3) if self._wide >= _ROOMY else (8.5, 1.35)
+        letters = int((self._wide - x - room) * 95 / size)
         self._all.text(
             x,
             _HEAD / 2 + 0.01,
-            _short(self._title, int((self._wide - x - 2.1) * _LETTERS)),
-            fontsize=10,
+            _short(self._title, letters),
+            fontsize=size,
             weight="bold",
             color=Ink.TEXT,
             va="center_baseline",
@@ -207,7 +209,7 @@ class Screen:
             self._wide - _EDGE,
             _HEAD / 2 + 0.01,
             "",
-            fontsize=9.5,
+            fontsize=size - 0.5,
             color=Ink.MUTED,
             ha="right",
             va="center_baseline",
@@ -289,8 +291,10 @@ class Screen:
             word.set_text(f"{blocked}{moment.n_cells / n_cells:.3f}".replace("0.", ".", 1))
             word.set_color(Ink.REACH if moment.stalled else Ink.MUTED)
         step = max(moment.step for moment in moments)
-        parts = [f"step {step} of {self.n_steps}", f"{min(time, self.duration_s):.1f} s"]
-        if not self._several:
+        counted = f"{step} of {self.n_steps}"
+        is_roomy = self._wide >= _ROOMY
+        parts = [f"step {counted}" if is_roomy else counted, f"{min(time, self.duration_s):.1f} s"]
+        if not self._several and is_roomy:
             parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}".replace("0.", ".", 1))
             if moments[0].stalled:
                 parts.insert(0, "× blocked")

@@ -14,7 +14,7 @@ from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
-from ._pictures import arena_picture, obstacle_shapes, robot_picture
+from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
@@ -46,7 +46,10 @@ __all__ = [
     "arena_names",
     "arena_picture",
     "check_start",
+    "floor_shapes",
+    "goal_shapes",
     "is_inside",
+    "light_shapes",
     "load_arena",
     "load_robot",
     "model_picture",

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import inspect
 import re
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -23,7 +24,7 @@ from scipy import stats
 
 from realitygap import myro
 from realitygap.cli import app
-from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
@@ -42,6 +43,7 @@ from realitygap.world import ArenaSettings
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
 MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
+FEATURES_DATA = Path(__file__).parent / "data" / "jyro-features.toml"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
 CONDITION_KEYS = ("name", "selection", "platform", "noise")
 TABLES: dict[str, type[BaseModel]] = {
@@ -72,11 +74,13 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/ledger.md"] = ledger()
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
+    pages["parts/distances.md"] = distances()
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
     pages["parts/mazes.md"] = mazes()
     pages["parts/myro.md"] = myro_functions()
+    pages["parts/jyro-features.md"] = jyro_features()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -126,6 +130,37 @@ def meaning(name: str) -> str:
     first = text.split("\n\n")[0]
     more = f" Differs: {differs[1]}" if differs and "Differs:" not in first else ""
     return " ".join((first + more).split())
+
+
+# --- Jyro ---------------------------------------------------------------------------------------------------
+
+
+def jyro_features() -> str:
+    """Every feature of Jyro: where it is here, and the test that holds it, or why it is left out."""
+    parts = []
+    for group, features in tomllib.loads(FEATURES_DATA.read_text("utf-8")).items():
+        rows = [
+            f"| {name} | {feature_place(entry)} | {feature_test(entry)} |" for name, entry in features.items()
+        ]
+        parts.append("\n".join([f"## {group}", "", "| in Jyro | here | test |", "|---|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def feature_place(entry: Mapping[str, Any]) -> str:
+    """Where a feature is, with what is to be said of it."""
+    if "left_out" in entry:
+        return f"left out: {escape(entry['left_out'])}"
+    names = ", ".join(f"`{name}`" for name in entry["here"])
+    attribute = f" (`{entry['attribute']}`)" if "attribute" in entry else ""
+    return f"{names}{attribute}" + (f". {escape(entry['note'])}" if "note" in entry else "")
+
+
+def feature_test(entry: Mapping[str, Any]) -> str:
+    """The test that holds a feature."""
+    if "test" not in entry:
+        return ""
+    file, name = entry["test"].split("::")
+    return f"`tests/{file}`" + ("" if name == "*" else f": {name.removeprefix('test_').replace('_', ' ')}")
 
 
 # --- settings -----------------------------------------------------------------------------------------------
@@ -316,6 +351,27 @@ def option_text(option: Any) -> str:
     word = option.metavar or ("NAME" if option.type_descriptor.annotation is str else "N")
     takes = "" if option.is_flag else f" {word}"
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
+
+
+# --- distances ----------------------------------------------------------------------------------------------
+
+
+def distances() -> str:
+    """What each distance of behaviors says of itself, and in full."""
+    compared = {
+        "position": "where trials end",
+        True: "the list of cells, in order",
+        False: "the set of cells",
+    }
+    lines = ["| distance | compares | needs the order | metric | unit | steps |", "|---|---|---|---|---|---|"]
+    told = []
+    for name, each in DISTANCES.items():
+        what = compared["position" if each.compares == "position" else each.needs_order]
+        unit = "0 to 1" if each.unit == "1" else each.unit
+        words = ["yes" if value else "no" for value in (each.needs_order, each.is_metric)]
+        lines.append(f"| `{name}` | {what} | {' | '.join(words)} | {unit} | {each.cost} |")
+        told.append(f"`{name}`\n: {escape(each.description)} Source: {escape(each.source)}")
+    return "\n".join(lines) + "\n\n" + "\n\n".join(told) + "\n"
 
 
 # --- choices ------------------------------------------------------------------------------------------------

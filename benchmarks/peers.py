@@ -19,6 +19,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+import enki_peer
+import irsim_peer
 import jyro_peer
 import kheperax_peer
 import multineat_peer
@@ -27,7 +29,14 @@ import ours
 from environments import Peer, PeerError, build_environment, machine, measure
 from work import FIGURES
 
-PEERS = (jyro_peer.PEER, kheperax_peer.PEER, neat_python_peer.PEER, multineat_peer.PEER)
+PEERS = (
+    jyro_peer.PEER,
+    enki_peer.PEER,
+    irsim_peer.PEER,
+    kheperax_peer.PEER,
+    neat_python_peer.PEER,
+    multineat_peer.PEER,
+)
 
 
 def compare(peers: Sequence[Peer], *, fresh: bool = False) -> dict[str, Any]:

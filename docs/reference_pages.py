@@ -8,13 +8,16 @@ from __future__ import annotations
 import csv
 import inspect
 import re
+import tomllib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from scipy import stats
@@ -24,8 +27,9 @@ from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.robots import JyroPlatform, ScribblerPlatform
-from realitygap.runs import Condition
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
+from realitygap.runs import MAZE_REWARDS, Condition
+from realitygap.settings import is_hidden
 from realitygap.study import (
     DEFAULT_NEAT,
     ConditionNotes,
@@ -34,10 +38,12 @@ from realitygap.study import (
     TrialsSection,
     load_study,
 )
-from realitygap.tasks import CLASSICAL_TASKS, CoverageTask
+from realitygap.tasks import CLASSICAL_TASKS, MAZE_TASKS, CoverageTask
 from realitygap.world import ArenaSettings
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
+MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
+FEATURES_DATA = Path(__file__).parent / "data" / "jyro-features.toml"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
 CONDITION_KEYS = ("name", "selection", "platform", "noise")
 TABLES: dict[str, type[BaseModel]] = {
@@ -47,6 +53,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
+    "[platform.sim]": SimPlatform,
     "[platform.scribbler]": ScribblerPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,
@@ -71,7 +78,9 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
+    pages["parts/mazes.md"] = mazes()
     pages["parts/myro.md"] = myro_functions()
+    pages["parts/jyro-features.md"] = jyro_features()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -123,6 +132,37 @@ def meaning(name: str) -> str:
     return " ".join((first + more).split())
 
 
+# --- Jyro ---------------------------------------------------------------------------------------------------
+
+
+def jyro_features() -> str:
+    """Every feature of Jyro: where it is here, and the test that holds it, or why it is left out."""
+    parts = []
+    for group, features in tomllib.loads(FEATURES_DATA.read_text("utf-8")).items():
+        rows = [
+            f"| {name} | {feature_place(entry)} | {feature_test(entry)} |" for name, entry in features.items()
+        ]
+        parts.append("\n".join([f"## {group}", "", "| in Jyro | here | test |", "|---|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+def feature_place(entry: Mapping[str, Any]) -> str:
+    """Where a feature is, with what is to be said of it."""
+    if "left_out" in entry:
+        return f"left out: {escape(entry['left_out'])}"
+    names = ", ".join(f"`{name}`" for name in entry["here"])
+    attribute = f" (`{entry['attribute']}`)" if "attribute" in entry else ""
+    return f"{names}{attribute}" + (f". {escape(entry['note'])}" if "note" in entry else "")
+
+
+def feature_test(entry: Mapping[str, Any]) -> str:
+    """The test that holds a feature."""
+    if "test" not in entry:
+        return ""
+    file, name = entry["test"].split("::")
+    return f"`tests/{file}`" + ("" if name == "*" else f": {name.removeprefix('test_').replace('_', ' ')}")
+
+
 # --- settings -----------------------------------------------------------------------------------------------
 
 
@@ -139,7 +179,7 @@ def settings_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The fields that a study file can set: of a condition only its own keys, its tables being listed apart."""
     if model is Condition:
         return {key: Condition.model_fields[key] for key in CONDITION_KEYS}
-    return model.model_fields
+    return {key: info for key, info in model.model_fields.items() if not is_hidden(info)}
 
 
 def first_line(model: type[BaseModel]) -> str:
@@ -527,6 +567,75 @@ def conditions_to_try() -> list[str]:
     return [
         c.name for c, note in zip(study.conditions, study.notes, strict=True) if note.baseline is not None
     ]
+
+
+# --- mazes --------------------------------------------------------------------------------------------------
+
+
+def maze_runs(maze: str, reward: str) -> tuple[int, NDArray[np.float64]]:
+    """How many runs solved a maze, and the evaluations of all, the limit for those that did not."""
+    with MAZES_DATA.open(newline="", encoding="utf-8") as file:
+        own = [row for row in csv.DictReader(file) if (row["maze"], row["reward"]) == (maze, reward)]
+    return sum(int(row["solved"]) for row in own), np.array([float(row["evaluations"]) for row in own])
+
+
+def resampled(statistic: Callable[..., Any], *samples: NDArray[np.float64]) -> str:
+    """A statistic's 95 % interval by resampling runs (BCa); nothing where all runs are alike."""
+    if any(len(set(sample)) == 1 for sample in samples):
+        return ""
+    found = stats.bootstrap(
+        samples, statistic, n_resamples=9999, vectorized=True, paired=False, rng=np.random.default_rng(1)
+    )
+    low, high = found.confidence_interval
+    return f" [{low:,.0f}, {high:,.0f}]" if high >= 100 else f" [{low:.1f}, {high:.1f}]"
+
+
+def share_interval(solved: int, n: int) -> str:
+    """So many runs of so many, with the exact 95 % interval of their share."""
+    low, high = stats.binomtest(solved, n).proportion_ci(method="exact")
+    return f"{solved} of {n} [{low:.0%}, {high:.0%}]"
+
+
+def maze_line(maze: str, reward: str) -> str:
+    """One line of the table: ours and what was published."""
+    solved, evaluations = maze_runs(maze, reward)
+    published = MAZE_TASKS[maze].published[reward]
+    n = published["seeds"]
+    cells = [
+        reward,
+        share_interval(solved, len(evaluations)),
+        f"{evaluations.mean():,.0f}{resampled(np.mean, evaluations)}",
+        f"{np.median(evaluations):,.0f}",
+        f"{evaluations.std(ddof=1):,.0f}",
+        share_interval(published["solved"], n) if "solved" in published else "",
+        mean_with_interval(published, n),
+    ]
+    return f"| {' | '.join(cells)} |"
+
+
+def mazes() -> str:
+    """Novelty and objective in the mazes, beside the published results."""
+    lines = [
+        "| | solved [95 %] | mean evaluations [95 %] | median | sd | published: solved | mean evaluations |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    ratios = []
+    for maze, task in MAZE_TASKS.items():
+        lines.append(f"| **{maze}** | | | | | | |")
+        lines += [maze_line(maze, reward) for reward in MAZE_REWARDS]
+        novelty, objective = maze_runs(maze, "novelty")[1], maze_runs(maze, "objective")[1]
+        ratio = resampled(
+            lambda a, b, axis=-1: np.mean(a, axis=axis) / np.mean(b, axis=axis), objective, novelty
+        )
+        means = [task.published[reward].get("mean_evaluations") for reward in ("objective", "novelty")]
+        known = f"; published {means[0] / means[1]:.1f}" if None not in means else ""
+        ratios.append(f"{maze} {objective.mean() / novelty.mean():.1f}{ratio}{known}")
+    text = (
+        "Mean evaluations of the objective over those of novelty, with 95 % intervals: "
+        + ". ".join(ratios)
+        + "."
+    )
+    return "\n".join([*lines, "", text]) + "\n"
 
 
 # --- classical tasks ----------------------------------------------------------------------------------------

@@ -135,6 +135,12 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
     assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
 
 
+def test_the_picture_of_several_robots_is_drawn_by_its_page():
+    make_several_robots = _load("make_several_robots")
+    for name, text in make_several_robots.make().items():
+        assert (make_several_robots.IMAGES / name).read_text("utf-8") == text
+
+
 def test_figures_on_the_page_of_a_billion_runs_are_those_that_its_command_measures(tmp_path):
     """Times differ from sitting to sitting; which figures there are and what a run takes on disk do not."""
     make_billion = _load("make_billion")

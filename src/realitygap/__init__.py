@@ -18,7 +18,7 @@ from ._version import __version__
 if TYPE_CHECKING:
     from .evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
     from .records import ResultsFolder
-    from .report import summarize, write_movie, write_report
+    from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
     from .study import Study, load_study, run_study
     from .trials import simulate_case
@@ -39,6 +39,7 @@ _HOME = {
     "run_study": "study",
     "simulate_case": "trials",
     "summarize": "report",
+    "watch": "report",
     "write_movie": "report",
     "write_report": "report",
 }
@@ -59,6 +60,7 @@ __all__ = [
     "run_study",
     "simulate_case",
     "summarize",
+    "watch",
     "write_movie",
     "write_report",
 ]

@@ -22,6 +22,10 @@ class OutgrownError(StudyError):
     """A genome of a run grew beyond the largest that there is room for; nothing of the run was cut off and kept."""
 
 
+class TaskError(StudyError):
+    """A function of somebody's own that says what trials are worth cannot be loaded, or failed."""
+
+
 class RecordError(RealityGapError):
     """A folder of results holds something that cannot be trusted or cannot be written."""
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
 
 from .errors import did_you_mean
 
@@ -82,6 +83,12 @@ def mistakes(
     return lines
 
 
+def is_hidden(info: FieldInfo) -> bool:
+    """Whether a setting is filled in by realitygap and no part of study files."""
+    extra = info.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("hidden"))
+
+
 def shown(value: object) -> str:
     """A value as it came, short enough for a message."""
     text = repr(value)
@@ -145,7 +152,10 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "value_error":
         # of the model as a whole there is nothing short to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
-        return f"{context['error']}." if is_table else f"{context['error']}, came {came}."
+        said = str(context["error"])
+        if is_table:
+            return said if said.endswith("?") else f"{said}."
+        return f"{said}, came {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
         words, key = _LIMITS[kind]

@@ -175,3 +175,42 @@ class Encoders:
         y += self.axle * math.sin(heading) + way * math.sin(heading + turn / 2)
         heading += turn
         self.pose = (x - self.axle * math.cos(heading), y - self.axle * math.sin(heading), heading)
+
+
+def to_segment(p: Point, a: Point, b: Point) -> float:
+    """Distance from a point to a segment."""
+    square = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2
+    part = 0.0 if square == 0 else ((p[0] - a[0]) * (b[0] - a[0]) + (p[1] - a[1]) * (b[1] - a[1])) / square
+    part = min(max(part, 0.0), 1.0)
+    return math.hypot(p[0] - a[0] - part * (b[0] - a[0]), p[1] - a[1] - part * (b[1] - a[1]))
+
+
+def crosses(a: Point, b: Point, c: Point, d: Point) -> bool:
+    """Whether AB and CD meet."""
+
+    def side(p: Point, q: Point, r: Point) -> float:
+        return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+
+    return side(a, b, c) * side(a, b, d) <= 0 and side(c, d, a) * side(c, d, b) <= 0
+
+
+def edges(corners: Sequence[Point]) -> list[tuple[Point, Point]]:
+    return list(zip(corners, [*corners[1:], corners[0]], strict=True))
+
+
+def is_shaded(a: Point, b: Point, corners: Sequence[Point], radius: float) -> bool:
+    """Whether the way from a to b comes within the radius of an outline (both ends outside of it)."""
+    near = [
+        min(to_segment(a, *edge), to_segment(b, *edge), to_segment(edge[0], a, b), to_segment(edge[1], a, b))
+        for edge in edges(corners)
+    ]
+    return min(near) < radius or (len(corners) > 1 and any(crosses(a, b, *edge) for edge in edges(corners)))
+
+
+def gap(p: Point, corners: Sequence[Point], radius: float) -> float:
+    """How far a point is from an outline of counter-clockwise corners grown by a radius, below zero inside."""
+    distance = min(to_segment(p, *edge) for edge in edges(corners))
+    inside = len(corners) > 2 and all(
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) >= 0 for a, b in edges(corners)
+    )
+    return (-distance if inside else distance) - radius

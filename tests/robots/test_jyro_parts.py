@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ from realitygap.robots.jyro import (
 )
 from realitygap.testing import check_robot
 from realitygap.trials import simulate_case
-from realitygap.world import Case, Pose, paper_arena
+from realitygap.world import Case, Light, Obstacle, Pose, paper_arena
 
 AHEAD = [[0.09, 0.0, 0.0]]
 
@@ -114,6 +115,21 @@ def test_a_world_of_one_or_more_is_what_simulate_does() -> None:
             assert robot.stalled == bool(track.stalls[step + 1, k])
             np.testing.assert_allclose(sensors[k].readings, track.readings[k][step + 1], rtol=0, atol=1e-9)
     assert 0.1 < track.stalls[1:].mean() < 0.9
+
+
+def test_an_arena_brings_its_obstacles_and_lights() -> None:
+    box = Obstacle(0.6, 0.3, 0.0, ((0.05, 0.05), (-0.05, 0.05), (-0.05, -0.05), (0.05, -0.05)))
+    disc = Obstacle(0.3, 0.5, radius=0.04)
+    arena = replace(paper_arena(), obstacles=(box, disc), lights=(Light(0.9, 0.3, 2.0),))
+    world = JyroWorld(arena)
+    robot = world.add(Scribbler(0.3, 0.3))
+    ahead = robot.add(RangeSensor([[0.0, 0.0, 0.0], [0.0, 0.0, math.pi / 2]], 5.0))
+    light = robot.add(LightSensor(AHEAD, 1.0))
+    assert ahead.readings == pytest.approx([0.25, 0.16], abs=1e-6)
+    assert light.readings == pytest.approx([0.5 * 2.0 * (1 - 0.51)], abs=1e-6)
+    assert len(world.walls) == 4 + 4 + 32
+    with pytest.raises(ValueError, match="The polygon has 2 corners"):
+        world.add_polygon([(0.0, 0.0), (1.0, 1.0)])
 
 
 # --- robots --------------------------------------------------------------------------------------------------
@@ -433,6 +449,13 @@ def test_the_picture_shows_everything() -> None:
     robot.move(0.2, 0.0)
     world.step(120)
     assert "blocked: pioneer-1" in world._repr_svg_()
+
+
+def test_a_robot_shows_itself_without_a_world() -> None:
+    robot = Pioneer(3.0, 4.0, color="orchid")
+    robot.add(Gripper())
+    assert "#da70d6" in robot._repr_svg_()
+    assert "with 1 devices" in robot._repr_svg_()
 
 
 def test_parts_of_a_picture_can_be_hidden() -> None:

@@ -180,7 +180,7 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("noise = nan", "condition[1] 'a'.noise", "expected a finite number"),
         ("noise = true", "condition[1] 'a'.noise", "expected a number"),
         ("noise = -0.1", "condition[1] 'a'.noise", "expected at least 0"),
-        ('platform = "sim"', "condition[1] 'a'.platform", "came 'sim'"),
+        ('platform = "twin"', "condition[1] 'a'.platform", "came 'twin'"),
         ('baseline = "b"', "condition 'a'.baseline", "there is no condition 'b'"),
         ("published = [0.1, 2]", "condition[1] 'a'.published[2]", "expected at most 1.0, came 2."),
         ('published = ["x"]', "condition[1] 'a'.published[1]", "expected a number, came 'x'."),

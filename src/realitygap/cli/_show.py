@@ -28,7 +28,7 @@ def show(
         typer.Argument(
             metavar="NAME",
             help="After network, species, lineage and divergence, the folder; after movie, one or more; after arena, "
-            "paper; after robot, jyro.",
+            "an arena's name or file; after robot, a robot's.",
         ),
     ] = None,
     out: Annotated[
@@ -57,6 +57,9 @@ def show(
             metavar="NAME", help="Of a divergence: another condition, or a platform, to try the network on."
         ),
     ] = None,
+    robot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of an arena: a robot's name or file, at the start.")
+    ] = None,
     repeats: Annotated[
         int | None, typer.Option(help="Of a divergence: trials on each of the two. [default: 30]")
     ] = None,
@@ -82,9 +85,9 @@ def show(
 
     Example: realitygap show divergence results/paper --condition novelty-50 --against novelty-10 -o divergence.svg
 
-    Example: realitygap show arena -o arena.svg
+    Example: realitygap show arena maze-hard --robot khepera -o arena.svg
 
-    Example: realitygap show robot jyro -o robot.svg
+    Example: realitygap show robot scribbler-s2-fluke2 -o robot.svg
 
     In Python: realitygap.report.save_view("results/paper", "run.svg", condition="coverage-50", replicate=3)
 
@@ -94,7 +97,9 @@ def show(
 
     In Python: realitygap.report.save_divergence("results/paper", "divergence.svg", against="novelty-10")
 
-    In Python: realitygap.report.save_arena("arena.svg"), realitygap.report.save_robot("robot.svg")
+    In Python: realitygap.report.save_arena("arena.svg", "maze-hard", robot="khepera")
+
+    In Python: realitygap.report.save_robot("robot.svg", "scribbler-s2-fluke2")
     """
     if out is None:
         raise StudyError("Where to? Name a file with -o, such as -o run.svg.")
@@ -106,6 +111,8 @@ def show(
             _refuse(what, ("--each", "--speed"), each, speed)
         if what != "divergence":
             _refuse(what, ("--against", "--repeats"), against, repeats)
+        if what != "arena":
+            _refuse(what, ("--robot",), robot)
         if what == "movie":
             typer.echo(f"Written: {_movie(names, out, each, speed, condition, *numbers)}")
             return
@@ -115,8 +122,10 @@ def show(
             return
         if what in ("arena", "robot"):
             _refuse(what, _NUMBERS, condition, *numbers)
-            save = save_arena if what == "arena" else save_robot
-            path = save(out) if name is None else save(out, name)
+            is_arena = what == "arena"
+            path = (
+                save_arena(out, name or "paper", robot=robot) if is_arena else save_robot(out, name or "jyro")
+            )
         else:
             subject, folder = _subject(what, name, out)
             path = save_view(

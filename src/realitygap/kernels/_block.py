@@ -58,6 +58,10 @@ class RunRows(NamedTuple):
     enabled: NDArray[np.bool_]  # (r, g, n, room)
     hidden: NDArray[np.int32]  # (r, g, n, hidden room)
     bias: NDArray[np.float64]  # (r, g, n, outputs + hidden room)
+    ended: NDArray[np.float64]  # (r, g, n, 2) [m from the start]
+    # Written by the staged road only
+    drawn: NDArray[np.float64]  # (r, g, n, d)
+    task_fitness: NDArray[np.float64]  # (r, g, n)
 
 
 class Runs(NamedTuple):
@@ -356,7 +360,7 @@ def select_novel(runs, n_runs, visited, counts, ended, rules, room):
 
 
 @kernel
-def keep_runs(runs, genomes, n_runs, cells, counts, rows, first_run, generation):
+def keep_runs(runs, genomes, n_runs, cells, counts, ended, rows, first_run, generation):
     """Copy a generation of all runs into rows `first_run` and on."""
     population = runs.fitness.shape[1]
     for run in range(n_runs):
@@ -365,6 +369,8 @@ def keep_runs(runs, genomes, n_runs, cells, counts, rows, first_run, generation)
             trial = run * population + row
             for k in range(3):
                 rows.counts[to_run, generation, row, k] = counts[trial, k]
+            for k in range(2):
+                rows.ended[to_run, generation, row, k] = ended[trial, k]
             for k in range(counts[trial, 0]):
                 rows.cells[to_run, generation, row, k] = cells[trial, k]
         _keep(runs, genomes, run, rows, to_run, generation)

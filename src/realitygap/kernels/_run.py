@@ -141,7 +141,7 @@ def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
             if novelty:
                 visited = room.ends if rules.count_ends else room.cells
                 select_novel(runs, n_runs, visited, room.counts, room.ended, rules, room.novelty)
-            keep_runs(runs, genomes, n_runs, room.cells, room.counts, rows, first_run, generation)
+            keep_runs(runs, genomes, n_runs, room.cells, room.counts, room.ended, rows, first_run, generation)
             if generation + 1 < rules.n_generations:
                 breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
             if children.full[0]:

@@ -1,9 +1,9 @@
 """Light sensors of the platform `sim`: several lights, a directional lobe, the inverse square, shadows.
 
-A sensor answers gain * sum over lights of strength * lobe * lit / d^2, times 1 + noise * N, limited to 0..1. The lobe is
-(cos a - cos w) / (1 - cos w), a the angle between the sensor's direction and the light: 1 straight ahead, 0 from
-the half-width w on (w a quarter turn gives cos a). `lit` is 1, or in the shadow of a wall or an obstacle what the
-robot's description says: one half (as in Jyro) or 0.
+A sensor answers gain * sum over lights of strength * lobe * lit / d^2, times 1 + noise * N, limited to 0..1. The
+lobe is (cos a - cos w) / (1 - cos w), a the angle between the sensor's direction and the light: 1 straight ahead, 0
+from the half-width w on (w a quarter turn gives cos a). `lit` is 1, or in the shadow of a wall or an obstacle what
+the robot's description says: one half (as in Jyro) or 0.
 """
 
 from __future__ import annotations

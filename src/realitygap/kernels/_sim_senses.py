@@ -31,7 +31,8 @@ from ._sim_range import (
     rate_of,
     table_response,
 )
-from ._sim_shape import IDLER, IR, LINEAR, PULSES, RANGE_NUMBERS, TABLE
+from ._sim_shape import HALF_SHADOWS, IDLER, IR, LINEAR, NO_SHADOWS, PULSES, RANGE_NUMBERS, TABLE
+from ._sim_sight import answer_bump, gap_of_point, shade_light
 from ._sim_stall import idler_stall, prepare_stall
 from ._sim_words import blocks_of, draw_words_of
 
@@ -110,7 +111,8 @@ def _any(row):
 
 @kernel
 def _start_range(shape, p, senses):
-    fill(senses.noisy, np.int32(0))
+    for k in range(senses.noisy.size):
+        senses.noisy[k] = 0
     for s in range(shape.row_range.size):
         row = shape.row_range[s]
         rate_of(p[row + DECAY], senses.range_rates[3 * s])
@@ -233,7 +235,12 @@ def _sense_light(shape, key, lanes, senses, step, first):
         for lamp in range(shape.n_lights):
             light = shape.row_lamp + 3 * lamp
             look_to(p[light], p[light + 1], p[row], p[row + 1], lanes.pose, spare[0], spare[1], spare[2])
-            fill(spare[3], real(1.0))
+            if shape.light_shadows == NO_SHADOWS:
+                fill(spare[3], real(1.0))
+            else:
+                place_point(p[row], p[row + 1], lanes.pose, spare[4], spare[5])
+                shade = 0.5 if shape.light_shadows == HALF_SHADOWS else 0.0
+                shade_light(shape, p, spare[4], spare[5], p[light], p[light + 1], shade, spare[3])
             add_light(
                 spare[0], spare[1], spare[2], p[light + 2], lobes[lobe], lobes[lobe + 1], lobes[lobe + 2],
                 lobes[lobe + 3], spare[3], reading,
@@ -256,6 +263,16 @@ def _sense_floor(shape, key, lanes, senses, step, first):
 
 
 @stage
+def _sense_bumps(shape, lanes, senses, first):
+    p, spare = lanes.p, senses.spare
+    for k in range(shape.row_bump.size):
+        row = shape.row_bump[k]
+        place_point(p[row], p[row + 1], lanes.pose, spare[0], spare[1])
+        gap_of_point(shape, p, spare[0], spare[1], spare[2], spare[3], spare[4])
+        answer_bump(spare[4], p[row + 2], lanes.readings[first + k])
+
+
+@stage
 def answer(shape, rules, key, lanes, step):
     """Write what the sensors answer into `lanes.readings`: range, light, line and bump sensors in turn.
 
@@ -272,6 +289,8 @@ def answer(shape, rules, key, lanes, step):
         _sense_light(shape, key, lanes, senses, step, n_range)
     if n_line > 0:
         _sense_floor(shape, key, lanes, senses, step, n_range + n_light)
+    if shape.row_bump.size > 0:
+        _sense_bumps(shape, lanes, senses, n_range + n_light + n_line)
 
 
 @stage

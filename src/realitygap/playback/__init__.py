@@ -4,17 +4,21 @@ A `MovingTrial` is what a trial looks like whatever platform it was on; `in_moti
 """
 
 from ._divergence import Divergence, measure_divergence, own_divergence
+from ._live import WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion
+from ._player import play
 
 __all__ = [
     "WIDTH",
     "Divergence",
     "MovingTrial",
     "RobotShape",
+    "WatchedRobot",
     "first_visits",
     "in_motion",
     "measure_divergence",
     "own_divergence",
+    "play",
     "save_movie",
 ]

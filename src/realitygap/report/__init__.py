@@ -43,7 +43,7 @@ from realitygap.report._frame_file import export_frame
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
-from realitygap.report._motion import Each, choose_moving, write_movie
+from realitygap.report._motion import Each, choose_moving, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
 from realitygap.report._paper_audit import Finding, audit_paper
@@ -128,6 +128,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_divergence",
     # in motion
     "write_movie",
+    "watch",
     "choose_moving",
     "Each",
     # for other programs

@@ -136,12 +136,13 @@ def _try_again(
     ]
     genomes = [genome_of(condition, row) for row in rows.iter_rows(named=True)]
     batch = retry_genomes(
-        condition.jyro,
+        condition.simulated_on,
         condition.arena.arena(),
         genomes,
         noise=condition.noise,
         noise_keys=keys,
         repeats=range(FRESH_TRIALS + 1),
+        inputs=condition.network_inputs,
     )
     coverage: npt.NDArray[np.float64] = getattr(batch, column).reshape(len(genomes), -1)
     reported = rows[column].to_numpy()

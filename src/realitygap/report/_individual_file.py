@@ -91,8 +91,7 @@ def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dic
 
 def _names(chosen: ChosenTrial) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Of all inputs and outputs, the constant input included."""
-    task = chosen.condition.task
-    return task.input_names(chosen.condition.selection), task.output_names
+    return chosen.condition.network_inputs, chosen.condition.output_names
 
 
 def _json(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:

@@ -177,8 +177,7 @@ def _brought(
     """The structure of an individual that no parent has: nodes and links."""
     known = {node for parent in parents for node in parent["genome"]["hidden"]}
     nodes = [node for node in row["genome"]["hidden"] if node not in known]
-    task = trial.condition.task
-    names = dict(enumerate([*task.input_names(trial.condition.selection), *task.output_names]))
+    names = dict(enumerate([*trial.condition.network_inputs, *trial.condition.output_names]))
     genes = row["genome"]
     links = [
         f"{names.get(source, f'h{source}')} → {names.get(target, f'h{target}')}"

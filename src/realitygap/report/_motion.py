@@ -5,18 +5,19 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import polars as pl
 
 from realitygap.errors import RecordError, did_you_mean
-from realitygap.playback import WIDTH, MovingTrial, RobotShape, in_motion, save_movie
+from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in_motion, play, save_movie
 from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
 from realitygap.report._driven import driven_paths, refuse_replay
 from realitygap.report._path_figure import no_such_run, typical_replicate
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.robots import Robot
 from realitygap.runs import replay
 from realitygap.trials import PATH_PARTS
 
@@ -31,6 +32,8 @@ _SURPLUS: dict[Each, tuple[str, ...]] = {
     "condition": ("condition", "generation", "individual"),
 }
 """Which numbers mean nothing where several trials are shown."""
+
+_MIXED = "Results and trials are given together, expected the ones or the others."
 
 _MOST = 8
 """Trials shown together."""
@@ -75,12 +78,10 @@ def write_movie(
     """
     path = Path(path)
     refuse_results(path)
-    many: list[Results | MovingTrial] = (
-        [results] if isinstance(results, ResultsFolder | str | Path | MovingTrial) else list(results)
-    )
+    many = _listed(results)
     ready = [one for one in many if isinstance(one, MovingTrial)]
     if ready and len(ready) < len(many):
-        raise TypeError("Results and trials are given together, expected the ones or the others.")
+        raise TypeError(_MIXED)
     if ready:
         return save_movie(ready, path, speed=speed, width=width)
     folders = [one for one in many if not isinstance(one, MovingTrial)]
@@ -170,9 +171,9 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     return in_motion(
         replay(condition, trial.row),
         condition.arena.arena(),
-        condition.jyro,
+        condition.simulated_on,
         title=title,
-        label=condition.jyro.label,
+        label=condition.label,
     )
 
 
@@ -211,3 +212,45 @@ def _steps_of(tally: Tally, name: str, replicate: int, which: tuple[int, int]) -
             if (trial.generation, trial.individual) == which:
                 return ledger.steps(trial.trial)
     raise RecordError(f"The ledger has no scored trial of generation {which[0]}, individual {which[1]}.")
+
+
+def watch(
+    what: Robot | Results | MovingTrial | Iterable[Results | MovingTrial],
+    *,
+    each: Each | None = None,
+    condition: str | None = None,
+    replicate: int | None = None,
+    generation: int | None = None,
+    individual: int | None = None,
+    speed: float = 1.0,
+) -> Any:
+    """Show trials, or a robot while it is used, below a notebook's cell.
+
+    Args:
+        what: results or trials, as in `write_movie`; or a robot, which is shown while the program drives it.
+        each, condition, replicate, generation, individual: which trials of results; see `write_movie`.
+        speed: to begin with: 0.25, 0.5, 1, 2, 4 or 8.
+
+    Returns:
+        A widget; of a robot a `realitygap.playback.WatchedRobot`, which is used in place of the robot.
+
+    Raises:
+        RealityGapError: anywidget is not there (the extra `notebook`).
+        RecordError: results are damaged or hold no trials yet, or a trial comes out otherwise than recorded.
+        ValueError: there is no such trial; the arenas differ; the speed is none of these.
+    """
+    if isinstance(what, Robot):
+        return WatchedRobot(what, speed=speed)
+    many = _listed(what)
+    ready = [one for one in many if isinstance(one, MovingTrial)]
+    if ready and len(ready) < len(many):
+        raise TypeError(_MIXED)
+    if ready:
+        return play(ready, speed=speed)
+    folders = [one for one in many if not isinstance(one, MovingTrial)]
+    title, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    return play(trials, title=title, speed=speed)
+
+
+def _listed(what: Results | MovingTrial | Iterable[Results | MovingTrial]) -> list[Results | MovingTrial]:
+    return [what] if isinstance(what, ResultsFolder | str | Path | MovingTrial) else list(what)

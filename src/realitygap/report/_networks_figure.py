@@ -151,8 +151,8 @@ def picture_of(condition: Condition, row: Mapping[str, Any]) -> Picture:
         )
     return network_picture(
         genome,
-        condition.task.input_names(condition.selection),
-        condition.task.output_names,
+        condition.network_inputs,
+        condition.output_names,
         title=f"Network of {row['condition']}, run {row['replicate']}, generation {row['generation']}, "
         f"individual {row['individual']}",
     )

@@ -115,7 +115,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         if condition.is_physical:
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)
-        chosen = _choose(rows, room // (condition.jyro.steps + 1), f"coverage_{tally.measure}")
+        chosen = _choose(rows, room // (condition.simulated_on.steps + 1), f"coverage_{tally.measure}")
         trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
     except (RealityGapError, ValueError):
         note = (
@@ -123,7 +123,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         )
         return _Run(name, replicate, None, 0, rows.height, note)
     if not trials:
-        note = f"a trial of {condition.jyro.steps:,} steps is too long to be embedded in a page."
+        note = f"a trial of {condition.simulated_on.steps:,} steps is too long to be embedded in a page."
         return _Run(name, replicate, None, 0, rows.height, note)
     note = ""
     if len(trials) < rows.height:
@@ -156,7 +156,7 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
 
 def _scene(condition: Condition) -> dict[str, Any]:
     """Where and with what body and sensors; lengths in meters."""
-    arena, platform = condition.arena.arena(), condition.jyro
+    arena, platform = condition.arena.arena(), condition.simulated_on
     grid, mounts = arena.grid, platform.sensors.mounts
     return {
         "walls": [list(wall) for wall in arena.walls],
@@ -164,7 +164,7 @@ def _scene(condition: Condition) -> dict[str, Any]:
         "body": [list(corner) for corner in platform.body.corners],
         "mounts": [list(mount) for mount in mounts],
         "sensors": _sensor_names([left for _, left, _ in mounts]),
-        "range": platform.sensor_range,
+        "range": platform.sensors.max_range,
         "steps": platform.steps,
     }
 

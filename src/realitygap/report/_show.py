@@ -6,7 +6,6 @@ import warnings
 from pathlib import Path
 from typing import Literal, get_args
 
-from realitygap.drawing import Picture
 from realitygap.errors import did_you_mean
 from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
@@ -20,7 +19,7 @@ from realitygap.report._species_figure import count_species, draw_tally_species
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial, draw_chosen_trial
 from realitygap.robots import JyroPlatform
-from realitygap.world import arena_picture, paper_arena
+from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
 Subject = Literal["run", "network", "species", "lineage"]
 
@@ -99,30 +98,34 @@ def _save(drawing: Drawing, out: Path, title: str) -> Path:
     return save_drawing(captioned(drawing, "figure"), out, title=title)
 
 
-def save_arena(out: str | Path, name: str = "paper") -> Path:
-    """Draw an arena, with the robot `jyro` at its start, into a file.
+def save_arena(out: str | Path, name: str | Path = "paper", *, robot: str | Path | None = None) -> Path:
+    """Draw an arena to scale into a file, with a robot at its start.
 
     Args:
         out: ends in .svg, .pdf or .png; a file that is there gives way.
-        name: paper.
+        name: of an arena, or the path of its TOML or SVG file.
+        robot: name or file of the robot; when not given, `jyro` in the paper's arena and else none.
 
     Returns:
         The path of the file.
 
     Raises:
+        DescriptionError: there is no such arena or robot, or its file cannot be used; every mistake.
         RecordError: the file cannot be written.
-        ValueError: there is no such arena or ending.
+        ValueError: there is no such ending.
     """
-    _check_name("arena", name, ["paper"])
-    robot = JyroPlatform()
-    return save_picture(arena_picture(paper_arena(), robot.body, robot.sensors), out)
+    check_ending(Path(out), _STILL)
+    arena = load_arena(name)
+    if robot is None and str(name) == "paper":
+        paper_robot = JyroPlatform()
+        return save_picture(arena_picture(arena, paper_robot.body, paper_robot.sensors), out)
+    return save_picture(arena_picture(arena, None if robot is None else load_robot(robot)), out)
 
 
-def save_robot(out: str | Path, name: str = "jyro") -> Path:
-    """Draw a robot with its dimensions into a file; see `save_arena`."""
-    _check_name("robot", name, ["jyro"])
-    picture: Picture = JyroPlatform().picture()
-    return save_picture(picture, out)
+def save_robot(out: str | Path, name: str | Path = "jyro") -> Path:
+    """Draw a robot by name or from its file into a file, with its sensors and dimensions; see `save_arena`."""
+    check_ending(Path(out), _STILL)
+    return save_picture(model_picture(load_robot(name)), out)
 
 
 def _check_name(what: str, name: str, known: list[str]) -> None:

@@ -205,9 +205,9 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     n_sensors = trajectory.readings.shape[1]
     names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
     _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
-    axes[0].set_ylim(0, 1.08 * trial.condition.jyro.sensors.max_range)
+    axes[0].set_ylim(0, 1.08 * trial.condition.simulated_on.sensors.max_range)
     _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, ["obstacle"], "input")
-    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.task.output_names, "command")
+    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.output_names, "command")
     axes[2].set_ylim(-1.1, 1.1)
     for each in axes:
         each.set_xlim(0, times[-1])

@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, model_validator
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
-from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.settings import Settings, mistakes
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CoverageTask, Task, as_task
+from realitygap.trials import sim_scene
 from realitygap.world import ArenaSettings, check_start
 
 # A condition's name is part of file names.
@@ -24,8 +25,8 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 # Trials of a run: with some 600 bytes for the row of each, 3 GB.
 MOST_TRIALS = 5_000_000
 
-Selection = Literal["coverage", "novelty", "random"]
-Platform = Literal["jyro", "scribbler"]
+Selection = Literal["coverage", "fitness", "novelty", "random"]
+Platform = Literal["jyro", "sim", "scribbler"]
 
 
 class Condition(Settings):
@@ -39,19 +40,22 @@ class Condition(Settings):
     )
     selection: Selection = Field(
         "coverage",
-        description="What decides who has children: coverage (the paper's objective NEAT), novelty, or nothing: "
-        "random tries as many unrelated networks, the control that the paper lacks.",
+        description="What decides who has children: coverage (the paper's objective NEAT) or, with another task, "
+        "fitness by it; novelty; or nothing: random tries as many unrelated networks, the control that the paper "
+        "lacks.",
     )
     platform: Platform = Field(
         "jyro",
-        description="What the networks are tried on: jyro, the paper's simulation, or scribbler, the robot.",
+        description="What the networks are tried on: jyro, the paper's simulation; sim, a robot simulated with its "
+        "outline, contact, motors and sensors (sim:FILE is one of a file); or scribbler, the robot.",
     )
     noise: float = Field(
         0.1,
         ge=0,
         le=10,
         description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8). On a robot 0: its readings are noisy by themselves.",
+        "(section 2.3: 0.1, 0.5, 0.8). On a robot 0: its readings are noisy by themselves; on sim, 0 when not given, "
+        "it comes on top of the robot's own noise.",
     )
     seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
     pair: bool = Field(
@@ -60,18 +64,52 @@ class Condition(Settings):
         "difference between them.",
     )
     arena: ArenaSettings = ArenaSettings()
-    task: CoverageTask = CoverageTask()
+    task: Annotated[SerializeAsAny[Settings], BeforeValidator(as_task)] = CoverageTask()
     neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
     novelty: NoveltySettings = NoveltySettings()
     jyro: JyroPlatform = JyroPlatform()
+    sim: SimPlatform = Field(default_factory=SimPlatform)
     scribbler: ScribblerPlatform = ScribblerPlatform()
 
     @model_validator(mode="before")
     @classmethod
-    def _a_robot_adds_its_own_noise(cls, values: Any) -> Any:
-        if isinstance(values, dict) and values.get("platform") == "scribbler":
-            return {"noise": 0.0, **values}
-        return values
+    def _platform_may_name_a_file(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        name, colon, robot = str(values.get("platform", "")).partition(":")
+        if name == "sim" and colon:
+            values = {**values, "platform": "sim", "sim": {**dict(values.get("sim", {})), "robot": robot}}
+        # a robot adds its own noise
+        return {"noise": 0.0, **values} if name in ("sim", "scribbler") else values
+
+    @model_validator(mode="before")
+    @classmethod
+    def _coverage_is_the_fitness_of_its_task(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        task = values.get("task", {})
+        is_coverage = isinstance(task, CoverageTask) or (
+            isinstance(task, Mapping) and task.get("kind", "coverage") == "coverage"
+        )
+        if is_coverage:
+            return {**values, "selection": "coverage"} if values.get("selection") == "fitness" else values
+        return {"selection": "fitness", **values}
+
+    @model_validator(mode="after")
+    def _selection_goes_with_the_task(self) -> Self:
+        if self.coverage is not None:
+            return self
+        if self.selection == "coverage":
+            raise ValueError(
+                f"selection is 'coverage', which is another task than {self.fitness_task.name!r}, expected 'fitness', "
+                "'novelty' or 'random'"
+            )
+        if self.is_physical:
+            raise ValueError(
+                f"task.kind is {self.fitness_task.name!r}, expected coverage with platform 'scribbler': an operator "
+                "enters the visited squares, and nothing else is known of a trial."
+            )
+        return self
 
     @model_validator(mode="after")
     def _an_operator_can_score_it(self) -> Self:
@@ -80,7 +118,7 @@ class Condition(Settings):
                 f"noise is {self.noise:g}, expected none with platform 'scribbler': a robot's readings are noisy by "
                 "themselves. Leave it out."
             )
-        if self.is_physical and self.task.cells != "line":
+        if self.is_physical and self.counted_cells != "line":
             raise ValueError(
                 "task.cells is 'ends', expected 'line' with platform 'scribbler': on paper stands the line that was "
                 "driven, and not where steps end."
@@ -98,7 +136,7 @@ class Condition(Settings):
                 f"novelty.distance is {distance.name!r}, expected 'paper', 'jaccard' or 'hamming' with platform "
                 f"'scribbler': an operator enters the visited squares, and not {what}."
             )
-        if distance.needs_order and self.task.cells != "line":
+        if distance.needs_order and self.counted_cells != "line":
             raise ValueError(
                 f"novelty.distance is {distance.name!r}, which looks at the order of visits, expected task.cells "
                 f"'line' with it: of the cells at the ends of steps no order is kept."
@@ -107,7 +145,16 @@ class Condition(Settings):
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        check_start(self.arena.arena(), self.tried_on.body)
+        arena = self.arena.arena()
+        if self.platform == "jyro":
+            arena.straight_walls()  # which says where there are none
+        check_start(arena, self.sim.model if self.platform == "sim" else self.tried_on.body)
+        return self
+
+    @model_validator(mode="after")
+    def _robot_and_arena_have_what_networks_see(self) -> Self:
+        if self.platform == "sim":
+            sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise)
         return self
 
     @model_validator(mode="after")
@@ -131,9 +178,14 @@ class Condition(Settings):
         return self.platform == "scribbler"
 
     @property
-    def tried_on(self) -> JyroPlatform | ScribblerPlatform:
+    def tried_on(self) -> JyroPlatform | SimPlatform | ScribblerPlatform:
         """The settings of its platform."""
-        return self.scribbler if self.platform == "scribbler" else self.jyro
+        return self.scribbler if self.platform == "scribbler" else self.simulated_on
+
+    @property
+    def simulated_on(self) -> JyroPlatform | SimPlatform:
+        """The settings of the platform that computes its trials."""
+        return self.sim if self.platform == "sim" else self.jyro
 
     @property
     def key(self) -> int:
@@ -141,9 +193,40 @@ class Condition(Settings):
         return random_key(self.seed, None if self.pair else self.name)
 
     @property
+    def coverage(self) -> CoverageTask | None:
+        """Its task where that is coverage; None where it is another."""
+        return self.task if isinstance(self.task, CoverageTask) else None
+
+    @property
+    def fitness_task(self) -> Task:
+        """Its task where that is another than coverage."""
+        if not isinstance(self.task, Task):
+            raise TypeError(f"The task is {self.task!r}, which is no `Task`.")
+        return self.task
+
+    @property
+    def drawn_names(self) -> tuple[str, ...]:
+        """Dotted names of the numbers that are drawn for its trials, in the order in which records have them."""
+        if self.platform != "sim":
+            return ()
+        return sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise).drawn_names
+
+    @property
+    def records_behavior(self) -> bool:
+        """Whether its distance of behaviors compares what is in no other column: where trials end."""
+        return self.selection == "novelty" and DISTANCES[self.novelty.distance].compares != "cells"
+
+    @property
+    def counted_cells(self) -> Literal["line", "ends"]:
+        """Which cells count as a behavior, and as coverage."""
+        return "line" if self.coverage is None else self.coverage.cells
+
+    @property
     def network_inputs(self) -> tuple[str, ...]:
         """Names of what its networks see, in order."""
-        return self.task.input_names(self.selection)
+        if self.coverage is None:
+            return tuple(self.fitness_task.inputs)
+        return self.coverage.input_names(self.selection)
 
     @property
     def has_bias_input(self) -> bool:
@@ -157,9 +240,14 @@ class Condition(Settings):
         bias_input = inputs.index("bias") if "bias" in inputs else -1
         return self.neat.rules(len(inputs), 2, bias_input=bias_input)
 
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of what its networks answer, in order."""
+        return ("move", "turn")
+
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
-        unused = {"jyro", "scribbler"} - {self.platform}
+        unused = {"jyro", "sim", "scribbler"} - {self.platform}
         return self.model_dump(mode="json", exclude={"name", *unused})
 
     def hash(self) -> str:

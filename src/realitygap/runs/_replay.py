@@ -52,11 +52,12 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             )
         condition = Condition.from_settings(row["condition"], dict(condition.get("settings", condition)))
     trajectory = trace_genome(
-        condition.jyro,
+        condition.simulated_on,
         condition.arena.arena(),
         genome_of(condition, row),
         noise=condition.noise,
         noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
+        inputs=condition.network_inputs,
     )
     difference = _difference(condition, trajectory, row)
     if difference:
@@ -83,6 +84,8 @@ def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, 
             f"the trial visits other cells when run again than its row has (first difference at place {place} of "
             f"{len(trajectory.cells)} and {len(cells)})"
         )
+    if tuple(row.get("drawn") or ()) != trajectory.drawn:
+        return f"{', '.join(trajectory.drawn_names) or 'nothing'} is drawn otherwise when run again than its row has"
     again = {
         "coverage_line": trajectory.coverage_line,
         "coverage_ends": trajectory.coverage_ends,

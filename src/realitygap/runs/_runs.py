@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from realitygap.errors import OutgrownError, whole_number
 from realitygap.evolution import distance_kind
 from realitygap.kernels import _block, _run
 from realitygap.kernels._block import RunRows, RunRules
-from realitygap.records import SCHEMA, list_column
+from realitygap.records import list_column, schema_with
 from realitygap.trials import jyro_rules, jyro_scene
 
 from ._condition import Condition
@@ -33,16 +34,19 @@ MAX_REPLICATES = 1 << 32
 def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
     novelty = condition.novelty
-    selection = {"coverage": _block.COVERAGE, "novelty": _block.NOVELTY, "random": _block.RANDOM}[
-        condition.selection
-    ]
+    selection = {
+        "coverage": _block.COVERAGE,
+        "fitness": _block.COVERAGE,
+        "novelty": _block.NOVELTY,
+        "random": _block.RANDOM,
+    }[condition.selection]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
         selection = _block.NEAREST_NOVELTY
     return RunRules(
         n_generations=condition.neat.generations,
         population=condition.neat.population,
         selection=selection,
-        count_ends=condition.task.cells == "ends",
+        count_ends=condition.counted_cells == "ends",
         archive_size=novelty.archive_size,
         above_all=novelty.enter == "above-all",
         by_column=novelty.sort == "x-then-y",
@@ -75,6 +79,9 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
         enabled=zeros(np.bool_, room),
         hidden=zeros(np.int32, hidden_room),
         bias=zeros(np.float64, 2 + hidden_room),
+        ended=zeros(np.float64, 2),
+        drawn=zeros(np.float64, len(condition.drawn_names)),
+        task_fitness=zeros(np.float64),
     )
 
 
@@ -97,7 +104,7 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
     """
     if condition.is_physical:
         raise ValueError(
-            f"Condition {condition.name!r} is tried on a robot, expected one with platform 'jyro'. Drive it: "
+            f"Condition {condition.name!r} is tried on a robot, expected one with platform 'jyro' or 'sim'. Drive it: "
             "realitygap run STUDY --port PORT."
         )
     first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
@@ -107,7 +114,7 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
     rules = run_rules(condition)
     room = neat.n_first_genes + FIRST_ROOM
     hidden_room = neat.start_hidden + FIRST_HIDDEN_ROOM
-    carry_out = run_staged if staged else _run_whole
+    carry_out = run_staged if staged or not _is_whole(condition) else _run_whole
     while True:
         rows = _empty_rows(condition, n_runs, arena.grid.n_cells, room, hidden_room)
         if carry_out(condition, rules, first_replicate, rows, room, hidden_room):
@@ -119,6 +126,11 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
                 "is room for. Nothing of these runs is kept. Lower add_node and add_link, or run fewer generations."
             )
         room, hidden_room = min(2 * room, MOST_GENES), min(2 * hidden_room, MOST_HIDDEN)
+
+
+def _is_whole(condition: Condition) -> bool:
+    """Whether the whole-run kernel knows its platform and its task."""
+    return condition.platform == "jyro" and condition.coverage is not None
 
 
 def _run_whole(
@@ -138,10 +150,28 @@ def _run_whole(
     return bool(_run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows))
 
 
-def prepare_kernels() -> None:
-    """Compile, or load from disk, all that runs need, by a run that is as small as can be."""
-    least = Condition(name="least", jyro={"steps": 1}, neat={"population": 2, "generations": 1})
-    run_rows(least, 0, 1)
+def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
+    """Compile, or load from disk, all that runs need, by runs that are as small as can be.
+
+    Args:
+        conditions: Those to come; without any, a run of the paper's.
+    """
+    least = [_least(condition) for condition in conditions if not condition.is_physical]
+    done: list[dict[str, Any]] = []
+    for condition in least or [_least(Condition(name="least"))]:
+        # what kernels are compiled for: types, and not numbers
+        like: dict[str, Any] = {"platform": condition.platform, "precision": condition.simulated_on.precision}
+        like |= {"task": condition.task.model_dump(), "whole": _is_whole(condition)}
+        if like not in done:
+            done.append(like)
+            run_rows(condition, 0, 1)
+
+
+def _least(condition: Condition) -> Condition:
+    """The condition with a population of two that live for one step."""
+    short = condition.simulated_on.model_copy(update={"steps": 1})
+    neat = condition.neat.model_copy(update={"population": 2, "generations": 1})
+    return condition.model_copy(update={condition.platform: short, "neat": neat})
 
 
 def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
@@ -192,6 +222,14 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
         }
     ).to_struct("genome")
     novelty = pl.Series("novelty", flat(rows.novelty)).fill_nan(None)
+    extra: dict[str, Any] = {}
+    if condition.platform == "sim":
+        extra["drawn"] = list_column(flat(rows.drawn), np.full(total, rows.drawn.shape[-1]))
+    if condition.coverage is None:
+        extra["task_fitness"] = flat(rows.task_fitness)
+    if condition.records_behavior:
+        start = condition.arena.arena().start
+        extra["behavior"] = list_column(flat(rows.ended) + np.array([start.x, start.y]), np.full(total, 2))
     return pl.DataFrame(
         {
             "condition": pl.repeat(condition.name, total, dtype=pl.String, eager=True),
@@ -210,6 +248,7 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
             "connections": (enabled & used).sum(axis=1).astype(np.uint32),
             "genome": genome,
             "key": pl.repeat(condition.key, total, dtype=pl.UInt64, eager=True),
+            **extra,
         },
-        schema=SCHEMA,
+        schema=schema_with(extra),
     )

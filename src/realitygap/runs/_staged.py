@@ -14,15 +14,20 @@ from numpy.typing import NDArray
 
 from realitygap.kernels import _block
 from realitygap.kernels._block import NoveltyRoom, RunRows, RunRules, Runs
-from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
+from realitygap.kernels._genome import Genomes, make_genomes
+from realitygap.kernels._lanes import LANES
 from realitygap.kernels._network import Networks, make_networks
-from realitygap.trials import PlatformTrials, open_trials
+from realitygap.trials import open_trials, trajectories_of
 
 from ._condition import Condition
 
 # Trials of a block: so many that calls from Python cost little beside them, so few that a block stays near.
 BLOCK_TRIALS = 4096
 LEAST_RUNS = 32
+
+
+# Of what is kept of every step at once, for tasks that look at it: near enough to stay in the cache.
+TRACE_BYTES = 8_000_000
 
 
 class _Block(NamedTuple):
@@ -35,6 +40,17 @@ class _Block(NamedTuple):
     which: NDArray[np.int32]  # (t,) 0, 1, ...
     counters: NDArray[np.uint32]  # (t, 3)
     novelty: NoveltyRoom
+
+
+class _Scored(NamedTuple):
+    """What came of the trials of one generation."""
+
+    cells: NDArray[np.uint8]  # (t, c) along the line, in order of first visit
+    ends: NDArray[np.uint8]  # (t, c) at the ends of steps, where they were asked for
+    counts: NDArray[np.int32]  # (t, 3)
+    ended: NDArray[np.float64]  # (t, 2)
+    drawn: NDArray[np.float64]  # (t, d)
+    fitness: NDArray[np.float64]  # (t,) by the task; (0,) where that is coverage
 
 
 def runs_together(population: int) -> int:
@@ -56,85 +72,133 @@ def run_staged(
 
     Returns:
         Whether all genomes found room; if not, the rows are worth nothing and want more room.
+
+    Raises:
+        TaskError: A function of the user's own failed.
     """
-    neat = condition.neat_rules
     total = rows.fitness.shape[0]
-    together = min(runs_together(rules.population), total)
-    trials = open_trials(
-        condition.jyro,
-        condition.arena.arena(),
-        neat,
-        inputs=condition.network_inputs,
-        noise=condition.noise,
-        bias_value=condition.neat.bias_value,
-    )
-    block = _make_block(condition, neat, rules, together, room, hidden_room)
-    for first_run in range(0, total, together):
-        n_runs = min(together, total - first_run)
-        if not _run_block(
-            condition, trials, neat, rules, block, first_replicate + first_run, n_runs, rows, first_run
-        ):
+    staged = _Staged(condition, rules, min(runs_together(rules.population), total), room, hidden_room)
+    for first_run in range(0, total, staged.together):
+        n_runs = min(staged.together, total - first_run)
+        if not staged.carry_out(first_replicate + first_run, n_runs, rows, first_run):
             return False
     return True
 
 
-def _make_block(
-    condition: Condition, neat: NeatRules, rules: RunRules, n_runs: int, room: int, hidden_room: int
-) -> _Block:
-    grid = condition.arena.arena().grid
-    n_trials = n_runs * rules.population
-    return _Block(
-        runs=_block.make_runs(rules, grid.n_cells, n_runs),
-        genomes=make_genomes(n_trials, neat.n_outputs, room, hidden_room),
-        children=make_genomes(n_trials, neat.n_outputs, room, hidden_room),
-        networks=make_networks(n_trials, neat, room, hidden_room),
-        which=np.arange(n_trials, dtype=np.int32),
-        counters=np.zeros((n_trials, 3), np.uint32),
-        novelty=_block.make_novelty_room(rules, grid.columns, grid.rows),
-    )
+class _Staged:
+    """Room and rules for blocks of at most `together` runs, one block after the other."""
 
-
-def _run_block(
-    condition: Condition,
-    trials: PlatformTrials,
-    neat: NeatRules,
-    rules: RunRules,
-    block: _Block,
-    first_replicate: int,
-    n_runs: int,
-    rows: RunRows,
-    first_row: int,
-) -> bool:
-    """A block of runs from the first generation to the last; whether all genomes found room."""
-    key, first = np.uint64(condition.key), np.int64(first_replicate)
-    n_trials = n_runs * rules.population
-    n_cells = condition.arena.arena().grid.n_cells
-    is_novelty = rules.selection in (_block.NOVELTY, _block.NEAREST_NOVELTY)
-    runs, genomes, children = block.runs, block.genomes, block.children
-    _block.begin_runs(runs, genomes, n_runs, neat, rules, key, first)
-    if genomes.full[0]:
-        return False
-    for generation in range(rules.n_generations):
-        _block.decode_runs(
-            genomes, block.networks, block.counters, n_runs, neat, rules, key, first, generation
+    def __init__(
+        self, condition: Condition, rules: RunRules, together: int, room: int, hidden_room: int
+    ) -> None:
+        self.condition, self.rules, self.together = condition, rules, together
+        self.arena = condition.arena.arena()
+        self.neat = condition.neat_rules
+        self.task = None if condition.coverage is not None else condition.fitness_task
+        self.trials = open_trials(
+            condition.simulated_on,
+            self.arena,
+            self.neat,
+            inputs=condition.network_inputs,
+            noise=condition.noise,
+            bias_value=condition.neat.bias_value,
         )
-        tried = trials.carry_out(
-            block.networks,
-            block.which[:n_trials],
-            condition.key,
-            block.counters[:n_trials],
-            ends=is_novelty and rules.count_ends,
+        grid, n_trials = self.arena.grid, together * rules.population
+        self.block = _Block(
+            runs=_block.make_runs(rules, grid.n_cells, together),
+            genomes=make_genomes(n_trials, self.neat.n_outputs, room, hidden_room),
+            children=make_genomes(n_trials, self.neat.n_outputs, room, hidden_room),
+            networks=make_networks(n_trials, self.neat, room, hidden_room),
+            which=np.arange(n_trials, dtype=np.int32),
+            counters=np.zeros((n_trials, 3), np.uint32),
+            novelty=_block.make_novelty_room(rules, grid.columns, grid.rows),
+        )
+
+    def carry_out(self, first_replicate: int, n_runs: int, rows: RunRows, first_row: int) -> bool:
+        """A block of runs from the first generation to the last; whether all genomes found room."""
+        neat, rules, block = self.neat, self.rules, self.block
+        key, first = np.uint64(self.condition.key), np.int64(first_replicate)
+        runs, genomes, children = block.runs, block.genomes, block.children
+        _block.begin_runs(runs, genomes, n_runs, neat, rules, key, first)
+        if genomes.full[0]:
+            return False
+        for generation in range(rules.n_generations):
+            _block.decode_runs(
+                genomes, block.networks, block.counters, n_runs, neat, rules, key, first, generation
+            )
+            scored = self._try(n_runs * rules.population)
+            self._select(scored, n_runs)
+            _block.keep_runs(
+                runs,
+                genomes,
+                n_runs,
+                scored.cells,
+                scored.counts,
+                scored.ended,
+                rows,
+                first_row,
+                generation,
+            )
+            self._keep(scored, n_runs, rows, first_row, generation)
+            if generation + 1 < rules.n_generations:
+                _block.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
+            if children.full[0]:
+                return False
+            genomes, children = children, genomes
+        return True
+
+    def _try(self, n: int) -> _Scored:
+        """All trials of a generation: at once, or portions of which every step is kept."""
+        if self.task is None or not self.task.needs_trace:
+            return self._try_some(0, n)
+        size = self._traced_at_once()
+        parts = [self._try_some(first, min(first + size, n)) for first in range(0, n, size)]
+        return _Scored(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+    def _traced_at_once(self) -> int:
+        """Trials whose steps fit into `TRACE_BYTES`, at least one block of lanes."""
+        numbers = 10 + 2 * len(self.trials.sensors) + self.neat.n_inputs
+        size = 4 if self.condition.simulated_on.precision == "single" else 8
+        blocks = TRACE_BYTES // (size * numbers * (self.trials.n_steps + 1) * LANES)
+        return max(1, blocks) * LANES
+
+    def _try_some(self, first: int, last: int) -> _Scored:
+        """Trials `first` up to `last` of a generation, scored by the task."""
+        tried = self.trials.carry_out(
+            self.block.networks,
+            self.block.which[first:last],
+            self.condition.key,
+            self.block.counters[first:last],
+            ends=self._is_novelty and self.rules.count_ends,
+            trace=self.task is not None and self.task.needs_trace,
         )
         batch = tried.batch
+        fitness = np.empty(0)
+        if self.task is not None:
+            seen = trajectories_of(self.trials, tried, self.arena, self.condition.network_inputs)
+            fitness = np.asarray(self.task.fitness(seen, self.arena), np.float64)
         counts = np.stack([batch.n_line, batch.n_ends, batch.n_stalls], axis=1)
-        _block.cover_runs(runs, n_runs, counts, rules, n_cells)
-        if is_novelty:
-            visited = tried.ends if rules.count_ends else batch.cells
-            _block.select_novel(runs, n_runs, visited, counts, tried.ended, rules, block.novelty)
-        _block.keep_runs(runs, genomes, n_runs, batch.cells, counts, rows, first_row, generation)
-        if generation + 1 < rules.n_generations:
-            _block.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
-        if children.full[0]:
-            return False
-        genomes, children = children, genomes
-    return True
+        return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness)
+
+    @property
+    def _is_novelty(self) -> bool:
+        return self.rules.selection in (_block.NOVELTY, _block.NEAREST_NOVELTY)
+
+    def _select(self, scored: _Scored, n_runs: int) -> None:
+        """What selection uses, into the block's fitness."""
+        runs, rules = self.block.runs, self.rules
+        if self.task is None:
+            _block.cover_runs(runs, n_runs, scored.counts, rules, self.arena.grid.n_cells)
+        else:
+            runs.fitness[:n_runs] = scored.fitness.reshape(n_runs, -1)
+        if self._is_novelty:
+            visited = scored.ends if rules.count_ends else scored.cells
+            _block.select_novel(runs, n_runs, visited, scored.counts, scored.ended, rules, self.block.novelty)
+
+    def _keep(self, scored: _Scored, n_runs: int, rows: RunRows, first_row: int, generation: int) -> None:
+        """What the kernels do not keep."""
+        place = (slice(first_row, first_row + n_runs), generation)
+        n = self.rules.population
+        rows.drawn[place] = scored.drawn.reshape(n_runs, n, -1)
+        if self.task is not None:
+            rows.task_fitness[place] = scored.fitness.reshape(n_runs, n)

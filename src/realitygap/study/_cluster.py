@@ -11,13 +11,14 @@ import contextlib
 import logging
 import queue
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from realitygap.errors import ClusterError, StudyError
 from realitygap.records import Delivery, ResultsFolder
+from realitygap.runs import Condition
 
 from ._executors import ChunkTask, Listener
 from ._job_queue import JobQueue
@@ -95,7 +96,7 @@ class Cluster:
         """Its name, and the threads of each worker that was seen in this sitting, by its address."""
         return {"cluster": self.name, "workers": dict(self.workers)}
 
-    def prepare(self) -> None:
+    def prepare(self, conditions: Sequence[Condition]) -> None:
         """Ask for jobs; each worker compiles or loads its kernels with its first chunk."""
         if self.jobs is not None:
             self.jobs.submit()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -37,8 +37,8 @@ class Executor(Protocol):
     def facts(self) -> dict[str, Any]:
         """What the log says of it: names and numbers, as JSON knows them."""
 
-    def prepare(self) -> None:
-        """Do what is done once and not counted as computing."""
+    def prepare(self, conditions: Sequence[Condition]) -> None:
+        """Do what is done once for these conditions and not counted as computing."""
 
     def carry_out(self, folder: ResultsFolder, tasks: Iterator[ChunkTask], listener: Listener) -> None:
         """Compute all tasks; return when they are published.
@@ -58,9 +58,9 @@ class Threads:
         """Their number."""
         return {"threads": self._n}
 
-    def prepare(self) -> None:
+    def prepare(self, conditions: Sequence[Condition]) -> None:
         """Compile the kernels, or load them from disk."""
-        prepare_kernels()
+        prepare_kernels(conditions)
 
     def carry_out(self, folder: ResultsFolder, tasks: Iterator[ChunkTask], listener: Listener) -> None:
         """See `Executor`."""

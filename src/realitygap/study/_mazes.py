@@ -51,7 +51,8 @@ def measure_maze(
     Returns:
         `task`, `settings`, `limit` (evaluations), `source` and, by reward, `novelty` and `objective`: `seeds`,
         `solved` (runs), `mean_evaluations`, `median_evaluations`, `sd_evaluations` (None of a single run),
-        `evaluations` (of each run) and `published`, the same of the source as far as it is given.
+        `evaluations` (of each run, None where it is unsolved) and `published`, the same of the source as far as it is
+        given.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
@@ -92,7 +93,7 @@ def summarize_maze_runs(runs: Sequence[MazeRun], limit: int) -> dict[str, Any]:
         "mean_evaluations": statistics.fmean(evaluations),
         "median_evaluations": statistics.median(evaluations),
         "sd_evaluations": statistics.stdev(evaluations) if len(evaluations) > 1 else None,
-        "evaluations": evaluations,
+        "evaluations": [run.evaluations if run.solved else None for run in runs],
     }
 
 

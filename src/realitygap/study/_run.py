@@ -224,7 +224,7 @@ def _carry_out(
     n_runs = len(missing) * study.about.replicates
     progress = _Counter(n_runs, n_runs - n_missing, tell)
     if n_missing:
-        executor.prepare()
+        executor.prepare([each for each in study.conditions if missing.get(each.name)])
         progress.begin()
         try:
             executor.carry_out(folder, _chunks(study, missing, chunk), progress)
@@ -373,7 +373,7 @@ def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) ->
 
 
 def _chunk_size(condition: Condition, replicates: int) -> int:
-    steps = condition.neat.generations * condition.neat.population * condition.jyro.steps
+    steps = condition.neat.generations * condition.neat.population * condition.simulated_on.steps
     by_time = CHUNK_STEPS // steps
     by_progress = -(-replicates // CHUNKS_PER_CONDITION)
     return max(1, min(by_time, by_progress, LARGEST_CHUNK))

@@ -31,6 +31,11 @@ class CoverageTask(Settings):
         "of time'; no alternative is offered.",
     )
 
+    @property
+    def name(self) -> str:
+        """As `[task] kind` has it."""
+        return "coverage"
+
     def has_bias_input(self, selection: str) -> bool:
         """Whether the networks of a condition have the constant input."""
         if self.bias_input == "with-novelty":

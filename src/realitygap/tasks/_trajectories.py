@@ -76,7 +76,10 @@ class Trajectories:
 
     @cached_property
     def readings(self) -> NDArray[np.float64]:
-        """(n, t + 1, s) without noise, 0 (nothing) to 1 (as near, bright or dark as can be told)."""
+        """(n, t + 1, s) what sensors answered, 0 (nothing) to 1 (as near, bright or dark as can be told).
+
+        With their noise on `sim`, without it on `jyro`.
+        """
         return _trials_first(self.arrays.readings)
 
     @cached_property

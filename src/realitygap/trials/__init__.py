@@ -8,6 +8,11 @@ from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
+from ._sim import SimTrials
+from ._sim_robot import SimRobot
+from ._sim_scene import SimScene, sim_scene
+from ._sim_world import SimWorld
+from ._sim_world_robot import SimWorldRobot
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -22,6 +27,11 @@ __all__ = [
     "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimRobot",
+    "SimScene",
+    "SimTrials",
+    "SimWorld",
+    "SimWorldRobot",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",
@@ -36,6 +46,7 @@ __all__ = [
     "poses_of",
     "preflight",
     "retry_genomes",
+    "sim_scene",
     "simulate_case",
     "simulate_file",
     "trace_genome",

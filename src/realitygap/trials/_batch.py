@@ -83,6 +83,12 @@ class Trajectory:
         stalled: (t + 1,) whether the step was blocked.
         coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
         cells: Cells along the line in order of first visit, columns * row + column.
+        sensors: (s,) names of the range sensors.
+        wheels: (t + 1, 2) way of the left and the right wheel since the start [m]; no rows on `jyro`.
+        answers: (t + 1, a) what the sensors answered, noise and all, 0..1; on `jyro` without noise.
+        answer_names: (a,) names of these, such as `light.0`.
+        drawn: (d,) what was drawn for the trial, of the numbers in `drawn_names`.
+        drawn_names: (d,) dotted names.
     """
 
     step_s: float
@@ -94,6 +100,12 @@ class Trajectory:
     coverage_line: float
     coverage_ends: float
     cells: tuple[int, ...]
+    sensors: tuple[str, ...] = ()
+    wheels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    answers: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    answer_names: tuple[str, ...] = ()
+    drawn: tuple[float, ...] = ()
+    drawn_names: tuple[str, ...] = ()
 
     def _repr_svg_(self) -> str:
         from ._picture import path_picture
@@ -145,7 +157,8 @@ class Tried(NamedTuple):
         ends: (n, c) uint8 the cells in which steps end, in ascending order; no rows where they were not asked for.
         ended: (n, 2) x and y at the end, from the arena's start [m].
         trace: Every step; its arrays have no rows where it was not asked for.
-        distances: (t + 1, s, n) what the range sensors measure as parts of their reach, without noise; likewise.
+        distances: (t + 1, s, n) from each range sensor to what it sees, without noise, in the unit of
+            `PlatformTrials.distance_unit`; likewise.
     """
 
     batch: TrialBatch
@@ -164,14 +177,14 @@ class PlatformTrials(Protocol):
         step_s: How long a step lasts [s].
         n_steps: Of each trial.
         sensors: Names of the readings in a trace.
-        reach: (s,) longest distance of each range sensor [m].
+        distance_unit: Of the distances in `Tried` [m].
         drawn_names: Of the numbers that are drawn for trials, runs or the study.
     """
 
     step_s: float
     n_steps: int
     sensors: tuple[str, ...]
-    reach: NDArray[np.float64]
+    distance_unit: float
     drawn_names: tuple[str, ...]
 
     def carry_out(

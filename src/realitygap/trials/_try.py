@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._philox import MAX_INDIVIDUALS
-from realitygap.robots import JyroPlatform
+from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.tasks import Trajectories
 from realitygap.world import Arena
 
@@ -26,8 +26,10 @@ from ._batch import (
     poses_of,
 )
 from ._jyro import JyroTrials
+from ._sim import SimTrials
 
-Platform = JyroPlatform
+Platform = JyroPlatform | SimPlatform
+"""A platform on which networks can be tried in one call."""
 
 
 def open_trials(
@@ -46,13 +48,15 @@ def open_trials(
         arena: Where.
         rules: NEAT's, of which only the network's kind counts.
         inputs: Names of what the networks see, in order; the paper's when not given.
-        noise: Level a: each reading is moved by a * U(-1, 1).
+        noise: Level a: each reading is moved by a * U(-1, 1); on `sim` on top of the robot's own noise.
         bias_value: Of the constant input.
 
     Raises:
         ValueError: The platform cannot give such inputs, or the noise is not a finite number from 0 on.
     """
     names = paper_inputs(rules) if inputs is None else tuple(inputs)
+    if isinstance(platform, SimPlatform):
+        return SimTrials(platform, arena, rules, inputs=names, noise=noise, bias_value=bias_value)
     if names != paper_inputs(rules):
         raise ValueError(
             f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform 'jyro', the "
@@ -98,7 +102,7 @@ def try_genomes(
         arena: Where.
         genomes: With these inputs and 2 outputs; all of one kind: constant input, activation, recurrence and biases of
             nodes are the same.
-        noise: Level a: each reading is moved by a * U(-1, 1).
+        noise: Level a: each reading is moved by a * U(-1, 1); on `sim` on top of the robot's own noise.
         noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
         inputs: Names of what the networks see, in order (`Task.inputs`); the paper's obstacle, stall and time when not
             given, and `bias` where the genomes have a constant input.
@@ -158,13 +162,19 @@ def trace_genome(
     return Trajectory(
         trials.step_s,
         poses_of(trace.poses[:, :, 0], arena.start),
-        tried.distances[:, :, 0].astype(np.float64) * trials.reach,
+        tried.distances[:, :, 0].astype(np.float64) * trials.distance_unit,
         trace.inputs[:, :, 0].astype(np.float64),
         trace.commands[:, :, 0].astype(np.float64),
         trace.stalled[:, 0],
         float(batch.coverage_line[0]),
         float(batch.coverage_ends[0]),
         tuple(int(cell) for cell in batch.behavior(0)),
+        tuple(name for name in trials.sensors if name.startswith("range.")),
+        trace.wheels[:, :, 0].astype(np.float64),
+        trace.readings[:, :, 0].astype(np.float64),
+        trials.sensors,
+        tuple(batch.drawn[0].tolist()) if batch.drawn_names else (),
+        batch.drawn_names,
     )
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor
-from ._obstacle import Goal, Light, Obstacle
-from ._robot import Body
+from ._obstacle import Goal, Light, Obstacle, Segment
 from ._units import INCH
 
 
@@ -72,6 +70,29 @@ class Arena:
     floor: Floor = BARE_FLOOR
     goal: Goal | None = None
     vary: Mapping[str, Distribution] = field(default_factory=dict, hash=False)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """(w, 4) walls and the straight sides of obstacles [m]."""
+        return (*self.walls, *(edge for obstacle in self.obstacles for edge in obstacle.edges()))
+
+    def straight_walls(self) -> tuple[Segment, ...]:
+        """(w, 4) all that stands in it as straight walls [m], which is all that Jyro knows.
+
+        Raises:
+            ValueError: An obstacle is round, or a number is drawn anew.
+        """
+        round_ones = [str(k) for k, obstacle in enumerate(self.obstacles) if obstacle.radius]
+        if round_ones:
+            raise ValueError(
+                f"arena {self.name!r} has round obstacles ({', '.join(round_ones)}), expected straight walls, which is "
+                "all that Jyro knows. Use platform 'sim'"
+            )
+        if self.vary:
+            raise ValueError(
+                f"in arena {self.name!r} {', '.join(self.vary)} are drawn, expected plain numbers. Use platform 'sim'"
+            )
+        return self.segments
 
     def to_dict(self) -> dict[str, Any]:
         """The arena as plain values; of what may be there, only what is."""
@@ -156,30 +177,3 @@ NAMED_STARTS = {
     "center": Pose(21 * INCH, 12 * INCH, 0.0),  # on a junction of cells: belongs to the upper right one
     "left": Pose(7.5 * INCH, 12 * INCH, 0.0),  # on a border of cells: belongs to the upper one
 }
-
-
-def check_start(arena: Arena, body: Body) -> None:
-    """Refuse a start at which the body would not lie within the walls.
-
-    Raises:
-        ValueError: a corner of it lies beyond a wall.
-    """
-    pose = arena.start
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    for forward, left in body.corners:
-        x = pose.x + forward * cosine - left * sine
-        y = pose.y + forward * sine + left * cosine
-        if not is_inside(arena, x, y):
-            raise ValueError(
-                f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g}): a corner of "
-                f"its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start away from the wall."
-            )
-
-
-def is_inside(arena: Arena, x: float, y: float) -> bool:
-    """Whether a point lies inside the arena's walls (an odd number of walls to its right)."""
-    crossings = 0
-    for x1, y1, x2, y2 in arena.walls:
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            crossings += 1
-    return crossings % 2 == 1

@@ -74,7 +74,18 @@ def _scaled(value: Any, scale: float, key: str) -> Any:
     return value
 
 
-class WallEntry(Settings):
+class Row(Settings):
+    """A table that a file may write as a list of its numbers."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_a_whole_row(cls, values: Any) -> Any:
+        if isinstance(values, list | tuple):  # one of the right length is a table by now
+            raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
+        return values
+
+
+class WallEntry(Row):
     """A straight wall from one point to another."""
 
     x1: Number = Field(description="Where it begins [m].")
@@ -121,7 +132,7 @@ class LightEntry(Settings):
     )
 
 
-class TapeEntry(Settings):
+class TapeEntry(Row):
     """A dark strip on the floor, along its middle."""
 
     x1: float
@@ -171,7 +182,7 @@ class GridEntry(Settings):
         return self
 
 
-class StartEntry(Settings):
+class StartEntry(Row):
     """Where every trial begins."""
 
     x: Number = Field(description="[m].")
@@ -179,7 +190,7 @@ class StartEntry(Settings):
     heading: Number = Field(0.0, description="From +x, counter-clockwise [rad].")
 
 
-class GoalEntry(Settings):
+class GoalEntry(Row):
     """What is to be reached."""
 
     x: Number = Field(description="Center [m].")
@@ -201,9 +212,19 @@ class ArenaFile(Described):
     obstacle: tuple[ObstacleEntry, ...] = Field((), max_length=256)
     light: tuple[LightEntry, ...] = Field((), max_length=64)
     floor: FloorEntry = FloorEntry()
-    grid: GridEntry | None = Field(None, description="Left out: 16 cells along the longer side of the walls.")
+    grid: GridEntry | None = Field(
+        None, description="Left out: 16 cells along the longer side of the walls, in their middle."
+    )
     start: StartEntry
     goal: GoalEntry | None = None
+
+    @model_validator(mode="after")
+    def _begins_beside_obstacles(self) -> Self:
+        arena = self.arena()
+        for k, obstacle in enumerate(arena.obstacles):
+            if obstacle.distance(arena.start.x, arena.start.y) < 0:
+                raise ValueError(f"start: lies within obstacle {k}. Move one of the two")
+        return self
 
     @classmethod
     def of(cls, arena: Arena) -> Self:
@@ -267,8 +288,14 @@ class ArenaFile(Described):
         ys = [y for wall in self.wall for y in (wall.y1, wall.y2)] or [self.start.y - 0.5, self.start.y + 0.5]
         across, up = max(xs) - min(xs), max(ys) - min(ys)
         cell = max(across, up) / 16 or 1.0 / 16
-        columns, rows = (max(1, math.ceil(size / cell - 1e-9)) for size in (across, up))
-        return Grid(min(xs), min(ys), cell, columns, rows)
+        columns, rows = (max(1, math.floor(size / cell + 0.5)) for size in (across, up))
+        return Grid(
+            (min(xs) + max(xs) - columns * cell) / 2,
+            (min(ys) + max(ys) - rows * cell) / 2,
+            cell,
+            columns,
+            rows,
+        )
 
     def _floor(self) -> Floor:
         tape = tuple((each.x1, each.y1, each.x2, each.y2) for each in self.floor.tape)

@@ -13,6 +13,7 @@ from realitygap.settings import Settings
 
 from ._quantiles import exponential, logarithm, normal_quantile
 
+FARTHEST = 6.5  # standard deviations: farther than any of 32 random bits takes a normal number
 KINDS = ("uniform", "normal", "log_uniform", "choice")
 Pair = tuple[float, float]
 
@@ -60,12 +61,12 @@ class Distribution(Settings):
 
     @property
     def lowest(self) -> float:
-        """The least that can come; -inf where there is no limit."""
+        """The least that can come."""
         return self._limited(self._ends()[0])
 
     @property
     def highest(self) -> float:
-        """The most that can come; inf where there is no limit."""
+        """The most that can come."""
         return self._limited(self._ends()[1])
 
     @property
@@ -104,7 +105,8 @@ class Distribution(Settings):
 
     def _ends(self) -> Pair:
         if self.normal is not None:
-            return (self.normal[0], self.normal[0]) if self.normal[1] == 0 else (-math.inf, math.inf)
+            reach = FARTHEST * self.normal[1]
+            return self.normal[0] - reach, self.normal[0] + reach
         if self.choice is not None:
             return min(self.choice), max(self.choice)
         ends = self.uniform if self.uniform is not None else self.log_uniform

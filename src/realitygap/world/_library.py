@@ -10,12 +10,17 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from realitygap.errors import DescriptionError, did_you_mean
 
-from ._arena import Arena, paper_arena
+from ._arena import NAMED_STARTS, Arena, paper_arena
 from ._arena_file import ArenaFile, in_meters
+from ._floor import MOST_PIXELS, FloorImage
 from ._numbers import in_si
 from ._robot_model import RobotModel
+from ._svg import svg_values
 
 T = TypeVar("T")
 
@@ -151,7 +156,7 @@ def arena_names() -> list[str]:
 
 
 def load_arena(arena: str | Path) -> Arena:
-    """An arena by name, or from a TOML file.
+    """An arena by name, or from a TOML or SVG file.
 
     Args:
         arena: One of `arena_names`, or the path of a file.
@@ -162,9 +167,70 @@ def load_arena(arena: str | Path) -> Arena:
     if str(arena) == "paper":
         return paper_arena()
     file, origin = _find("arena", arena_names(), arena)
-    values = read_toml(file, origin)
+    if origin.lower().endswith(".svg"):
+        text = read_text(file, origin)
+        values = _checked(origin, lambda: svg_values(text))
+    else:
+        written = read_toml(file, origin)
+        values = _checked(origin, lambda: in_meters(_in_present_words(written)))
+        _read_image(values, origin)
     values.setdefault("name", Path(origin).stem)
-    return _checked(origin, lambda: ArenaFile(**in_meters(values))).arena()
+    return _checked(origin, lambda: ArenaFile(**values)).arena()
+
+
+def _in_present_words(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of an emulator's scene file of 0.1 in the words of arena files: its walls, lamps, tape and start."""
+    values = dict(values)
+    if "walls" in values and "wall" not in values:
+        values["wall"] = values.pop("walls")
+    lamps = values.pop("lamps", None) if "light" not in values else None
+    if lamps is not None:
+        names = ("x", "y", "strength")
+        rows = lamps if isinstance(lamps, list) else [lamps]
+        values["light"] = [
+            dict(zip(names, row, strict=True)) if isinstance(row, list) and len(row) == len(names) else row
+            for row in rows
+        ]
+    if "tape" in values and "floor" not in values:
+        values["floor"] = {"tape": values.pop("tape")}
+    start = values.get("start")
+    if isinstance(start, str) and start in NAMED_STARTS:
+        values["start"] = list(NAMED_STARTS[start])
+    return values
+
+
+def _read_image(values: dict[str, Any], origin: str) -> None:
+    """Put the pixels of a floor image in place of its file."""
+    floor = values.get("floor")
+    image = floor.get("image") if isinstance(floor, dict) else None
+    if not isinstance(floor, dict) or not isinstance(image, dict) or not isinstance(image.get("file"), str):
+        return  # what is wrong with it is said later
+    path = Path(origin).parent / image["file"]
+    gray = _gray(path, origin)
+    width = image.get("width")
+    if isinstance(width, int | float):
+        made = FloorImage.of(0.0, 0.0, float(width), gray)
+        floor["image"] = image | {"columns": made.columns, "rows": made.rows, "pixels": made.pixels}
+
+
+def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
+    """The brightness of an image file."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            if max(picture.size) > MOST_PIXELS:
+                raise DescriptionError(
+                    f"{origin}: floor.image.file: {path.name} is {picture.width} x {picture.height} pixels, expected "
+                    f"at most {MOST_PIXELS} each way. Make it smaller."
+                )
+            return np.asarray(picture.convert("L"), dtype=np.uint8)
+    except (OSError, UnidentifiedImageError, ValueError) as error:
+        if isinstance(error, DescriptionError):
+            raise
+        raise DescriptionError(
+            f"{origin}: floor.image.file: {path.name} is no image that can be read."
+        ) from None
 
 
 def read_toml(file: Traversable, origin: str) -> dict[str, Any]:
@@ -217,8 +283,9 @@ def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, s
         return path, str(path)
     if path.suffix or len(path.parts) > 1:
         raise DescriptionError(f"There is no {what} file {path}.")
+    endings = ".toml or .svg" if what == "arena" else ".toml"
     raise DescriptionError(
-        f"Unknown {what} {str(name)!r}. {did_you_mean(str(name), known)} A file ends in .toml."
+        f"Unknown {what} {str(name)!r}. {did_you_mean(str(name), known)} A file ends in {endings}."
     )
 
 

@@ -182,7 +182,7 @@ def _limited(name: str, drawn: Distribution, limits: Limits) -> Distribution:
     """
     if drawn.normal is not None and not limits.least <= drawn.normal[0] <= limits.most:
         raise ValueError(f"{name}: expected a mean {_in_words(limits)}, came {drawn.normal[0]:g}")
-    if drawn.normal is not None and drawn.lowest == -math.inf and limits.open_least:
+    if drawn.normal is not None and drawn.lowest <= limits.least and limits.open_least:
         raise ValueError(
             f"{name}: a normal distribution reaches {limits.least:g}, and this number must be more. Add `least`"
         )

@@ -3,88 +3,210 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
 
 from ._arena import Arena, Pose
+from ._floor import BARE_FLOOR, Floor, FloorImage
+from ._obstacle import Goal, Light, Obstacle
 from ._robot import Body, RangeSensors
+from ._robot_model import RobotModel
 from ._units import INCH
 
 _TICK = 0.012  # half the length of the strokes that end a dimension line [m]
+PAPER_WIDTH = 42 * INCH  # what sizes in pictures were chosen for [m]
+MOST_DRAWN = 96  # pixels of a floor image that a picture shows across or up
+GRAYS = 32  # of 256 that a picture does not tell apart
+TAPE = "#3d434c"
+LIGHT, LIGHT_GLOW = "#e0a100", "#f6e3a1"
 _WHOLE = 1e-6  # a length this near to whole inches was meant so [in]
 
 
-def arena_picture(arena: Arena, body: Body | None = None, sensors: RangeSensors | None = None) -> Picture:
-    """The arena from above: walls, reachable cells, start, and where given the robot there, to scale.
+def arena_picture(
+    arena: Arena, body: Body | RobotModel | None = None, sensors: RangeSensors | None = None
+) -> Picture:
+    """The arena from above with all that is in it and, where given, the robot at its start, to scale.
 
     Args:
         arena: What does not move.
-        body: Outline of the robot, drawn at the start.
+        body: Outline of the robot, or the robot itself, drawn at the start.
         sensors: Its rays, drawn as far as they see.
     """
-    xs = [x for wall in arena.walls for x in wall[::2]]
-    ys = [y for wall in arena.walls for y in wall[1::2]]
+    left, bottom, right, top = _extent(arena)
+    size = max(right - left, top - bottom) / PAPER_WIDTH  # 1 for the paper's arena
     grid = arena.grid
-    left, right, bottom, top = min(xs), max(xs), min(ys), max(ys)
     cells_right, cells_top = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
-    shapes: list[Shape] = [
-        Line(
-            ((grid.x, grid.y), (cells_right, grid.y), (cells_right, cells_top), (grid.x, cells_top)),
-            None,
-            closed=True,
-            fill=Ink.VISITED,
-        )
-    ]
-    shapes += [
-        Line(((grid.x + k * grid.cell, grid.y), (grid.x + k * grid.cell, cells_top)), Ink.MUTED, 0.4)
-        for k in range(1, grid.columns)
-    ]
-    shapes += [
-        Line(((grid.x, grid.y + k * grid.cell), (cells_right, grid.y + k * grid.cell)), Ink.MUTED, 0.4)
-        for k in range(1, grid.rows)
-    ]
-    shapes.append(
-        Line(
-            ((grid.x, grid.y), (cells_right, grid.y), (cells_right, cells_top), (grid.x, cells_top)),
-            Ink.REACH,
-            1.4,
-            closed=True,
-        )
-    )
+    shapes: list[Shape] = [*floor_shapes(arena.floor), *_cells(arena)]
+    shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
     shapes += [Line(((x1, y1), (x2, y2)), Ink.TEXT, 2.4) for x1, y1, x2, y2 in arena.walls]
+    shapes += [shape for light in arena.lights for shape in light_shapes(light)]
+    if arena.goal is not None:
+        shapes += goal_shapes(arena.goal)
     if sensors is not None:
         shapes += _rays(sensors, arena.start)
-    if body is not None:
+    if isinstance(body, RobotModel):
+        shapes += _model_shapes(body, arena.start)
+    elif body is not None:
         shapes += _outline(body, arena.start)
-    shapes += _start(arena.start)
-    gap = 0.05
-    shapes += _measure(left, bottom - gap, right, bottom - gap, _length(right - left))
-    shapes += _measure(left - gap, bottom, left - gap, top, _length(top - bottom))
-    shapes += _measure(
-        cells_right - grid.cell, cells_top + 0.028, cells_right, cells_top + 0.028, "", color=Ink.REACH
-    )
+    shapes += _start(arena.start, size)
+    gap = 0.05 * size
+    shapes += _measure(left, bottom - gap, right, bottom - gap, _length(right - left), size=size)
+    shapes += _measure(left - gap, bottom, left - gap, top, _length(top - bottom), size=size)
+    over = cells_top + 0.028 * size
+    shapes += _measure(cells_right - grid.cell, over, cells_right, over, "", color=Ink.REACH, size=size)
     shapes.append(
         Text(
-            cells_right - grid.cell - 0.02,
-            cells_top + 0.034,
+            cells_right - grid.cell - 0.02 * size,
+            cells_top + 0.034 * size,
             f"{grid.columns} × {grid.rows} cells of {_length(grid.cell)}",
             7.5,
             "end",
             color=Ink.REACH,
+            halo=cells_top + 0.06 * size > top,
         )
     )
-    start = arena.start
     return Picture(
         f"Arena {arena.name}",
-        f"Arena {arena.name}, {_length(right - left)} by {_length(top - bottom)}, with {grid.columns} by {grid.rows} "
-        f"reachable cells of {_length(grid.cell)}. Trials begin at ({start.x:.4g}, {start.y:.4g}) m, heading "
-        f"{start.heading:.4g} rad.",
-        left - 0.13,
-        bottom - 0.13,
-        right + 0.02,
-        top + 0.02,
+        _arena_in_words(arena, right - left, top - bottom),
+        left - 0.13 * size,
+        bottom - 0.13 * size,
+        right + 0.02 * size,
+        max(top + 0.02 * size, over + 0.04 * size),
         tuple(shapes),
     )
+
+
+def _model_shapes(model: RobotModel, pose: Pose) -> list[Shape]:
+    """A robot of a file at a pose: its rays, cut off at the size of its body, and its outline."""
+    shapes: list[Shape] = []
+    for sensor in model.range:
+        x, y = _placed(pose, sensor.x, sensor.y)
+        angle, far = pose.heading + sensor.direction, min(sensor.reach, 2 * model.radius)
+        end = (x + far * math.cos(angle), y + far * math.sin(angle))
+        shapes += [Line(((x, y), end), Ink.PUBLISHED, 0.9, (3.0, 1.6)), Disc(x, y, 1.3, None, Ink.PUBLISHED)]
+    for part in model.body:
+        outline = tuple(_placed(pose, x, y) for x, y in part.outline())
+        shapes.append(Line(outline, Ink.BODY, 1.4, closed=True))
+    return shapes
+
+
+def _extent(arena: Arena) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of what is to be seen [m]."""
+    grid = arena.grid
+    points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
+    points += [(light.x, light.y) for light in arena.lights]
+    points += [point for obstacle in arena.obstacles for point in obstacle.outline()]
+    if not arena.walls:
+        points += [(grid.x, grid.y), (grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell)]
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _cells(arena: Arena) -> list[Shape]:
+    """The reachable cells, lightly filled unless there is something on the floor."""
+    grid = arena.grid
+    right, top = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
+    corners = ((grid.x, grid.y), (right, grid.y), (right, top), (grid.x, top))
+    fill = Ink.VISITED if arena.floor == BARE_FLOOR else None
+    shapes: list[Shape] = [Line(corners, None, closed=True, fill=fill)]
+    shapes += [
+        Line(((grid.x + k * grid.cell, grid.y), (grid.x + k * grid.cell, top)), Ink.MUTED, 0.4)
+        for k in range(1, grid.columns)
+    ]
+    shapes += [
+        Line(((grid.x, grid.y + k * grid.cell), (right, grid.y + k * grid.cell)), Ink.MUTED, 0.4)
+        for k in range(1, grid.rows)
+    ]
+    return [*shapes, Line(corners, Ink.REACH, 1.4, closed=True)]
+
+
+def _arena_in_words(arena: Arena, width: float, height: float) -> str:
+    grid, start = arena.grid, arena.start
+    things = [
+        (len(arena.obstacles), "obstacle"),
+        (len(arena.lights), "light"),
+        (len(arena.floor.tape), "strip of tape"),
+        (arena.goal is not None, "goal"),
+    ]
+    there = [
+        f"{n:d} {what}{'s' if n > 1 else ''}".replace("strip of tapes", "strips of tape")
+        for n, what in things
+        if n
+    ]
+    return (
+        f"Arena {arena.name}, {_length(width)} by {_length(height)}, with {grid.columns} by {grid.rows} "
+        f"reachable cells of {_length(grid.cell)}{', ' if there else ''}{', '.join(there)}. Trials begin at "
+        f"({start.x:.4g}, {start.y:.4g}) m, heading {start.heading:.4g} rad."
+    )
+
+
+def obstacle_shapes(obstacle: Obstacle) -> list[Shape]:
+    """An obstacle from above."""
+    return [Line(obstacle.outline(), Ink.TEXT, 1.6, closed=True, fill=Ink.RULE)]
+
+
+def light_shapes(light: Light) -> list[Shape]:
+    """A light from above, and how strong it is."""
+    shapes: list[Shape] = [
+        Disc(light.x, light.y, radius, color=None, fill=fill)
+        for radius, fill in ((9.0, LIGHT_GLOW), (5.5, LIGHT_GLOW), (4.0, LIGHT))
+    ]
+    return [*shapes, Text(light.x, light.y, f"light {light.strength:g}", 7.5, shift=(0.0, 14.0), halo=True)]
+
+
+def goal_shapes(goal: Goal) -> list[Shape]:
+    """The goal from above."""
+    rim = tuple(
+        (goal.x + goal.radius * math.cos(k * math.pi / 24), goal.y + goal.radius * math.sin(k * math.pi / 24))
+        for k in range(48)
+    )
+    return [
+        Line(rim, Ink.PEN3, 1.4, (3.0, 1.6), closed=True),
+        Disc(goal.x, goal.y, 2.0, color=None, fill=Ink.PEN3),
+        Text(goal.x, goal.y, "goal", 7.5, shift=(0.0, -9.0), color=Ink.PEN3, halo=True),
+    ]
+
+
+def floor_shapes(floor: Floor) -> list[Shape]:
+    """What is on the floor: an image in coarse pixels, and tape as wide as it is."""
+    shapes: list[Shape] = _image_shapes(floor.image) if floor.image is not None else []
+    for x1, y1, x2, y2 in floor.tape:
+        length = math.hypot(x2 - x1, y2 - y1) or 1.0
+        across_x, across_y = (
+            -(y2 - y1) / length * floor.tape_width / 2,
+            (x2 - x1) / length * floor.tape_width / 2,
+        )
+        corners = (
+            (x1 + across_x, y1 + across_y),
+            (x2 + across_x, y2 + across_y),
+            (x2 - across_x, y2 - across_y),
+            (x1 - across_x, y1 - across_y),
+        )
+        shapes.append(Line(corners, None, closed=True, fill=TAPE))
+    return shapes
+
+
+def _image_shapes(image: FloorImage) -> list[Shape]:
+    """Runs of like brightness, row by row."""
+    step = max(1, math.ceil(max(image.columns, image.rows) / MOST_DRAWN))
+    gray = image.gray[::step, ::step] // GRAYS * GRAYS
+    pixel = image.width / image.columns * step
+    shapes: list[Shape] = []
+    for row, values in enumerate(gray):
+        top = image.y + image.height - row * pixel
+        bottom = max(image.y, top - pixel)
+        ends = [0, *(k for k in range(1, len(values)) if values[k] != values[k - 1]), len(values)]
+        for first, last in pairwise(ends):
+            left, right = image.x + first * pixel, min(image.x + last * pixel, image.x + image.width)
+            level = min(255, int(values[first]) + GRAYS - 1)
+            fill = f"#{level:02x}{level:02x}{level:02x}"
+            shapes.append(
+                Line(
+                    ((left, bottom), (right, bottom), (right, top), (left, top)), None, closed=True, fill=fill
+                )
+            )
+    return shapes
 
 
 def robot_picture(name: str, body: Body, sensors: RangeSensors) -> Picture:
@@ -136,20 +258,24 @@ def _rays(sensors: RangeSensors, pose: Pose) -> list[Shape]:
     return shapes
 
 
-def _start(pose: Pose) -> list[Shape]:
-    tip = _placed(pose, 0.062, 0.0)
+def _start(pose: Pose, size: float = 1.0) -> list[Shape]:
+    tip = _placed(pose, 0.062 * size, 0.0)
     shaft = Line(((pose.x, pose.y), tip), Ink.OURS, 1.4)
-    head = Line((_placed(pose, 0.045, 0.012), tip, _placed(pose, 0.045, -0.012)), Ink.OURS, 1.4)
+    back, aside = 0.045 * size, 0.012 * size
+    head = Line((_placed(pose, back, aside), tip, _placed(pose, back, -aside)), Ink.OURS, 1.4)
     return [shaft, head, Disc(pose.x, pose.y, 2.6, fill=Ink.OURS)]
 
 
-def _measure(x1: float, y1: float, x2: float, y2: float, text: str, color: str = Ink.TEXT) -> list[Shape]:
+def _measure(
+    x1: float, y1: float, x2: float, y2: float, text: str, color: str = Ink.TEXT, size: float = 1.0
+) -> list[Shape]:
     """A dimension line along an axis, its text outside: below a level one, left of an upright one."""
     level = y1 == y2
+    tick = _TICK * size
     ends = [
         Line(
-            ((x - (0 if level else _TICK), y - (_TICK if level else 0)),
-             (x + (0 if level else _TICK), y + (_TICK if level else 0))),
+            ((x - (0 if level else tick), y - (tick if level else 0)),
+             (x + (0 if level else tick), y + (tick if level else 0))),
             color, 0.7,
         )
         for x, y in ((x1, y1), (x2, y2))

@@ -106,7 +106,11 @@ class RangeSensor(Settings):
     cone: HalfAngle = Field(0.0, description="Half the angle that it sees [rad].")
     reach: Positive = Field(description="How far it sees [m].")
     rays: int = Field(
-        1, ge=1, le=63, description="Spread over the cone, the nearest counts: 1, or an odd number."
+        1,
+        ge=1,
+        le=63,
+        description="Spread over the cone: 1, or an odd number. linear and table answer to the nearest, ir and pulses "
+        "to the light of all.",
     )
     response: Literal["linear", "ir", "table", "pulses"] = Field(
         "linear",
@@ -193,7 +197,7 @@ class Encoders(Settings):
         0.0, description="Standard deviation after one meter [m]; grows with the root of the way."
     )
     drift_per_m: Number = Field(
-        0.0, description="Added to the right and taken from the left in each meter [m]."
+        0.0, description="Turn to the left that is reckoned in each meter driven and did not happen [rad]."
     )
 
 
@@ -260,6 +264,11 @@ class RobotModel(Described):
         return {
             key: value for key, value in super().to_dict().items() if key not in ("description", "sources")
         }
+
+    def _repr_svg_(self) -> str:
+        from ._robot_picture import model_picture
+
+        return model_picture(self).to_svg()
 
     @property
     def radius(self) -> float:

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
+from realitygap.errors import DescriptionError
 from realitygap.settings import Settings
 
-from ._arena import NAMED_STARTS, Arena, Pose, is_inside, paper_arena
+from ._arena import NAMED_STARTS, Arena, Pose, paper_arena
+from ._library import arena_names, load_arena
+from ._placing import enclosing_walls, is_inside
 
 StartName = Literal["corner", "center", "left"]
 
@@ -17,29 +30,97 @@ StartName = Literal["corner", "center", "left"]
 class ArenaSettings(Settings):
     """The arena of a study."""
 
-    preset: Literal["paper"] = Field(
+    preset: str = Field(
         "paper",
-        description="The arena by name. paper: 42 x 24 in, cells of 3 in, the inner 12 x 6 reachable (section 2.1).",
+        description="The arena by name. paper: 42 x 24 in, cells of 3 in, the inner 12 x 6 reachable (section 2.1). "
+        "`realitygap show arena` draws it and the others: arena files have the list.",
     )
     start: StartName | Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
         "corner",
         description="Where trials begin: a name, or [x, y, heading] in meters and radians from +x, "
         "counter-clockwise. corner: (0.1905, 0.1905) facing +x, a cell's center; center: the arena's center, on a "
         "junction of cells, which belongs to the upper right one; left: middle of the left side, on a border of "
-        "cells, which belongs to the upper one. The paper says only that it is always the same.",
+        "cells, which belongs to the upper one. The paper says only that it is always the same. Names go with the "
+        "paper's arena; any other begins where its file says.",
+    )
+    read: dict[str, Any] | None = Field(
+        None,
+        description="The arena as it was read from the file, so that results need no file.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
+    file: str | None = Field(
+        None,
+        description="In place of a name: a file of your own, TOML or SVG. The results hold the arena itself.",
     )
 
-    @field_validator("start")
+    @model_validator(mode="before")
     @classmethod
-    def _start_is_inside(cls, start: StartName | list[float]) -> StartName | list[float]:
-        if isinstance(start, str):
-            return start
-        arena = paper_arena()
-        if not is_inside(arena, start[0], start[1]):
-            raise ValueError("start lies outside the arena: expected 0 < x < 1.0668 and 0 < y < 0.6096 [m]")
-        if abs(start[2]) > 2 * math.pi:
-            raise ValueError("heading is in radians, expected -2 pi to 2 pi")
-        return start
+    def _reads_its_file(cls, values: Any) -> Any:
+        """Begin where the file says, and keep what stood in it and its bare name, which is the same everywhere."""
+        if not isinstance(values, Mapping):
+            return values
+        values = dict(values)
+        file, preset = values.get("file"), values.get("preset", "paper")
+        if isinstance(file, str) and values.get("read") is None:
+            arena = _read(file)
+            if arena is not None:
+                values |= {"file": Path(file).name, "read": arena.to_dict()}
+        elif isinstance(file, str):
+            arena = Arena.from_dict(values["read"])
+        else:
+            arena = load_arena(preset) if preset in arena_names() else None
+        if arena is not None and "start" not in values and (file is not None or preset != "paper"):
+            values["start"] = list(arena.start)
+        return values
+
+    @field_validator("preset")
+    @classmethod
+    def _is_known(cls, preset: str) -> str:
+        if preset not in arena_names():
+            raise ValueError(f"expected {', '.join(arena_names())}")
+        return preset
+
+    @field_validator("file")
+    @classmethod
+    def _was_read(cls, file: str | None, info: ValidationInfo) -> str | None:
+        if file is not None and info.data.get("read") is None:
+            try:
+                load_arena(_as_path(file))
+            except DescriptionError as error:
+                raise ValueError(str(error).rstrip(".")) from None
+        if file is not None and info.data.get("preset") != "paper":
+            raise ValueError("expected preset or file and not both")
+        return file
+
+    @model_validator(mode="after")
+    def _begins_inside(self) -> Self:
+        if isinstance(self.start, str):
+            if self.file is not None or self.preset != "paper":
+                raise ValueError(
+                    f"start is {self.start!r}, which goes with the paper's arena. Expected [x, y, heading]"
+                )
+            return self
+        arena = self._without_start()
+        x, y, heading = self.start
+        if enclosing_walls(arena.walls) and not is_inside(arena, x, y):
+            xs = [x for wall in arena.walls for x in wall[::2]]
+            ys = [y for wall in arena.walls for y in wall[1::2]]
+            raise ValueError(
+                f"start lies outside the arena: expected {min(xs):g} < x < {max(xs):g} and {min(ys):g} < y < "
+                f"{max(ys):g} [m], came {self.start}"
+            )
+        if abs(heading) > 2 * math.pi:
+            raise ValueError(f"start: heading is in radians, expected -2 pi to 2 pi, came {heading:g}")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Of an arena by name there is no file: conditions keep the hash that they had before files."""
+        values: dict[str, Any] = handler(self)
+        return {
+            key: value for key, value in values.items() if value is not None or key not in ("file", "read")
+        }
 
     def pose(self) -> Pose:
         """Where trials begin."""
@@ -51,4 +132,26 @@ class ArenaSettings(Settings):
 
     def arena(self) -> Arena:
         """The arena."""
-        return paper_arena(self.pose())
+        if self.file is None and self.preset == "paper":
+            return paper_arena(self.pose())
+        arena = self._without_start()
+        if arena.start == self.pose():
+            return arena  # its start may be drawn
+        vary = {name: drawn for name, drawn in arena.vary.items() if not name.startswith("arena.start.")}
+        return replace(arena, start=self.pose(), vary=vary)
+
+    def _without_start(self) -> Arena:
+        return Arena.from_dict(self.read) if self.read is not None else load_arena(self.preset)
+
+
+def _read(file: str) -> Arena | None:
+    """The arena of a file; None where it cannot be read, which the field's own check says."""
+    try:
+        return load_arena(_as_path(file))
+    except DescriptionError:
+        return None
+
+
+def _as_path(file: str) -> Path:
+    """A path that no name of an arena can be taken for."""
+    return Path(file) if file not in arena_names() else Path.cwd() / file

@@ -26,11 +26,11 @@ from ._stock import (
     PioneerFrontSonar,
     PioneerFrontSonars,
 )
-from ._world import Box, JyroWorld, Lamp
+from ._world import Area, JyroWorld, Lamp
 
 __all__ = [
+    "Area",
     "Blimp",
-    "Box",
     "Bumper",
     "Camera",
     "Column",

@@ -10,7 +10,7 @@ from realitygap.drawing import Line, Picture, Shape, hex_of
 from realitygap.errors import did_you_mean
 
 if TYPE_CHECKING:
-    from ._world import Box, JyroWorld
+    from ._world import JyroWorld
 
 PARTS = ("boxes", "shapes", "lights", "walls", "trails", "rays", "bodies", "devices", "speech")
 """What a picture is made of."""
@@ -36,7 +36,7 @@ def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
     left, right, bottom, top = _borders(world)
     margin = _MARGIN * max(right - left, top - bottom)
     parts: list[tuple[str, Sequence[Shape]]] = [
-        ("boxes", [_rectangle(box) for box in world.boxes]),
+        ("boxes", [Line(area.corners, None, closed=True, fill=hex_of(area.fill)) for area in world.areas]),
         ("shapes", world.drawn),
         ("lights", [_disc(lamp.x, lamp.y, LAMP_RADIUS, hex_of(lamp.color)) for lamp in world.lights]),
         ("walls", _walls(world)),
@@ -80,11 +80,6 @@ def _walls(world: JyroWorld) -> list[Shape]:
         Line(((x1, y1), (x2, y2)), hex_of(color), 2.0)
         for (x1, y1, x2, y2), color in zip(world.walls, world.wall_colors, strict=True)
     ]
-
-
-def _rectangle(box: Box) -> Line:
-    corners = ((box.left, box.bottom), (box.right, box.bottom), (box.right, box.top), (box.left, box.top))
-    return Line(corners, None, closed=True, fill=hex_of(box.fill))
 
 
 def _disc(x: float, y: float, radius: float, fill: str, n: int = 48) -> Line:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import Ink, Line, Point, Shape, Text, hex_of
+from realitygap.drawing import Ink, Line, Picture, Point, Shape, Text, hex_of
 from realitygap.errors import RobotError
 from realitygap.kernels._scene import START_ENERGY
 from realitygap.world import Pose
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Part = Literal["trails", "rays", "bodies", "devices", "speech"]
 """What a robot is drawn of."""
+_PORTRAIT = 1.0  # side of the picture of one robot [m]
 AnyDevice = TypeVar("AnyDevice", bound=Device)
 
 
@@ -83,11 +84,7 @@ class SceneRobot:
 
     @property
     def world(self) -> JyroWorld:
-        """The world it is in.
-
-        Raises:
-            RobotError: It is in none.
-        """
+        """The world it is in; asking for it where there is none is a RobotError."""
         if self._world is None:
             raise RobotError(
                 f"The {self.kind} {self.name or ''} is in no world: call world.add(robot) first."
@@ -253,6 +250,15 @@ class SceneRobot:
             return []
         x, y = self.point(0.0, 0.0)
         return [Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True)]
+
+    def _repr_svg_(self) -> str:
+        """The robot alone, with what it carries and without what it sees, in a square of 1 m."""
+        x, y = self.point(0.0, 0.0)
+        parts = self.parts()
+        shapes = (*parts["bodies"], *parts["devices"], *parts["speech"])
+        half = _PORTRAIT / 2
+        about = f"The {self.kind} {self.name or ''} with {len(self.devices)} devices."
+        return Picture(self.kind, about, x - half, y - half, x + half, y + half, shapes).to_svg(180.0)
 
     def to_dict(self) -> dict[str, Any]:
         """What it is and does, devices and their readings included, as plain values."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import Picture, Shape, hex_of
+from realitygap.drawing import Ink, Line, Picture, Shape, hex_of
 from realitygap.errors import RobotError
 from realitygap.kernels import _scene as kernel
 from realitygap.world import Arena
@@ -34,13 +34,10 @@ class Lamp:
 
 
 @dataclass(frozen=True)
-class Box:
-    """An axis-parallel box that is drawn filled: two corners [m] and a color."""
+class Area:
+    """What walls stand around and pictures show filled: corners in order [m], and a color."""
 
-    left: float
-    bottom: float
-    right: float
-    top: float
+    corners: tuple[tuple[float, float], ...]
     fill: str
 
 
@@ -58,14 +55,18 @@ class JyroWorld:
     another robot at the end of its step stays entirely as it was, and stalls.
 
     Args:
-        arena: Walls to begin with; lengths in meters. None for an empty world.
+        arena: Walls, obstacles and lights to begin with; rounded corners are short straight walls. None for an empty
+            world.
         step_s: Length of a step [s].
         seed: Of the noise of sensors that have some.
 
     Attributes:
         time: Simulated time [s].
         n_steps: Steps since the start or the last reset.
-        robots, lights: In the order of adding.
+        robots: In the order of adding.
+        lights: Likewise; each may be changed at any time.
+        areas: Insides of boxes and obstacles, which pictures show filled.
+        drawn: What else pictures show.
         light_above_walls: Whether light passes over walls.
         random: Where sensors take their noise from.
 
@@ -81,7 +82,7 @@ class JyroWorld:
         self.seed = seed
         self.robots: list[SceneRobot] = []
         self.lights: list[Lamp] = []
-        self.boxes: list[Box] = []
+        self.areas: list[Area] = []
         self.drawn: list[Shape] = []
         self.light_above_walls = False
         self._walls: list[tuple[float, float, float, float]] = []
@@ -89,8 +90,8 @@ class JyroWorld:
         self._first_lights: list[Lamp] = []
         self._is_ready = False
         self._begin()
-        for wall in arena.walls if arena else ():
-            self.add_wall(*wall)
+        if arena is not None:
+            self._furnish(arena)
 
     def _begin(self) -> None:
         self.time, self.n_steps = 0.0, 0
@@ -125,7 +126,29 @@ class JyroWorld:
         self.add_wall(left, top, right, top, color)
         self.add_wall(left, bottom, right, bottom, color)
         self.add_wall(right, top, right, bottom, color)
-        self.boxes.append(Box(left, bottom, right, top, fill))
+        self.areas.append(Area(((left, bottom), (right, bottom), (right, top), (left, top)), fill))
+
+    def add_polygon(
+        self, corners: Sequence[Sequence[float]], fill: str = "purple", wall_color: str | None = None
+    ) -> None:
+        """Put up walls around any outline: (c, 2) corners in order [m]."""
+        hex_of(fill)
+        points = tuple((float(x), float(y)) for x, y in corners)
+        if len(points) < 3:
+            raise ValueError(f"The polygon has {len(points)} corners, expected 3 or more.")
+        for start, end in zip(points, (*points[1:], points[0]), strict=True):
+            self.add_wall(*start, *end, fill if wall_color is None else wall_color)
+        self.areas.append(Area(points, fill))
+
+    def _furnish(self, arena: Arena) -> None:
+        for x1, y1, x2, y2 in arena.floor.tape:
+            self.add_shape(Line(((x1, y1), (x2, y2)), Ink.BODY, 3.0))
+        for wall in arena.walls:
+            self.add_wall(*wall)
+        for obstacle in arena.obstacles:
+            self.add_polygon(obstacle.outline(), "gray70", "gray40")
+        for light in arena.lights:
+            self.add_light(light.x, light.y, light.strength)
 
     def add_light(self, x: float, y: float, brightness: float = 1.0, color: str = "yellow") -> Lamp:
         """Put up a lamp [m], and get it back."""

@@ -1,0 +1,159 @@
+"""Trials in a notebook: played, stopped, and gone through step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import cache
+from importlib import import_module, resources
+from typing import Any
+
+import numpy as np
+
+from realitygap.drawing import PENS, Disc, Ink, Line, Shape
+from realitygap.errors import RealityGapError
+from realitygap.world import Arena
+
+from ._moving import MovingTrial, all_trials, extent, things_in
+from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED
+
+_DIGITS = 4
+"""Of lengths [m] and angles [rad] that a page is sent."""
+
+_COLORS = {
+    "far": FAR,
+    "middle": MIDDLE,
+    "near": NEAR,
+    "tile": TILE,
+    "visited": TILE_VISITED,
+    "often": TILE_OFTEN,
+}
+
+
+def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed: float = 1.0) -> Any:
+    """A widget that plays trials in a notebook: rays, trails, cells, a slider and the choice of a speed.
+
+    Args:
+        trials: one, or up to eight in one arena.
+        title: in the head.
+        speed: one of 0.25, 0.5, 1, 2, 4 and 8 to begin with.
+
+    Raises:
+        RealityGapError: anywidget is not there.
+        TypeError: what is given is no trial.
+        ValueError: none is given, or too many, or in different arenas; the speed is none of these.
+    """
+    listed = all_trials(trials)
+    if len(listed) > MOST_TRIALS:
+        raise ValueError(
+            f"{len(listed)} trials to show together, expected at most {MOST_TRIALS}, one a pen. Choose some of them."
+        )
+    title = title or (listed[0].title if len(listed) == 1 else f"{len(listed)} trials")
+    return player_class()(
+        scene=pack_scene(listed[0].arena, title),
+        trials=pack_trials(listed),
+        speed=check_speed(speed),
+    )
+
+
+def check_speed(speed: float) -> float:
+    """The speed, if a player offers it.
+
+    Raises:
+        ValueError: it does not.
+    """
+    speeds = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+    if speed not in speeds:
+        raise ValueError(f"speed is {speed:g}, expected one of {', '.join(f'{each:g}' for each in speeds)}.")
+    return float(speed)
+
+
+@cache
+def player_class() -> type:
+    """The class of the widget; made when it is first needed, because anywidget is an extra.
+
+    Raises:
+        RealityGapError: anywidget is not there.
+    """
+    try:
+        anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
+    except ImportError as error:
+        raise RealityGapError(
+            "Trials are shown in a notebook by anywidget, which is not installed: pip install 'realitygap[notebook]'. "
+            "realitygap.write_movie needs none."
+        ) from error
+    files = resources.files("realitygap.playback")
+
+    class Player(anywidget.AnyWidget):  # type: ignore[name-defined, misc]  # anywidget is an extra
+        """Trials in motion in a notebook."""
+
+        _esm = files.joinpath("player.js").read_text("utf-8")
+        _css = files.joinpath("player.css").read_text("utf-8")
+        scene = traitlets.Dict().tag(sync=True)
+        trials = traitlets.List().tag(sync=True)
+        speed = traitlets.Float(1.0).tag(sync=True)
+        live = traitlets.Bool(False).tag(sync=True)
+        was_live = traitlets.Bool(False).tag(sync=True)
+
+    return Player
+
+
+def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
+    """What stands still, ready for JSON; without an arena a bare square around the origin."""
+    if arena is None:
+        return {"title": title, "extent": [-0.4, 0.4, -0.25, 0.25], "colors": _COLORS}
+    grid = arena.grid
+    return {
+        "title": title,
+        "extent": [round(float(end), _DIGITS) for end in extent(arena)],
+        "shapes": [_pack_shape(shape) for shape in things_in(arena)],
+        "walls": [list(wall) for wall in arena.walls],
+        "grid": {"x": grid.x, "y": grid.y, "cell": grid.cell, "columns": grid.columns, "rows": grid.rows},
+        "colors": _COLORS,
+    }
+
+
+def _pack_shape(shape: Shape) -> dict[str, Any]:
+    """A plain shape of something that stands in the arena, ready for JSON."""
+    if isinstance(shape, Line):
+        points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
+        return {
+            "points": [*points, points[0]] if shape.closed else points,
+            "fill": shape.fill or "none",
+            "stroke": shape.color or "none",
+            "width": shape.width,
+            "dash": list(shape.dash),
+        }
+    if isinstance(shape, Disc):
+        return {"x": shape.x, "y": shape.y, "radius": shape.radius, "fill": shape.fill}
+    return {"x": shape.x, "y": shape.y, "text": shape.text, "up": shape.shift[1], "fill": shape.color}
+
+
+def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[dict[str, Any]]:
+    """Trials ready for JSON; `placed` is false where nobody knows where the robot is."""
+    return [
+        {
+            "title": trial.title,
+            "label": trial.label,
+            "letter": LETTERS[pen],
+            "color": PENS[pen][0] if len(trials) > 1 else Ink.OURS,
+            "dashes": list(PENS[pen][1]) if len(trials) > 1 else [],
+            "placed": placed,
+            "outlines": [[list(corner) for corner in outline] for outline in trial.shape.outlines],
+            "mounts": [list(mount) for mount in trial.shape.mounts],
+            "reach": list(trial.shape.reach),
+            "step_s": trial.step_s,
+            "parts": trial.parts,
+            "poses": np.round(trial.poses, _DIGITS).tolist(),
+            "rays": [pack_rays(row) for row in trial.rays.tolist()],
+            "stalled": trial.stalled.astype(int).tolist(),
+            "cells": list(trial.cells),
+            "visited_at": list(trial.visited_at),
+        }
+        for pen, trial in enumerate(trials)
+    ]
+
+
+def pack_rays(lengths: Iterable[float]) -> list[float | None]:
+    """Lengths of rays ready for JSON, which has no NaN."""
+    return [None if math.isnan(length) else round(length, _DIGITS) for length in lengths]

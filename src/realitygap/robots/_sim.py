@@ -1,0 +1,203 @@
+"""The platform `sim`: a robot as its file describes it, with contact, motors and sensors."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, field_serializer, model_validator
+
+from realitygap.drawing import Picture
+from realitygap.settings import Settings
+from realitygap.world import Body, Distribution, RangeSensors, RobotModel, load_robot, robot_picture
+
+DEFAULT_ROBOT = "scribbler-s2-fluke2"
+
+NOISE = (
+    *("noise_uniform", "noise_gain", "drop_most", "outlier_most", "noise", "noise_per_m", "delay_jitter"),
+    *("travel_noise_per_m", "travel_noise_per_s", "heading_noise_per_m", "heading_noise_per_s"),
+)
+"""The last parts of names of numbers that are noise: 0 is none."""
+
+ARENA = "arena."
+"""What the names of an arena's numbers begin with."""
+
+
+@functools.cache
+def _named_robot(name: str) -> RobotModel:
+    return load_robot(name)
+
+
+def _as_robot(value: Any) -> Any:
+    """A robot by name or from a file, or as results describe it."""
+    if isinstance(value, str):
+        try:
+            return _named_robot(value) if "." not in value and "/" not in value else load_robot(value)
+        except ValueError as error:
+            raise ValueError(str(error).rstrip(".")) from None
+    return RobotModel.from_dict(value) if isinstance(value, Mapping) else value
+
+
+def _as_numbers(values: Any) -> Any:
+    """Numbers by name, and distributions made of tables."""
+    if not isinstance(values, Mapping):
+        return values
+    found: dict[str, Any] = {}
+    problems: list[str] = []
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            try:
+                value = Distribution(**value)
+            except ValueError as error:
+                problems += [
+                    f"{name}{line.removeprefix('Distribution')}"
+                    for line in str(error).rstrip(".").split("\n")
+                ]
+        elif isinstance(value, bool) or not isinstance(value, int | float | Distribution):
+            problems.append(
+                f"{name}: expected a number, or how it is drawn, such as {{ uniform = [0.1, 0.2] }}, came {value!r}"
+            )
+        elif not isinstance(value, Distribution):
+            value = float(value)
+        found[name] = value
+    if problems:
+        raise ValueError("; ".join(problems))
+    return found
+
+
+class SimPlatform(Settings):
+    """A robot of a file, simulated with its outline, contact, motors and sensors.
+
+    Every number of the robot and of the arena has a dotted name, such as `drive.track` or `arena.start.x`; `set` gives
+    any of them another value, or says how it is drawn for each trial, run or study. Where nothing is said, numbers are
+    the robot file's, which says where they come from.
+    """
+
+    robot: Annotated[RobotModel, BeforeValidator(_as_robot)] = Field(
+        default_factory=lambda: _named_robot(DEFAULT_ROBOT),
+        description=f"A robot by name (`realitygap show robot`), or the file of one; {DEFAULT_ROBOT} when not given. "
+        "Results keep all that is in it.",
+    )
+    steps: int = Field(
+        100, ge=1, le=100_000, description="Steps of a trial: commands (section 2.2, the paper's robot: 100)."
+    )
+    step_s: float = Field(
+        0.0, ge=0, le=60, description="How long a command lasts [s]; 0: as the robot's file has it."
+    )
+    contact: Literal["robot", "freeze", "stop", "slide"] = Field(
+        "robot",
+        description="What happens at walls: as the robot's file has it; freeze, as in Jyro; stop, where it turns if "
+        "its body allows; or slide, where it skids and turns along them.",
+    )
+    noise: bool = Field(
+        True,
+        description="Whether sensors and motors are as noisy as the robot's file says. A condition's own noise, the "
+        "paper's a, comes on top.",
+    )
+    noisy_reading: Literal["leave", "clip"] = Field(
+        "leave",
+        description="Of sensors with a linear response: after adding the paper's noise, leave the reading as it is, or "
+        "limit it to 0..1.",
+    )
+    set: Annotated[dict[str, float | Distribution], BeforeValidator(_as_numbers)] = Field(
+        default_factory=dict,
+        description="Numbers of the robot and of the arena by dotted name: a value, or how it is drawn: uniform = "
+        "[least, most], normal = [mean, standard deviation], log_uniform or choice, with per = trial (when not given), "
+        'run or study: "drive.track" = { normal = [0.153, 0.002], per = "run" }.',
+    )
+    precision: Literal["single", "double"] = Field(
+        "single", description="Of the arithmetic of trials: 32 or 64 bits."
+    )
+
+    @model_validator(mode="after")
+    def _numbers_are_the_robots(self) -> Self:
+        try:
+            self.model  # noqa: B018 - made to see whether it can be
+        except ValueError as error:
+            lines = [line.removeprefix("RobotModel").lstrip(".: ") for line in str(error).split("\n")]
+            raise ValueError("set: " + "; ".join(line.rstrip(".") for line in lines)) from None
+        return self
+
+    @field_serializer("robot")
+    def _robot_as_resolved(self, robot: RobotModel) -> dict[str, Any]:
+        return robot.to_dict()
+
+    @field_serializer("set")
+    def _set_as_plain(self, values: dict[str, float | Distribution]) -> dict[str, Any]:
+        return {
+            name: value.to_dict() if isinstance(value, Distribution) else value
+            for name, value in values.items()
+        }
+
+    @functools.cached_property
+    def model(self) -> RobotModel:
+        """The robot with its numbers as set, the contact chosen, and without noise where there is to be none."""
+        robot = self.robot
+        if self.contact != "robot":
+            contact = robot.contact.model_copy(update={"model": self.contact})
+            robot = robot.model_copy(update={"contact": contact})
+        changed: dict[str, float | Distribution] = {}
+        if not self.noise:
+            changed |= {name: 0.0 for name in robot.numbers() if name.rpartition(".")[2] in NOISE}
+        changed |= {name: value for name, value in self.set.items() if not name.startswith(ARENA)}
+        return robot.with_numbers(changed) if changed else robot
+
+    @property
+    def arena_numbers(self) -> dict[str, float | Distribution]:
+        """Those of `set` that are the arena's."""
+        return {name: value for name, value in self.set.items() if name.startswith(ARENA)}
+
+    @property
+    def command_s(self) -> float:
+        """How long a command lasts [s]."""
+        return self.step_s or self.model.step_s
+
+    @property
+    def label(self) -> str:
+        """What every figure of this platform says."""
+        return "SIM"
+
+    @property
+    def body(self) -> Body:
+        """What figures draw: the outline around all parts of the body."""
+        return Body(hull([point for part in self.model.body for point in part.outline()]))
+
+    @property
+    def sensors(self) -> RangeSensors:
+        """What figures draw: where range sensors are and look."""
+        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in self.model.range)
+        return RangeSensors(mounts, max((sensor.reach for sensor in self.model.range), default=0.0))
+
+    @property
+    def body_radius(self) -> float:
+        """Distance of the farthest point of the body from its origin [m]."""
+        return self.model.radius
+
+    def picture(self) -> Picture:
+        """The robot from above, to scale, with its dimensions."""
+        return robot_picture(f"{self.model.name} ({self.label})", self.body, self.sensors)
+
+    def _repr_svg_(self) -> str:
+        return self.picture().to_svg(300.0)
+
+
+def hull(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """The corners of the convex outline around points, counter-clockwise."""
+
+    def half(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        kept: list[tuple[float, float]] = []
+        for point in ordered:
+            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    ordered = sorted(set(points))
+    return tuple(half(ordered) + half(ordered[::-1]))
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Above 0 where a, b, c turn to the left."""
+    return math.fsum(((b[0] - a[0]) * (c[1] - a[1]), -(b[1] - a[1]) * (c[0] - a[0])))

@@ -1,0 +1,69 @@
+"""Reach a goal: in a maze, however the walls lead."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from realitygap.errors import TaskError
+from realitygap.kernels._scores import goal_scores
+from realitygap.settings import Settings
+from realitygap.world import Arena
+
+from ._inputs import Inputs
+from ._trajectories import Trajectories
+
+
+class GoalTask(Settings):
+    """How much of the way to the arena's goal was made good at the end: 1 - d / d0, or 1 where it was reached.
+
+    d is the straight distance from the goal at the end and d0 that at the start, whatever walls stand between; reached
+    is nearer than the goal's radius at the end of any step. With `selection = "novelty"` and the distance `final` the
+    same trials are rewarded for ending where none did.
+
+    Source: Lehman & Stanley (2011), section 4. Differs: a part of the first distance, and 1 once it was reached.
+    """
+
+    kind: Literal["goal"] = Field("goal", description="Reaching a goal.")
+    inputs: Inputs = (
+        "range.0",
+        "range.1",
+        "goal_sector.0",
+        "goal_sector.1",
+        "goal_sector.2",
+        "goal_sector.3",
+        "bias",
+    )
+
+    @property
+    def name(self) -> str:
+        """As `[task] kind` has it."""
+        return self.kind
+
+    @property
+    def needs_trace(self) -> bool:
+        """Always: the goal may be reached at any step."""
+        return True
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) at most 1; below 0 where the robot ended farther away than it began.
+
+        Raises:
+            TaskError: The arena has no goal, or it is where trials start.
+        """
+        if arena.goal is None:
+            raise TaskError(
+                f"Task 'goal' wants a goal, and arena {arena.name!r} has none. Choose another arena, such as 'goal', "
+                "or put a [goal] into its file."
+            )
+        x, y = arena.goal.x - arena.start.x, arena.goal.y - arena.start.y
+        if np.hypot(x, y) <= arena.goal.radius:
+            raise TaskError(
+                f"Trials in arena {arena.name!r} start at its goal, expected one to be reached. Move the start."
+            )
+        scores = np.empty(len(trajectories))
+        goal_scores(trajectories.arrays.poses, x, y, float(arena.goal.radius), scores)
+        return scores

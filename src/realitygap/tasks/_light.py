@@ -1,0 +1,63 @@
+"""Light seeking: be near a light, and get there without being blocked."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from realitygap.errors import TaskError
+from realitygap.kernels._scores import nearness_scores
+from realitygap.settings import Settings
+from realitygap.world import Arena
+
+from ._inputs import Inputs
+from ._trajectories import Trajectories
+
+
+class LightTask(Settings):
+    """How near to the nearest light a robot was on the whole, less what it spent blocked, 0 to 1.
+
+    At each step 1 - d / d0, at least 0, with d the distance to the nearest light and d0 that of the start; its mean
+    over steps, times the share of steps that were not blocked.
+
+    Source: light seeking and obstacle avoidance are the tasks of Jakobi, Husbands & Harvey (1995), "Noise and the
+    reality gap". Differs: they evolve the two apart, by formulas that were not at hand; this one is ours.
+    """
+
+    kind: Literal["light"] = Field("light", description="Light seeking.")
+    inputs: Inputs = ("light.0", "light.1", "bias")
+
+    @property
+    def name(self) -> str:
+        """As `[task] kind` has it."""
+        return self.kind
+
+    @property
+    def needs_trace(self) -> bool:
+        """Always: every step counts."""
+        return True
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) 0 to 1.
+
+        Raises:
+            TaskError: The arena has no light, or one at the start.
+        """
+        places = np.array([(light.x, light.y) for light in arena.lights]).reshape(-1, 2)
+        places -= (arena.start.x, arena.start.y)
+        if not len(places):
+            raise TaskError(
+                f"Task 'light' wants a light, and arena {arena.name!r} has none. Choose another arena, such as "
+                "'light', or put a [[light]] into its file."
+            )
+        if not np.hypot(*places.T).all():
+            raise TaskError(
+                f"A light of arena {arena.name!r} is where trials start, expected one to be sought. Move the start or "
+                "the light."
+            )
+        scores = np.empty(len(trajectories))
+        nearness_scores(trajectories.arrays.poses, trajectories.arrays.stalled, places, scores)
+        return scores

@@ -1,0 +1,71 @@
+"""Wall following: go along the walls with them on one side."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from realitygap.errors import TaskError
+from realitygap.kernels._scores import wall_scores
+from realitygap.settings import Settings
+from realitygap.world import Arena
+
+from ._inputs import Inputs
+from ._trajectories import Trajectories
+
+SIDES = {"left": 1.0, "right": -1.0}
+
+
+class WallTask(Settings):
+    """How far a robot went along walls that it had near and on one side [m].
+
+    A step counts with its part along the nearest wall or obstacle: forward with that on the right side, backward with
+    it on the wrong one. So going to and fro, or round in a circle, adds up to nothing.
+
+    Source: ours.
+    """
+
+    kind: Literal["wall"] = Field("wall", description="Wall following.")
+    inputs: Inputs = ("range.0", "range.1", "bias")
+    side: Literal["left", "right"] = Field("right", description="Where the robot has the wall.")
+    within: float = Field(
+        0.15, gt=0, le=100, description="Nearer than this to the robot's origin is near [m]."
+    )
+
+    @property
+    def name(self) -> str:
+        """As `[task] kind` has it."""
+        return self.kind
+
+    @property
+    def needs_trace(self) -> bool:
+        """Always: every step counts."""
+        return True
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) [m], below 0 where the robot went the wrong way round.
+
+        Raises:
+            TaskError: The arena has neither walls nor obstacles.
+        """
+        walls = outlines(arena)
+        if not len(walls):
+            raise TaskError(
+                f"Task 'wall' wants walls, and arena {arena.name!r} has none. Choose another arena, such as 'wall'."
+            )
+        scores = np.empty(len(trajectories))
+        wall_scores(trajectories.arrays.poses, walls, SIDES[self.side], float(self.within), scores)
+        return scores
+
+
+def outlines(arena: Arena) -> NDArray[np.float64]:
+    """(w, 4) walls and the sides of obstacles, round ones in short lines, from the start [m]."""
+    walls = [*arena.walls]
+    for obstacle in arena.obstacles:
+        points = obstacle.outline()
+        walls += [(*one, *other) for one, other in zip(points, (*points[1:], points[0]), strict=True)]
+    start = (arena.start.x, arena.start.y)
+    return np.asarray(np.array(walls, np.float64).reshape(-1, 4) - np.array(start * 2))

@@ -1,0 +1,64 @@
+"""What is drawn for a trial: numbers of the robot and the arena, as a pure function of the key and the trial."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.kernels._draw import draw_units
+from realitygap.kernels._philox import PURPOSE_MODEL
+from realitygap.world import Distribution
+
+
+class Draws:
+    """The numbers that are drawn, each a function of the key, of its name and of the trial, the run or the study.
+
+    A number does not depend on which others are drawn, so that conditions of one study draw the same where both do.
+
+    Args:
+        numbers: By dotted name; those that are no distributions are left aside.
+    """
+
+    def __init__(self, numbers: Mapping[str, float | Distribution]) -> None:
+        self._drawn = {name: value for name, value in numbers.items() if isinstance(value, Distribution)}
+        self.names = tuple(self._drawn)
+
+    @property
+    def differ(self) -> bool:
+        """Whether trials of one call may differ in them."""
+        return any(drawn.per != "study" for drawn in self._drawn.values())
+
+    def draw(self, key: int, counters: NDArray[np.uint32]) -> NDArray[np.float64]:
+        """(n, d) what is drawn for n trials.
+
+        Args:
+            key: Of the random numbers.
+            counters: (n, 3) the fixed words of each trial's random numbers.
+        """
+        words = {per: _counters(counters, per) for per in {drawn.per for drawn in self._drawn.values()}}
+        drawn = np.empty((len(counters), len(self.names)))
+        units = np.empty(len(counters))
+        for k, (name, distribution) in enumerate(self._drawn.items()):
+            draw_units(_block_of(name), np.uint64(key), words[distribution.per], units)
+            drawn[:, k] = distribution.of(units)
+        return drawn
+
+
+def _block_of(name: str) -> np.uint32:
+    """The word of the counter that stands for a number."""
+    return np.uint32(int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little"))
+
+
+def _counters(counters: NDArray[np.uint32], per: str) -> NDArray[np.uint32]:
+    """The words of the counter for draws that hold for a trial, a run or the study."""
+    words = np.zeros_like(counters)
+    if per == "trial":
+        words[:] = counters
+        words[:, 0] &= np.uint32(0xFFFFFF00)
+    elif per == "run":
+        words[:, 2] = counters[:, 2]
+    words[:, 0] |= np.uint32(PURPOSE_MODEL)
+    return words

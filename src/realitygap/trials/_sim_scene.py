@@ -1,0 +1,236 @@
+"""A robot and an arena in the form that the kernels of `sim` read: structure, and a table of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.kernels._sim_shape import (
+    INPUT_KINDS,
+    SimShape,
+    encloses,
+    in_table,
+    make_sim_shape,
+    sim_rows,
+    sim_table,
+)
+from realitygap.robots import ARENA, SimPlatform
+from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
+
+from ._batch import REAL
+
+Numbers = Mapping[str, float | Distribution]
+
+
+@dataclass(frozen=True)
+class SimScene:
+    """A robot in an arena, of which some numbers may be drawn.
+
+    Attributes:
+        platform: With what settings.
+        robot: As it is with them.
+        arena: Likewise.
+        shape: What all trials share.
+        numbers: Of robot and arena, by dotted name.
+        rows: Where each is in the table.
+    """
+
+    platform: SimPlatform
+    robot: RobotModel
+    arena: Arena
+    shape: SimShape
+    numbers: Numbers
+    rows: dict[str, int]
+
+    @property
+    def drawn_names(self) -> tuple[str, ...]:
+        """Of the numbers that are drawn, in the order in which records have them."""
+        return tuple(name for name, value in self.numbers.items() if isinstance(value, Distribution))
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """From where trials measure positions: the start [m]."""
+        return self.arena.start.x, self.arena.start.y
+
+    def table(self, values: Mapping[str, float | NDArray[np.float64]]) -> NDArray[np.floating]:
+        """(p, n) the numbers of n trials, from values in meters and radians; or (p, 1)."""
+        return sim_table(self.shape, values, REAL[self.platform.precision], self.origin)
+
+    def rows_of(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+        """(d, n) some rows of the table, in the order of the names."""
+        return np.array([in_table(name, value, self.origin) for name, value in values.items()])
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """The numbers that are not drawn, and the centers of those that are."""
+        return {
+            name: value.center if isinstance(value, Distribution) else value
+            for name, value in self.numbers.items()
+        }
+
+
+def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise: float) -> SimScene:
+    """Robot and arena with all settings, and what networks see of them.
+
+    Args:
+        platform: The robot as simulated.
+        arena: Where; its numbers in `platform.set` are laid over it.
+        inputs: Names of what networks see, in order.
+        noise: The paper's a, on top of the robot's own noise: each range reading is moved by a * U(-1, 1).
+
+    Raises:
+        ValueError: An input that the robot or arena does not have, noise that is not a finite number from 0 on, a
+            number that the arena does not have, or more than 256 cells.
+    """
+    if not (math.isfinite(noise) and noise >= 0):
+        raise ValueError(f"noise is {noise}, expected a finite number, 0 or more.")
+    if arena.grid.n_cells > 256:
+        raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
+    robot = platform.model
+    if platform.arena_numbers:
+        try:
+            arena = arena.with_numbers(platform.arena_numbers)
+        except ValueError as error:
+            lines = [line.removeprefix("ArenaFile").lstrip(".: ") for line in str(error).split("\n")]
+            raise ValueError(
+                "sim.set: " + "; ".join(f"{ARENA}{line.rstrip('.')}" for line in lines)
+            ) from None
+    numbers: dict[str, float | Distribution] = {**robot.numbers(), **arena.numbers()}
+    if noise > 0:
+        numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}
+    shape = make_sim_shape(
+        **_body_and_drive(robot, numbers, platform.command_s),
+        **_sensors(robot),
+        **_surroundings(arena, numbers),
+        inputs=[_input(name, robot, arena) for name in inputs],
+    )
+    rows = sim_rows(shape)
+    return SimScene(
+        platform,
+        robot,
+        arena,
+        shape,
+        {name: value for name, value in numbers.items() if name in rows},
+        rows,
+    )
+
+
+def highest(value: float | Distribution) -> float:
+    """The most that a number can be."""
+    return value.highest if isinstance(value, Distribution) else value
+
+
+def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
+    latest = highest(numbers["drive.delay"]) + highest(numbers["drive.delay_jitter"])
+    drive = robot.drive
+    return {
+        "parts": [len(part.corner) for part in robot.body],
+        "contact": robot.contact.model,
+        "mixing": drive.mixing,
+        "ahead": drive.ahead,
+        "levels": drive.levels,
+        "lowest_level": drive.lowest_level,
+        "delay_steps": math.ceil(latest / step_s),
+    }
+
+
+def _sensors(robot: RobotModel) -> dict[str, Any]:
+    return {
+        "range_response": [sensor.response for sensor in robot.range],
+        "range_rays": [sensor.rays for sensor in robot.range],
+        "range_table": [len(sensor.table) for sensor in robot.range],
+        "range_pulses": [sensor.pulses for sensor in robot.range],
+        "encoders": robot.encoder is not None,
+        "n_light": len(robot.light),
+        "light_shadows": robot.shadows,
+        "stall": robot.stall.kind,
+        "n_line": len(robot.line),
+        "line_levels": [sensor.level for sensor in robot.line],
+        "n_bump": len(robot.bump),
+    }
+
+
+def _surroundings(arena: Arena, numbers: Numbers) -> dict[str, Any]:
+    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
+    moving = any(
+        name.startswith("arena.wall.") and isinstance(numbers[name], Distribution) for name in numbers
+    )
+    x, y = arena.start.x, arena.start.y
+    image, grid = _floor_image(arena.floor.image)
+    half = arena.floor.tape_width
+    return {
+        "n_walls": len(walls),
+        "enclosed": not moving and encloses(walls, arena.start),
+        "obstacles": [_n_corners(obstacle, k, numbers) for k, obstacle in enumerate(arena.obstacles)],
+        "obstacle_round": [
+            len(obstacle.corners) == 1 or highest(numbers[f"arena.obstacle.{k}.radius"]) > 0
+            for k, obstacle in enumerate(arena.obstacles)
+        ],
+        "n_lamps": len(arena.lights),
+        "goal": arena.goal is not None,
+        "columns": arena.grid.columns,
+        "rows": arena.grid.rows,
+        "floor": image,
+        "floor_grid": (grid[0] - x, grid[1] - y, grid[2]),
+        "tapes": [(x1 - x, y1 - y, x2 - x, y2 - y, half, 0.0) for x1, y1, x2, y2 in arena.floor.tape],
+    }
+
+
+def _n_corners(obstacle: Obstacle, k: int, numbers: Numbers) -> int:
+    """0 for a disc around its own origin, whose corner needs no numbers."""
+    middle = all(numbers[f"arena.obstacle.{k}.corner.0.{axis}"] == 0.0 for axis in "xy")
+    return 0 if len(obstacle.corners) == 1 and middle else len(obstacle.corners)
+
+
+def _floor_image(image: FloorImage | None) -> tuple[NDArray[np.float32] | None, tuple[float, float, float]]:
+    """(h, w) brightness 0..1 with square pixels, row 0 lowest; its lower left corner [m] and pixels per meter."""
+    if image is None:
+        return None, (0.0, 0.0, 1.0)
+    per_m = max(image.columns / image.width, image.rows / image.height)
+    columns = np.minimum(
+        (np.arange(max(1, round(image.width * per_m))) + 0.5) / per_m / image.width * image.columns,
+        image.columns - 1,
+    )
+    rows = np.minimum(
+        (np.arange(max(1, round(image.height * per_m))) + 0.5) / per_m / image.height * image.rows,
+        image.rows - 1,
+    )
+    upwards = image.gray[::-1].astype(np.float32) / np.float32(255)
+    return upwards[rows.astype(int)][:, columns.astype(int)], (image.x, image.y, per_m)
+
+
+_COUNTS = {"range": "range", "light": "light", "line": "line", "bump": "bump"}
+_ALONE = ("obstacle", "stall", "time", "bias", "goal_distance", "last_move", "last_turn")
+
+
+def _input(name: str, robot: RobotModel, arena: Arena) -> tuple[str, int]:
+    """Kind and index of an input.
+
+    Raises:
+        ValueError: There is none of this name, or this robot or arena does not have it.
+    """
+    kind, _, index = name.partition(".")
+    known = kind in INPUT_KINDS and (index == "" if kind in _ALONE else index.isdecimal())
+    if not known:
+        raise ValueError(
+            f"A network cannot see {name!r}, expected {', '.join(_ALONE)}, or range.K, light.K, line.K, bump.K, "
+            "encoder.K, goal_sector.K with K from 0 on."
+        )
+    if kind in _COUNTS:
+        n = len(getattr(robot, _COUNTS[kind]))
+        if int(index) >= n:
+            raise ValueError(f"A network is to see {name}, and robot {robot.name!r} has {n} {kind} sensors.")
+    if kind == "encoder" and (robot.encoder is None or int(index) > 1):
+        raise ValueError(
+            f"A network is to see {name}, and robot {robot.name!r} has encoder.0 and .1 or none."
+        )
+    if kind.startswith("goal") and arena.goal is None:
+        raise ValueError(f"A network is to see {name}, and arena {arena.name!r} has no goal.")
+    if kind == "obstacle" and not robot.range:
+        raise ValueError(f"A network is to see obstacle, and robot {robot.name!r} has no range sensor.")
+    return kind, int(index or 0)

@@ -1,0 +1,107 @@
+"""Whether a robot fits where it is to start."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from ._arena import Arena, Pose
+from ._obstacle import Segment
+from ._robot import Body
+
+if TYPE_CHECKING:
+    from ._robot_model import RobotModel
+
+Point = tuple[float, float]
+
+SAME_DIGITS = (
+    7  # ends of walls that are the same to so many digits [m] are one corner: rounding of coordinates
+)
+TOUCHING = 1e-9  # outlines that overlap by less [m] touch, which is allowed at the start
+
+
+def check_start(arena: Arena, robot: Body | RobotModel) -> None:
+    """Refuse a start at which the body would not lie within the walls and beside all obstacles.
+
+    Raises:
+        ValueError: a corner of it lies beyond a wall, or it overlaps a wall or an obstacle.
+    """
+    pose = arena.start
+    start = f"the robot does not fit at the start ({pose.x:g}, {pose.y:g}, {pose.heading:g})"
+    enclosing = enclosing_walls(arena.walls)
+    for outline in _outlines(robot, pose):
+        for x, y in outline:
+            if enclosing and not _is_within(enclosing, x, y):
+                raise ValueError(
+                    f"{start}: a corner of its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start "
+                    "away from the wall."
+                )
+        for what, other in _solids(arena):
+            if _overlap(outline, other):
+                raise ValueError(f"{start}: its body would overlap {what}. Move the start away from it.")
+
+
+def is_inside(arena: Arena, x: float, y: float) -> bool:
+    """Whether a point lies inside the walls that enclose the arena; nothing does where none do."""
+    return _is_within(enclosing_walls(arena.walls), x, y)
+
+
+def enclosing_walls(walls: Sequence[Segment]) -> list[Segment]:
+    """The walls that make closed rounds: what is left after taking away those with a loose end, again and again."""
+    left = list(walls)
+    while True:
+        counts = Counter(end for wall in left for end in _ends(wall))
+        tied = [wall for wall in left if all(counts[end] > 1 for end in _ends(wall))]
+        if len(tied) == len(left):
+            return tied
+        left = tied
+
+
+def _ends(wall: Segment) -> tuple[Point, Point]:
+    x1, y1, x2, y2 = (round(value, SAME_DIGITS) for value in wall)
+    return (x1, y1), (x2, y2)
+
+
+def _is_within(walls: Sequence[Segment], x: float, y: float) -> bool:
+    """Whether an odd number of walls lies to the right of a point."""
+    crossings = 0
+    for x1, y1, x2, y2 in walls:
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            crossings += 1
+    return crossings % 2 == 1
+
+
+def _outlines(robot: Body | RobotModel, pose: Pose) -> Iterator[tuple[Point, ...]]:
+    """The outlines of a robot at a pose, each convex [m]."""
+    parts = [robot.corners] if isinstance(robot, Body) else [part.outline() for part in robot.body]
+    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
+    for part in parts:
+        yield tuple(
+            (pose.x + forward * cosine - left * sine, pose.y + forward * sine + left * cosine)
+            for forward, left in part
+        )
+
+
+def _solids(arena: Arena) -> Iterator[tuple[str, tuple[Point, ...]]]:
+    """What a body cannot overlap, in words and as convex outlines."""
+    for k, (x1, y1, x2, y2) in enumerate(arena.walls):
+        yield f"wall {k}", ((x1, y1), (x2, y2))
+    for k, obstacle in enumerate(arena.obstacles):
+        yield f"obstacle {k}", obstacle.outline()
+
+
+def _overlap(a: Sequence[Point], b: Sequence[Point]) -> bool:
+    """Whether two convex outlines overlap: no direction parts them. Two corners are a line."""
+    for corners in (a, b):
+        for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True):
+            length = math.hypot(x2 - x1, y2 - y1)
+            if not length:
+                continue
+            across_x, across_y = (y2 - y1) / length, (x1 - x2) / length
+            along_a = [x * across_x + y * across_y for x, y in a]
+            along_b = [x * across_x + y * across_y for x, y in b]
+            if min(max(along_a) - min(along_b), max(along_b) - min(along_a)) <= TOUCHING:
+                return False
+    return True

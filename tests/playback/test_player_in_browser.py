@@ -1,0 +1,231 @@
+"""The player in a real browser: Chromium as installed on the machine, driven by Playwright.
+
+Every test also fails on any message of the console and on any request but for the page itself.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from realitygap.playback import play
+
+from .page import page_of
+from .trials import straight, turning
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
+
+CHROMIUM = next(
+    filter(
+        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
+    ),
+    None,
+)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium or Chrome on the PATH")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--no-first-run"]
+        )
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def show(browser, tmp_path) -> Iterator[Callable[..., Any]]:
+    contexts, complaints = [], []
+
+    def open_page(widget: Any, **options: Any) -> Any:
+        context = browser.new_context(viewport={"width": 900, "height": 800}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(5_000)
+        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        context.on(
+            "request",
+            lambda request: (
+                None if request.url.startswith(("file:", "data:")) else complaints.append(request.url)
+            ),
+        )
+        page.goto(page_of(widget, tmp_path / "page.html").as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+def clock(page) -> str:
+    return page.text_content(".rg-clock")
+
+
+def scrub(page, step: int) -> None:
+    page.locator("input[type=range]").evaluate(
+        "(slider, step) => { slider.value = step; slider.dispatchEvent(new Event('input')); }", step
+    )
+
+
+def visited(page) -> int:
+    return page.evaluate(
+        "() => [...document.querySelectorAll('.rg-tile')]"
+        ".filter(tile => tile.style.fill !== 'rgb(243, 245, 248)').length"
+    )
+
+
+def test_the_slider_goes_through_the_trial(show):
+    trial = straight(10)
+    page = show(play(trial))
+    assert clock(page) == "step 0 of 10 · 0.0 s · coverage .014"
+    assert visited(page) == 1
+    scrub(page, 7)
+    assert clock(page).startswith("step 7 of 10 · 0.7 s · coverage ")
+    assert visited(page) == trial.at(0.7).n_cells
+    x = float(page.locator(".rg-robot").get_attribute("transform").split("(")[1].split(" ")[0])
+    left, _, _, _ = page.evaluate("() => window.model.get('scene').extent")
+    assert x == pytest.approx(1000 * (trial.poses[7, 0] - left), abs=0.2)
+    assert len(page.locator(".rg-trail").get_attribute("points").split()) == 9, "rows 0 to 7, and where it is"
+    scrub(page, 2)
+    assert visited(page) == trial.at(0.2).n_cells, "cells are given back"
+    assert page.locator("input[type=range]").get_attribute("aria-valuetext") == "step 2 of 10, 0.2 seconds"
+
+
+def test_it_plays_as_fast_as_asked_and_stops_at_the_end(show):
+    page = show(play(straight(10)))
+    page.select_option("select", "8")
+    page.click("button[aria-label=Play]")
+    page.wait_for_selector("button[aria-label=Play]", timeout=3000)
+    assert clock(page).startswith("step 10 of 10 · 1.0 s")
+    assert page.evaluate("() => window.model.get('speed')") == 8
+    page.select_option("select", "0.25")
+    page.click("button[aria-label=Play]")
+    page.wait_for_timeout(300)
+    page.click("button[aria-label=Pause]")
+    shown = float(clock(page).split(" · ")[1].removesuffix(" s"))
+    assert 0.0 < shown < 0.6, "it begins anew at its end, and a quarter as fast"
+    assert page.text_content("[role=status]") == clock(page)
+
+
+def test_keys_do_what_buttons_do(show):
+    page = show(play(straight(87)))
+    field = page.locator("svg[role=img]")
+    field.focus()
+    for key, step in (
+        ("ArrowRight", 1),
+        ("Shift+ArrowRight", 11),
+        ("ArrowLeft", 10),
+        ("End", 87),
+        ("Home", 0),
+    ):
+        page.keyboard.press(key)
+        assert clock(page).startswith(f"step {step} of 87")
+    page.keyboard.press(" ")
+    page.wait_for_selector("button[aria-label=Pause]")
+    page.keyboard.press(" ")
+    page.wait_for_selector("button[aria-label=Play]")
+    assert field.get_attribute("aria-label").startswith("a: step")
+
+
+def test_rays_are_as_long_as_they_read_and_colored_by_nearness(show):
+    page = show(play(straight(10)))
+    rays = page.evaluate(
+        "() => [...document.querySelectorAll('.rg-ray')].map(ray => [ray.getAttribute('x1'), ray.getAttribute('x2'), "
+        "ray.style.stroke])"
+    )
+    assert [(float(to) - float(start)) for start, to, _ in rays] == pytest.approx([200.0, 100.0, 0.0])
+    assert [color for _, _, color in rays] == ["rgb(169, 180, 194)", "rgb(227, 154, 27)", "rgb(194, 24, 43)"]
+    page.uncheck("label:has-text('rays') input")
+    assert not page.locator(".rg-ray").first.is_visible()
+    page.uncheck("label:has-text('cells') input")
+    assert visited(page) == 0
+    page.uncheck("label:has-text('trails') input")
+    assert not page.locator(".rg-trail").first.is_visible()
+
+
+def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(show):
+    trials = [straight(4, title=name) for name in ("one", "two", "<b>three")]
+    page = show(play([*trials, turning(2)], title="four"))
+    assert page.text_content(".rg-head strong") == "four"
+    assert page.locator(".rg-name").all_text_contents()[2] == "C <b>three .014"
+    places = {letter.get_attribute("transform") for letter in page.locator(".rg-letter").all()}
+    assert len(places) == 4
+    scrub(page, 10)
+    assert "× " in page.locator(".rg-name").all_text_contents()[3], "blocked in its last step"
+    assert clock(page) == "step 4 of 4 · 1.0 s", "it lasts as long as the longest"
+
+
+def test_who_wants_no_motion_sees_steps(show):
+    page = show(play(turning(2)), reduced_motion="reduce")
+    page.click("button[aria-label=Play]")
+    page.wait_for_timeout(200)
+    turns = page.locator(".rg-robot").get_attribute("transform")
+    assert turns.endswith(f"rotate({-(360 - 22.918):.2f})") or clock(page).startswith("step 1")
+
+
+def test_every_control_has_a_name_and_can_be_reached_by_keyboard(show):
+    page = show(play(straight(10)))
+    names = []
+    for _ in range(7):
+        page.keyboard.press("Tab")
+        names.append(
+            page.evaluate(
+                "() => { const one = document.activeElement; return one.getAttribute('aria-label') || "
+                "(one.labels && one.labels[0] && one.labels[0].textContent); }"
+            )
+        )
+    assert names[0].startswith("a: step 0 of 10")
+    assert names[1:] == ["Play", "Step", "Speed", "rays", "trails", "cells"]
+
+
+def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
+    trial = straight(10)
+    widget = play(trial)
+    done = widget.trials
+    widget.trials = play(straight(0)).trials
+    widget.live = True
+    page = show(widget)
+    assert page.evaluate("() => window.sent") == [{"kind": "all"}]
+    assert page.locator("button[aria-label=Play]").is_disabled()
+    now = {"kind": "now", "rays": [0.2, 0.1, None], "stalled": False, "lasts": 0.0, "time": 0.1, "trail": []}
+    page.evaluate(
+        "message => window.tell(message)", {**now, "pose": [0.2, 0.2, 0.0], "step": 1, "cells": [13]}
+    )
+    assert clock(page) == "step 1 · 0.1 s · coverage .014"
+    page.evaluate(
+        "message => window.tell(message)",
+        {
+            **now,
+            "pose": [0.4, 0.2, 0.0],
+            "step": 2,
+            "time": 0.2,
+            "cells": [14, 15],
+            "trail": [[0.3, 0.2]],
+            "lasts": 0.1,
+        },
+    )
+    page.wait_for_timeout(250)
+    assert clock(page) == "step 2 · 0.2 s · coverage .042"
+    x = float(page.locator(".rg-robot").get_attribute("transform").split("(")[1].split(" ")[0])
+    left, _, _, _ = page.evaluate("() => window.model.get('scene').extent")
+    assert x == pytest.approx(1000 * (0.4 - left), abs=0.2)
+    page.evaluate(
+        "trials => { window.model.set('was_live', true); window.model.set('trials', trials); "
+        "window.model.set('live', false); }",
+        done,
+    )
+    assert clock(page).startswith("step 10 of 10")
+    assert page.locator("button[aria-label=Play]").is_enabled()
+
+
+def test_a_view_that_is_closed_listens_no_longer(show):
+    page = show(play(straight(10)))
+    page.click("button[aria-label=Play]")
+    page.evaluate("() => window.cleanup()")
+    assert page.evaluate("() => window.heard()") == 0

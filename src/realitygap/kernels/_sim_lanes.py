@@ -11,9 +11,11 @@ from ._compile import kernel, stage
 from ._lanes import LANES, Line, Poses, Row, Rows, Words, fill
 from ._math import sin_cos_of_turns
 from ._philox import PURPOSE_DRIVE
+from ._sim_outline import outline_of, place_obstacle, reach_of
 from ._sim_senses import Senses, make_senses, start_senses
 from ._wiring import Wiring, make_wiring
 
+NEAR = 32  # trials in contact that are worked on side by side
 N_SPARE = 24  # rows for what stages work out on the way
 
 
@@ -42,7 +44,9 @@ class SimLanes(NamedTuple):
     targets: Rows  # (2 * (delay_steps + 2),) speeds asked for, latest first, left and right in turn
     wheels: Rows  # (2,) driven since the start, as an encoder without error would say [m]
     commands: Rows  # (2,) of the last step, -1..1
-    moved: Rows  # (3,) what the step asks for: length [m], turn [turns], and time since the start [s]
+    moved: (
+        Rows  # (4,) what the step asks for: length [m] and turn [turns] by the old command, then the new one
+    )
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
     readings: Rows  # (n_readings,) 0..1, 1 is near
@@ -66,7 +70,27 @@ class SimRoom(NamedTuple):
     """Room for a block of trials."""
 
     lanes: SimLanes
+    near: Near
     wiring: Wiring
+
+
+class Near(NamedTuple):
+    """The trials of a block whose robots may touch something in a step, gathered. Poses are of the axle."""
+
+    p: Rows  # as in `SimLanes`, of which what contact needs
+    lane: NDArray[np.int32]  # (NEAR,) where each comes from
+    pose: Poses
+    before: Poses  # at the beginning of a part of the step
+    start: Poses  # at the beginning of the step
+    moved: Rows  # (4,) as in `SimLanes`
+    gap: Row  # of the deepest contact [m]; the rest is of it too
+    facing: Row  # its normal, towards the body: ahead and left
+    beside: Row
+    point_x: Row  # where the body is met
+    point_y: Row
+    low: Row  # the least gap met so far
+    done: Rows  # (2,) carried out: length and turn
+    spare: Rows  # (N_SPARE,)
 
 
 class SimTrace(NamedTuple):
@@ -97,6 +121,36 @@ def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
     )
 
 
+def make_near(shape, dtype):
+    """Room for trials in contact."""
+
+    def row():
+        return np.zeros(NEAR, dtype)
+
+    def poses():
+        return Poses(*(row() for _ in Poses._fields))
+
+    def rows(n):
+        return np.zeros((n, NEAR), dtype)
+
+    return Near(
+        p=rows(shape.n_all_rows),
+        lane=np.zeros(NEAR, np.int32),
+        pose=poses(),
+        before=poses(),
+        start=poses(),
+        moved=rows(4),
+        gap=row(),
+        facing=row(),
+        beside=row(),
+        point_x=row(),
+        point_y=row(),
+        low=row(),
+        done=rows(2),
+        spare=rows(N_SPARE),
+    )
+
+
 def make_sim_room(shape, neat, hidden_room, dtype):
     """Room for a block of trials with networks of so many hidden nodes, in a precision."""
     n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
@@ -123,7 +177,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         targets=rows(2 * (shape.delay_steps + 2)),
         wheels=rows(2),
         commands=rows(2),
-        moved=rows(3),
+        moved=rows(4),
         distances=rows(n_rays),
         rates=rows(n_rays),
         readings=rows(shape.n_readings),
@@ -142,7 +196,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         n_line=np.zeros(LANES, np.int32),
         spare=rows(N_SPARE),
     )
-    return SimRoom(lanes, make_wiring(np.zeros(0, dtype), neat, hidden_room))
+    return SimRoom(lanes, make_near(shape, dtype), make_wiring(np.zeros(0, dtype), neat, hidden_room))
 
 
 @kernel
@@ -196,6 +250,14 @@ def _direct(direction, cone, part, cosine, sine):
 def _derive(shape, lanes):
     p = lanes.p
     start = shape.row_start
+    fill(p[shape.row_reach], lanes.low.dtype.type(0.0))
+    for part in range(shape.part_corners.size):
+        n = shape.part_corners[part]
+        first, outline = shape.row_part[part], shape.row_outline[part]
+        outline_of(p, first, n, outline, lanes.total)
+        for corner in range(n):
+            row = outline + 5 * corner
+            reach_of(p[row], p[row + 1], p[first + 2 * n], p[shape.row_drive + 2], p[shape.row_reach])
     if shape.enclosed:
         for w in range(shape.n_walls):
             wall = shape.row_wall + 4 * w
@@ -204,6 +266,12 @@ def _derive(shape, lanes):
                 p[wall], p[wall + 1], p[wall + 2], p[wall + 3], p[start], p[start + 1],
                 p[plane], p[plane + 1], p[plane + 2],
             )  # fmt: skip
+    for obstacle in range(shape.row_obstacle.size):
+        place_obstacle(shape, lanes, obstacle)
+    for q in range(shape.row_obstacle.size, shape.row_shape.size):
+        wall = shape.row_wall + 4 * (q - shape.row_obstacle.size)
+        outline_of(p, wall, 2, shape.row_shape[q], lanes.total)
+        fill(p[shape.row_shape[q] + 10], lanes.low.dtype.type(0.0))
     for s in range(shape.row_range.size):
         sensor = shape.row_range[s]
         rays = shape.range_rays[s]

@@ -124,7 +124,10 @@ class SimShape(NamedTuple):
     levels: int  # speeds up to full, evenly spaced from 0; 0: all speeds exist
     lowest_level: int  # the number of the slowest that exists
     delay_steps: int  # whole steps by which a command can be late
+    late: bool  # whether commands come late at all
+    noisy: bool  # whether the drive draws random numbers
     substeps: int  # parts of a step in which contact is looked for
+    late_substeps: int  # likewise, of its beginning, when the old command still goes on
     sweeps: int  # how often contact is mended in each of them
     enclosed: bool  # whether the walls close a convex room, so that each is a half-plane
     stall: int  # BLOCKED or IDLER
@@ -164,12 +167,13 @@ class SimShape(NamedTuple):
     floor_grid: NDArray[np.float64]  # (3,) x, y of its lower left corner [m], pixels per meter
     tapes: NDArray[np.float64]  # (k, 6) lines on the floor: both ends [m], width [m], brightness
     # Rows that follow from the table, behind it
-    row_edge: NDArray[np.int32]  # (k,) for each corner of a part: normal x, y and length of the edge from it
-    row_reach: int  # the farthest that the body reaches from its origin
+    row_outline: NDArray[np.int32]  # (k,) for each corner of a part, counter-clockwise: x from the axle, y,
+    # normal x, y and length of the edge that begins there
+    row_reach: int  # the farthest that the body reaches from its axle [m]
     row_plane: int  # normal x, y and offset of each wall
     row_ray: int  # cosine and sine of each ray
     shape_corners: NDArray[np.int32]  # (q,) corners of all that is met as a polygon: obstacles, open walls
-    row_shape: NDArray[np.int32]  # (q,) x, y, normal x, y, length a corner; then radius, middle x, y, reach
+    row_shape: NDArray[np.int32]  # (q,) x, y, normal x, y, length for each corner; then its radius
     n_all_rows: int
 
 
@@ -208,8 +212,11 @@ def make_sim_shape(
     ahead: int = 1,
     levels: int = 0,
     lowest_level: int = 1,
+    late: bool = True,
+    noisy: bool = True,
     delay_steps: int = 0,
-    substeps: int = 1,
+    substeps: int = 4,
+    late_substeps: int = 1,
     sweeps: int = 2,
     stall: str = "blocked",
     range_response: Sequence[str] = (),
@@ -243,8 +250,10 @@ def make_sim_shape(
         mixing: "wheels" or "independent".
         ahead: 1, or -1 where the end at -x is ahead.
         levels, lowest_level: Speeds that exist: lowest_level / levels up to 1; 0: all.
+        late, noisy: Whether the drive has a delay, and random numbers; without, they need not be worked out.
         delay_steps: Whole steps by which a command can be late at most.
-        substeps: Parts of a step in which contact is looked for (`substeps_for`).
+        substeps, late_substeps: Parts of a step in which contact is looked for, of the new command and of the
+            old one that goes on before it (`substeps_for`).
         sweeps: How often contact is mended in each of them.
         stall: "blocked" or "idler".
         range_response: "linear", "ir", "table" or "pulses" for each range sensor.
@@ -285,19 +294,22 @@ def make_sim_shape(
     first_ray = np.concatenate([[0], np.cumsum(rays)]).astype(np.int32)
     polygons = [max(corners, 1) for corners in obstacles] + ([] if enclosed else [2] * n_walls)
     end = len(names)
-    row_edge, end = _stack([3 * corners for corners in parts], end)
+    row_outline, end = _stack([5 * corners for corners in parts], end)
     row_reach, end = end, end + 1
     row_plane, end = end, end + (3 * n_walls if enclosed else 0)
     row_ray, end = end, end + 2 * int(first_ray[-1])
-    row_shape, end = _stack([5 * corners + 4 for corners in polygons], end)
+    row_shape, end = _stack([5 * corners + 1 for corners in polygons], end)
     return SimShape(
         contact=CONTACT_MODELS[contact],
         mixing=MIXINGS[mixing],
         ahead=ahead,
         levels=levels,
         lowest_level=lowest_level,
+        late=late,
+        noisy=noisy,
         delay_steps=delay_steps,
         substeps=substeps,
+        late_substeps=late_substeps,
         sweeps=sweeps,
         enclosed=enclosed,
         stall=STALLS[stall],
@@ -336,7 +348,7 @@ def make_sim_shape(
         floor=np.zeros((0, 0), np.float32) if floor is None else np.ascontiguousarray(floor, np.float32),
         floor_grid=np.array(floor_grid, np.float64),
         tapes=np.array(tapes, np.float64).reshape(-1, 6),
-        row_edge=row_edge,
+        row_outline=row_outline,
         row_reach=row_reach,
         row_plane=row_plane,
         row_ray=row_ray,

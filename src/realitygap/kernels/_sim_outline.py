@@ -115,7 +115,11 @@ def _copy(source, target):
 def place_obstacle(shape, lanes, obstacle):
     """The outline of an obstacle from its own numbers, wherever they say that it is."""
     p = lanes.p
-    first, outline, n = shape.row_obstacle[obstacle], shape.row_shape[obstacle], shape.obstacle_corners[obstacle]
+    first, outline, n = (
+        shape.row_obstacle[obstacle],
+        shape.row_shape[obstacle],
+        shape.obstacle_corners[obstacle],
+    )
     if n == 0:
         fill(p[outline + 2], p.dtype.type(0.0))
         fill(p[outline + 3], p.dtype.type(0.0))

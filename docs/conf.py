@@ -8,6 +8,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import make_billion  # noqa: E402
+import make_gallery  # noqa: E402
 import make_sensors  # noqa: E402
 import make_speed  # noqa: E402
 import reference_pages  # noqa: E402
@@ -100,6 +101,7 @@ def setup(app):
     """Write the generated pages before Sphinx looks for pages."""
     more = {
         "parts/billion.md": make_billion.page_tables(),
+        "parts/gallery.md": make_gallery.page_part(),
         **make_speed.page_parts(),
         **make_sensors.page_parts(),
     }

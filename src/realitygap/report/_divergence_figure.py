@@ -48,7 +48,7 @@ _GHOSTS = 7
 _MOST_TRAILS = 30
 """Repeats whose paths are drawn; more would be a blot."""
 
-PLATFORMS = ("jyro",)
+PLATFORMS = ("jyro", "sim")
 """That a network can be tried on beside its own, with their defaults."""
 
 
@@ -146,8 +146,9 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
     if against in names:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
     if against in PLATFORMS:
-        fresh = Condition(name=own.name)
-        return own.model_copy(update={"platform": against, against: getattr(fresh, against)})
+        fresh = Condition(name=own.name, platform=against)
+        changed = {"platform": against, against: getattr(fresh, against), "noise": fresh.noise}
+        return own.model_copy(update=changed)
     raise ValueError(
         f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
     )
@@ -159,14 +160,14 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
     trials = []
     for repeat in range(1, repeats + 1):
         trajectory = trace_genome(
-            on.tried_on,  # type: ignore[arg-type]  # a robot was refused
+            on.simulated_on,
             arena,
             genome,
             noise=on.noise,
             noise_key=replace(key, repeat=repeat),
-            inputs=on.network_inputs,
+            inputs=trial.condition.network_inputs,
         )
-        trials.append(in_motion(trajectory, arena, on.tried_on, title=name, label=on.label))
+        trials.append(in_motion(trajectory, arena, on.simulated_on, title=name, label=on.label))
     return Side(name, tuple(trials))
 
 
@@ -281,6 +282,8 @@ def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong:
     moment = trial.at(row / trial.parts * trial.step_s)
     for outline in trial.shape.outlines:
         corners = placed([*outline, outline[0]], moment.pose)
+        if strong:
+            axes.fill(corners[:, 0], corners[:, 1], color=Ink.GROUND, alpha=0.75, linewidth=0, zorder=7.5)
         draw_line(
             axes,
             corners[:, 0],

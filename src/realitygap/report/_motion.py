@@ -173,7 +173,7 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
         condition.arena.arena(),
         condition.simulated_on,
         title=title,
-        label=condition.simulated_on.label,
+        label=condition.label,
     )
 
 

@@ -145,7 +145,10 @@ class Condition(Settings):
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        check_start(self.arena.arena(), self.tried_on.body)
+        arena = self.arena.arena()
+        if self.platform == "jyro":
+            arena.straight_walls()  # which says where there are none
+        check_start(arena, self.sim.model if self.platform == "sim" else self.tried_on.body)
         return self
 
     @model_validator(mode="after")

@@ -9,6 +9,7 @@ from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sim import SimTrials
+from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
@@ -26,6 +27,7 @@ __all__ = [
     "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimRobot",
     "SimScene",
     "SimTrials",
     "SimWorld",

@@ -19,7 +19,7 @@ from realitygap.kernels._sim_shape import (
     sim_rows,
     sim_table,
 )
-from realitygap.robots import SimPlatform
+from realitygap.robots import ARENA, SimPlatform
 from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
 
 from ._batch import REAL
@@ -93,7 +93,13 @@ def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise:
         raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
     robot = platform.model
     if platform.arena_numbers:
-        arena = arena.with_numbers(platform.arena_numbers)
+        try:
+            arena = arena.with_numbers(platform.arena_numbers)
+        except ValueError as error:
+            lines = [line.removeprefix("ArenaFile").lstrip(".: ") for line in str(error).split("\n")]
+            raise ValueError(
+                "sim.set: " + "; ".join(f"{ARENA}{line.rstrip('.')}" for line in lines)
+            ) from None
     numbers: dict[str, float | Distribution] = {**robot.numbers(), **arena.numbers()}
     if noise > 0:
         numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}

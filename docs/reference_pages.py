@@ -24,7 +24,7 @@ from scipy import stats
 
 from realitygap import myro
 from realitygap.cli import app
-from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
@@ -74,6 +74,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/ledger.md"] = ledger()
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
+    pages["parts/distances.md"] = distances()
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
@@ -350,6 +351,27 @@ def option_text(option: Any) -> str:
     word = option.metavar or ("NAME" if option.type_descriptor.annotation is str else "N")
     takes = "" if option.is_flag else f" {word}"
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
+
+
+# --- distances ----------------------------------------------------------------------------------------------
+
+
+def distances() -> str:
+    """What each distance of behaviors says of itself, and in full."""
+    compared = {
+        "position": "where trials end",
+        True: "the list of cells, in order",
+        False: "the set of cells",
+    }
+    lines = ["| distance | compares | needs the order | metric | unit | steps |", "|---|---|---|---|---|---|"]
+    told = []
+    for name, each in DISTANCES.items():
+        what = compared["position" if each.compares == "position" else each.needs_order]
+        unit = "0 to 1" if each.unit == "1" else each.unit
+        words = ["yes" if value else "no" for value in (each.needs_order, each.is_metric)]
+        lines.append(f"| `{name}` | {what} | {' | '.join(words)} | {unit} | {each.cost} |")
+        told.append(f"`{name}`\n: {escape(each.description)} Source: {escape(each.source)}")
+    return "\n".join(lines) + "\n\n" + "\n\n".join(told) + "\n"
 
 
 # --- choices ------------------------------------------------------------------------------------------------

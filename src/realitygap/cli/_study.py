@@ -27,7 +27,9 @@ NARROWEST = 78
 def run(
     study: Annotated[
         str,
-        typer.Argument(metavar="STUDY", help="paper, paper-choices, paper-robot, or a study file (.toml)."),
+        typer.Argument(
+            metavar="STUDY", help="paper, paper-choices, paper-robot, distances, or a study file (.toml)."
+        ),
     ],
     replicates: Annotated[
         int | None, typer.Option(min=1, help="Runs of each condition, in place of the study's.")

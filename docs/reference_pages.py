@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 import typer
+from description_pages import description_parts
 from numpy.typing import NDArray
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -81,6 +82,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/mazes.md"] = mazes()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
+    pages |= description_parts()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name

@@ -104,12 +104,11 @@ def on_trials(study: ResultsFolder) -> str:
         if distance.compares == "cells":
             found = audit_distance(name, study, n_walks=10).confounds
             chosen = [each for each in found if each.of in ("random walks", AUDITED)]
-            cells: list[object] = []
-            for each in chosen:
-                cells += [f"{_signed(each.correlation.value)} ({_span(each.correlation)})"]
-            rows.append([name, *cells, *(f"{100 * each.contained:.0f} %" for each in chosen)])
-    head = ["Distance", "random walks", f"trials of “{AUDITED}”", "shorter within longer, walks"]
-    return _csv([*head, "shorter within longer, trials"], rows)
+            rows.append(
+                [name, *(f"{_signed(each.correlation.value)} ({_span(each.correlation)})" for each in chosen)]
+            )
+    rows.append(["shorter within longer", *(f"{100 * each.contained:.0f} %" for each in chosen)])
+    return _csv(["Distance", "random walks", f"trials of “{AUDITED}”"], rows)
 
 
 # --- the study ----------------------------------------------------------------------------------------------

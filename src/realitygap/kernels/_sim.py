@@ -156,7 +156,7 @@ def _run_block(shape, table, rules, neat, key, counters, first, n_lanes, room, c
                 _keep_answers(trace, lanes, neat, first, n_lanes, step)
             take_commands(lanes.values[neat.n_inputs], lanes.values[neat.n_inputs + 1], lanes)
             drive(shape, rules, key, lanes, step)
-            settle(shape, lanes)
+            settle(shape, lanes, room.near)
             feel_motion(shape, rules, key, lanes, step)
         arrive(shape, rules, lanes)
         _list(shape, lanes, n_lanes, cells, first)
@@ -220,7 +220,7 @@ def step_sim(shape, rules, key, n, room, cells, step, commands):
     lanes = room.lanes
     take_commands(commands[0], commands[1], lanes)
     drive(shape, rules, key, lanes, step)
-    settle(shape, lanes)
+    settle(shape, lanes, room.near)
     feel_motion(shape, rules, key, lanes, step)
     arrive(shape, rules, lanes)
     _list(shape, lanes, n, cells, 0)

@@ -1,14 +1,48 @@
-"""What happens to a body that meets a wall or an obstacle, in lanes."""
+"""What happens to a body that meets a wall or an obstacle, in lanes.
+
+`freeze`: the whole step is refused (Jyro). `stop`: translation is refused, turning goes on where the body allows it.
+`slide`: at the contact that is deepest, the wall pushes along its normal n and rubs along its tangent t; the body gives
+way along A * wrench, A = diag(long, lat, ang) in the frame of its axle, until it is free, several times.
+
+Source: the wrench n - mu * sign(slip) * t, and A, of quasi-static pushing. Differs: friction holds the contact point
+where less than mu times the normal push is enough for that (Coulomb); a full push against the slip would drag the
+body back.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ._compile import stage
+from ._compile import kernel, stage
 from ._lanes import LANES, fill, keep_where_low
+from ._math import TWO_PI, sin_cos_of_turns
+from ._sim_drive import arc_step
+from ._sim_lanes import NEAR
+from ._sim_near import (
+    TOUCHES,
+    beyond_ends,
+    beyond_face,
+    copy_poses,
+    flag_near,
+    flag_near_disc,
+    gather,
+    list_near,
+    look_ahead,
+    scatter,
+    sizes_asked,
+)
+from ._sim_outline import PER_CORNER
 from ._sim_rays import see_plane
+from ._sim_shape import FREEZE, SLIDE, WHEELS
+from ._sim_touch import touch
 
 FAR = 1e9  # farther than any wall [m]
+CLEAR = 2e-6  # how far a body that was pushed is free [m]: above what rounding does in single precision
+LEAST_GIVE = 0.05  # of what a body gives without friction: less would throw it far off
+MOST_TURN = 0.25  # by which one push turns a body [rad]
+STALL_SHARE = 0.5  # of what was asked, of which less is done where a robot stalls
+SLIGHT = 0.05  # of all that was asked, below which nothing stalls
+N_RESCUES = 4  # straight pushes at the end of a step before it is refused
 
 
 @stage
@@ -20,8 +54,21 @@ def _nearer(center, along, across, forward, left, radius, low):
 
 
 @stage
+def _nearer_of_two(center, along, across, forward, left, other_forward, other_left, radius, low):
+    for lane in range(LANES):
+        a = along[lane]
+        b = across[lane]
+        c = center[lane]
+        one = c + a * forward[lane] + b * left[lane] - radius[lane]
+        two = c + a * other_forward[lane] + b * other_left[lane] - radius[lane]
+        nearest = low[lane]
+        gap = one if one < two else two
+        low[lane] = gap if gap < nearest else nearest
+
+
+@stage
 def clearance(shape, lanes, pose):
-    """How far each body at `pose` is from the nearest wall [m], below zero inside one; into `lanes.low`."""
+    """How far each body at `pose` is from the nearest wall of a room [m], below zero inside one; to `lanes.low`."""
     real = lanes.low.dtype.type
     p, spare = lanes.p, lanes.spare
     fill(lanes.low, real(FAR))
@@ -30,10 +77,311 @@ def clearance(shape, lanes, pose):
             plane = shape.row_plane + 3 * w
             see_plane(p[plane], p[plane + 1], p[plane + 2], pose, spare[0], spare[1], spare[2])
             for part in range(shape.part_corners.size):
-                first = shape.row_part[part]
-                radius = first + 2 * shape.part_corners[part]
-                for corner in range(first, radius, 2):
-                    _nearer(spare[0], spare[1], spare[2], p[corner], p[corner + 1], p[radius], lanes.low)
+                n, first = shape.part_corners[part], shape.row_part[part]
+                radius = first + 2 * n
+                for k in range(n >> 1):
+                    row = first + 4 * k
+                    _nearer_of_two(
+                        spare[0], spare[1], spare[2], p[row], p[row + 1], p[row + 2], p[row + 3], p[radius], lanes.low
+                    )  # fmt: skip
+                if n & 1:
+                    _nearer(spare[0], spare[1], spare[2], p[radius - 2], p[radius - 1], p[radius], lanes.low)
+
+
+@stage
+def _flag_touching(low, flag):
+    real = flag.dtype.type
+    for lane in range(LANES):
+        flag[lane] = real(TOUCHES) if low[lane] <= real(0.0) else real(0.0)
+
+
+@stage
+def _flag_near_shapes(shape, lanes, flag):
+    """Flag robots that some obstacle or open wall is near enough to be met by in the step."""
+    real = lanes.low.dtype.type
+    p, spare = lanes.p, lanes.spare
+    x, y, far, most = spare[1], spare[2], spare[3], spare[4]
+    look_ahead(lanes.moved, p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far)
+    for q in range(shape.row_shape.size):
+        n, first = shape.shape_corners[q], shape.row_shape[q]
+        radius = first + PER_CORNER * n
+        if n == 1:
+            flag_near_disc(p[first], p[first + 1], p[radius], x, y, far, flag)
+        else:
+            fill(most, real(-FAR))
+            for corner in range(n):
+                row = first + PER_CORNER * corner
+                beyond_face(p[row], p[row + 1], p[row + 2], p[row + 3], x, y, most)
+            if n == 2:
+                beyond_ends(p[first], p[first + 1], p[first + 2], p[first + 3], p[first + 4], x, y, most)
+            flag_near(most, p[radius], far, flag)
+
+
+@stage
+def _go_part(shape, length, turn, part, pose):
+    """Part of a motion, from where the axles are."""
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    real = x.dtype.type
+    for k in range(NEAR):
+        dx, dy, turned, s, c = arc_step(
+            length[k] * real(part), turn[k] * real(part), heading[k], sine[k], cosine[k]
+        )
+        x[k] = x[k] + dx
+        y[k] = y[k] + dy
+        heading[k] = turned
+        sine[k] = s
+        cosine[k] = c
+
+
+@stage
+def _note_touch(gap, low):
+    for k in range(NEAR):
+        least = low[k]
+        now = gap[k]
+        low[k] = now if now < least else least
+
+
+@stage
+def _push(gap, facing, beside, point_x, point_y, friction, long, lat, ang, pose, before):
+    """Push bodies that touch something free at their deepest contacts, in the frames of their axles."""
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    old_x, old_y, old_heading = before.x, before.y, before.heading
+    real = gap.dtype.type
+    for k in range(NEAR):
+        a = facing[k]
+        b = beside[k]
+        c_x = point_x[k]
+        c_y = point_y[k]
+        s = sine[k]
+        c = cosine[k]
+        mu = friction[k]
+        # Wrenches of the normal (a, b) and of the tangent (-b, a): what each turns, and what the body gives.
+        turn_n = c_x * b - c_y * a
+        turn_t = c_x * a + c_y * b
+        nn = long[k] * a * a + lat[k] * b * b + ang[k] * turn_n * turn_n
+        tt = long[k] * b * b + lat[k] * a * a + ang[k] * turn_t * turn_t
+        nt = (lat[k] - long[k]) * a * b + ang[k] * turn_n * turn_t
+        # How far the point of contact slipped since the beginning.
+        d_x = x[k] - old_x[k]
+        d_y = y[k] - old_y[k]
+        turned = heading[k] - old_heading[k]
+        turned = (turned - np.floor(turned + real(0.5))) * real(TWO_PI)
+        slip = (d_y * c - d_x * s) * a - (d_x * c + d_y * s) * b + turned * turn_t
+        deep = real(CLEAR) - gap[k]
+        # Friction holds it: no slip is left. Both are divided by `whole` later.
+        whole = nn * tt - nt * nt
+        hold_n = deep * tt + slip * nt
+        hold_t = -slip * nn - deep * nt
+        holds = (abs(hold_t) <= mu * hold_n) & (whole > real(0.0))
+        # It does not: it rubs with all it has, against the slip that there would be without it.
+        side = real(-1.0) if hold_t < real(0.0) else real(1.0)
+        gives = nn + side * mu * nt
+        least = real(LEAST_GIVE) * nn
+        gives = gives if gives > least else least
+        scale = real(1.0) / (whole if holds else gives)
+        push = (hold_n if holds else deep) * scale
+        rub = (hold_t if holds else side * mu * deep) * scale
+        f_x = push * a - rub * b
+        f_y = push * b + rub * a
+        spin = ang[k] * (push * turn_n + rub * turn_t)
+        size = abs(spin)
+        limit = real(MOST_TURN) / (size if size > real(MOST_TURN) else real(MOST_TURN))
+        touching = gap[k] <= real(0.0)
+        limit = limit if touching else real(0.0)
+        f_x = f_x * long[k] * limit
+        f_y = f_y * lat[k] * limit
+        x[k] = x[k] + (f_x * c - f_y * s)
+        y[k] = y[k] + (f_x * s + f_y * c)
+        angle = heading[k] + spin * limit * real(1.0 / TWO_PI)
+        angle = angle - np.floor(angle + real(0.5))
+        new_s, new_c = sin_cos_of_turns(angle)
+        heading[k] = angle
+        sine[k] = new_s
+        cosine[k] = new_c
+
+
+@stage
+def _push_straight(gap, facing, beside, pose):
+    """Move bodies that touch something straight away from it."""
+    x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
+    real = gap.dtype.type
+    for k in range(NEAR):
+        now = gap[k]
+        deep = real(CLEAR) - now if now <= real(0.0) else real(0.0)
+        x[k] = x[k] + deep * (facing[k] * cosine[k] - beside[k] * sine[k])
+        y[k] = y[k] + deep * (facing[k] * sine[k] + beside[k] * cosine[k])
+
+
+@stage
+def _put_back_places(gap, before, pose):
+    keep = gap
+    real = gap.dtype.type
+    x, y, old_x, old_y = pose.x, pose.y, before.x, before.y
+    for k in range(NEAR):
+        now_x = x[k]
+        now_y = y[k]
+        was_x = old_x[k]
+        was_y = old_y[k]
+        back = keep[k] <= real(0.0)
+        x[k] = was_x if back else now_x
+        y[k] = was_y if back else now_y
+
+
+@stage
+def _put_back_turns(gap, before, pose):
+    real = gap.dtype.type
+    heading, sine, cosine = pose.heading, pose.sine, pose.cosine
+    old_heading, old_sine, old_cosine = before.heading, before.sine, before.cosine
+    for k in range(NEAR):
+        now = heading[k]
+        now_s = sine[k]
+        now_c = cosine[k]
+        was = old_heading[k]
+        was_s = old_sine[k]
+        was_c = old_cosine[k]
+        back = gap[k] <= real(0.0)
+        heading[k] = was if back else now
+        sine[k] = was_s if back else now_s
+        cosine[k] = was_c if back else now_c
+
+
+@stage
+def _note_done(length, turn, before, pose, went, turned):
+    """Add what a part of a step did of what it was asked: along the heading halfway, and around."""
+    real = went.dtype.type
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    old_x, old_y, old_heading = before.x, before.y, before.heading
+    old_sine, old_cosine = before.sine, before.cosine
+    for k in range(NEAR):
+        c = real(0.5) * (cosine[k] + old_cosine[k])
+        s = real(0.5) * (sine[k] + old_sine[k])
+        forward = (x[k] - old_x[k]) * c + (y[k] - old_y[k]) * s
+        angle = heading[k] - old_heading[k]
+        angle = angle - np.floor(angle + real(0.5))
+        went[k] = went[k] + (forward if length[k] >= real(0.0) else -forward)
+        turned[k] = turned[k] + (angle if turn[k] >= real(0.0) else -angle)
+
+
+@stage
+def _judge(reach, length, turn, went, turned, low, stall):
+    """0 where a robot stalls: less was done than a share of what was asked, and it touched something."""
+    real = low.dtype.type
+    for k in range(NEAR):
+        asked = length[k]
+        around = turn[k]
+        slight = real(SLIGHT) * (asked + around)
+        lost = asked - went[k]
+        lost = lost if lost < asked else asked
+        held = around - turned[k] * (real(TWO_PI) * reach[k])
+        held = held if held < around else around
+        blocked = (lost > real(STALL_SHARE) * asked + slight) | (held > real(STALL_SHARE) * around + slight)
+        stall[k] = real(0.0) if (low[k] <= real(0.0)) & blocked else real(1.0)
+
+
+@stage
+def _clear(row, value):
+    real = row.dtype.type
+    for k in range(NEAR):
+        row[k] = real(value)
+
+
+@kernel
+def _contact_part(shape, near):
+    """Contact after one part of a step was gone."""
+    p, row = near.p, shape.row_contact
+    n = touch(shape, near)
+    _note_touch(near.gap, near.low)
+    if n == 0 or shape.contact == FREEZE:
+        return
+    if shape.contact == SLIDE:
+        for sweep in range(shape.sweeps):
+            if sweep > 0 and touch(shape, near) == 0:
+                break
+            _push(
+                near.gap, near.facing, near.beside, near.point_x, near.point_y,
+                p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, near.before,
+            )  # fmt: skip
+        return
+    _put_back_places(near.gap, near.before, near.pose)
+    touch(shape, near)
+    _put_back_places(near.gap, near.before, near.pose)
+    _put_back_turns(near.gap, near.before, near.pose)
+
+
+@kernel
+def _leave_free(shape, near):
+    """Push what still touches something straight out, and where that fails go back to the beginning of the step."""
+    for _ in range(N_RESCUES):
+        if touch(shape, near) == 0:
+            return
+        _push_straight(near.gap, near.facing, near.beside, near.pose)
+    touch(shape, near)
+    _put_back_places(near.gap, near.start, near.pose)
+    _put_back_turns(near.gap, near.start, near.pose)
+
+
+@kernel
+def _resolve(shape, near):
+    """Carry out a step of robots that may touch something."""
+    length, turn = near.spare[20], near.spare[21]
+    went, turned = near.done[0], near.done[1]
+    reach = near.p[shape.row_reach]
+    _clear(length, 0.0)
+    _clear(turn, 0.0)
+    _clear(went, 0.0)
+    _clear(turned, 0.0)
+    copy_poses(near.pose, near.start)
+    for phase in range(2):
+        parts = shape.substeps
+        if phase == 0 and shape.mixing == WHEELS:
+            if not shape.late:
+                continue
+            parts = shape.late_substeps
+        sizes_asked(near.moved, reach, phase, length, turn)
+        for _ in range(parts):
+            copy_poses(near.pose, near.before)
+            _go_part(shape, near.moved[2 * phase], near.moved[2 * phase + 1], 1.0 / parts, near.pose)
+            _contact_part(shape, near)
+            if shape.contact != FREEZE:
+                _note_done(
+                    near.moved[2 * phase], near.moved[2 * phase + 1], near.before, near.pose, went, turned
+                )
+    if shape.contact == FREEZE:
+        _put_back_places(near.low, near.start, near.pose)
+        _put_back_turns(near.low, near.start, near.pose)
+        _stall_of_touch(near.low, near.gap)
+        return
+    _leave_free(shape, near)
+    _judge(reach, length, turn, went, turned, near.low, near.gap)
+
+
+@stage
+def _stall_of_touch(low, stall):
+    real = low.dtype.type
+    for k in range(NEAR):
+        stall[k] = real(0.0) if low[k] <= real(0.0) else real(1.0)
+
+
+@kernel
+def _meet(shape, lanes, near):
+    """Carry out the step of the lanes flagged in the first row of `spare`, NEAR of them at a time."""
+    flag = lanes.spare[0]
+    n_flagged = 0
+    for lane in range(LANES):
+        n_flagged += 1 if flag[lane] > 0 else 0
+    if n_flagged > NEAR:
+        for first in range(0, LANES, NEAR):
+            for k in range(NEAR):
+                near.lane[k] = first + k
+            gather(shape, lanes, near, True)
+            _resolve(shape, near)
+            scatter(shape, lanes, near, NEAR)
+        return
+    n, _ = list_near(flag, 0, near.lane)
+    if n > 0:
+        gather(shape, lanes, near, False)
+        _resolve(shape, near)
+        scatter(shape, lanes, near, n)
 
 
 @stage
@@ -47,13 +395,34 @@ def _note_stalls(low, stalled, n_stalls):
 
 
 @stage
-def settle(shape, lanes):
+def _accept(pose, proposed):
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
+    to_sine, to_cosine = proposed.sine, proposed.cosine
+    for lane in range(LANES):
+        x[lane] = to_x[lane]
+        y[lane] = to_y[lane]
+        heading[lane] = to_heading[lane]
+        sine[lane] = to_sine[lane]
+        cosine[lane] = to_cosine[lane]
+
+
+@stage
+def settle(shape, lanes, near):
     """Go where the step would end as far as contact allows."""
     clearance(shape, lanes, lanes.proposed)
     pose, proposed, low = lanes.pose, lanes.proposed, lanes.low
+    if shape.contact == FREEZE and shape.row_shape.size == 0:
+        _note_stalls(low, lanes.stalled, lanes.n_stalls)
+        keep_where_low(low, pose.x, proposed.x)
+        keep_where_low(low, pose.y, proposed.y)
+        keep_where_low(low, pose.heading, proposed.heading)
+        keep_where_low(low, pose.sine, proposed.sine)
+        keep_where_low(low, pose.cosine, proposed.cosine)
+        return
+    _flag_touching(low, lanes.spare[0])
+    if shape.row_shape.size > 0:
+        _flag_near_shapes(shape, lanes, lanes.spare[0])
+    _meet(shape, lanes, near)
     _note_stalls(low, lanes.stalled, lanes.n_stalls)
-    keep_where_low(low, pose.x, proposed.x)
-    keep_where_low(low, pose.y, proposed.y)
-    keep_where_low(low, pose.heading, proposed.heading)
-    keep_where_low(low, pose.sine, proposed.sine)
-    keep_where_low(low, pose.cosine, proposed.cosine)
+    _accept(pose, proposed)

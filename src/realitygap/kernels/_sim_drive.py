@@ -269,11 +269,12 @@ def plan(shape, rules, key, lanes, step):
         else:
             _add_to(spare[12], moved[2])
             _add_to(spare[13], moved[3])
-    if shape.mixing == INDEPENDENT and shape.late:
-        _add_to(moved[0], moved[2])
+    if shape.mixing == INDEPENDENT:
+        # First straight on, then around.
+        _add_to(moved[2], moved[0])
         _add_to(moved[1], moved[3])
-        _set(moved[0], 0.0)
         _set(moved[1], 0.0)
+        _set(moved[2], 0.0)
 
 
 @inlined
@@ -328,18 +329,18 @@ def _arc_on(length, turn, axle, pose):
 
 
 @stage
-def _straight_then_turn(length, turn, pose, proposed):
+def _straight_then_turn(length, turn, axle, pose, proposed):
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
     to_sine, to_cosine = proposed.sine, proposed.cosine
     real = x.dtype.type
     for lane in range(LANES):
-        to_x[lane] = x[lane] + length[lane] * cosine[lane]
-        to_y[lane] = y[lane] + length[lane] * sine[lane]
         turned = heading[lane] + turn[lane]
         turned = turned - np.floor(turned + real(0.5))
         to_heading[lane] = turned
         sine_now, cosine_now = sin_cos_of_turns(turned)
+        to_x[lane] = x[lane] + length[lane] * cosine[lane] + axle[lane] * (cosine[lane] - cosine_now)
+        to_y[lane] = y[lane] + length[lane] * sine[lane] + axle[lane] * (sine[lane] - sine_now)
         to_sine[lane] = sine_now
         to_cosine[lane] = cosine_now
 
@@ -357,7 +358,7 @@ def drive(shape, rules, key, lanes, step):
     plan(shape, rules, key, lanes, step)
     moved, axle = lanes.moved, lanes.p[shape.row_drive + AXLE]
     if shape.mixing == INDEPENDENT:
-        _straight_then_turn(moved[2], moved[3], lanes.pose, lanes.proposed)
+        _straight_then_turn(moved[0], moved[3], axle, lanes.pose, lanes.proposed)
     elif shape.late:
         _arc(moved[0], moved[1], axle, lanes.pose, lanes.proposed)
         _arc_on(moved[2], moved[3], axle, lanes.proposed)

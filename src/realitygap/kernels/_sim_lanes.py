@@ -49,6 +49,7 @@ class SimLanes(NamedTuple):
     )
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
+    clips: Rows  # (4 * rays,) room
     readings: Rows  # (n_readings,) 0..1, 1 is near
     senses: Senses
     counters: Words  # (3,) the fixed words of each trial's random numbers
@@ -90,6 +91,8 @@ class Near(NamedTuple):
     point_y: Row
     low: Row  # the least gap met so far
     done: Rows  # (2,) carried out: length and turn
+    seen: Rows  # (5 * most corners of an obstacle,) its corners and normals from the body
+    best: Rows  # (9,) of `_sim_touch`
     spare: Rows  # (N_SPARE,)
 
 
@@ -147,6 +150,8 @@ def make_near(shape, dtype):
         point_y=row(),
         low=row(),
         done=rows(2),
+        seen=rows(5 * int(shape.shape_corners.max(initial=1))),
+        best=rows(9),
         spare=rows(N_SPARE),
     )
 
@@ -180,6 +185,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         moved=rows(4),
         distances=rows(n_rays),
         rates=rows(n_rays),
+        clips=rows(4 * n_rays),
         readings=rows(shape.n_readings),
         senses=make_senses(shape, dtype),
         counters=bits(3),

@@ -80,7 +80,7 @@ class Row(Settings):
     @model_validator(mode="before")
     @classmethod
     def _is_a_whole_row(cls, values: Any) -> Any:
-        if isinstance(values, list | tuple):  # one of the right length is a table by now
+        if not isinstance(values, Mapping | Settings):  # a list of the right length is a table by now
             raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
         return values
 

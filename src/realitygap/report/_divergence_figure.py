@@ -224,8 +224,8 @@ def draw_divergence(one: Side, other: Side, *, of: str = "", width: float = WIDE
     )
     shown = f" of the first {_MOST_TRAILS} repeats" if n > _MOST_TRAILS else ""
     caption = (
-        f"One network{f' ({of})' if of else ''}, tried {n} times on {one.name} and {n} times on {other.name}, each on noise of its own; "
-        f"{labels}, {steps}. Above: all paths{shown}; the first "
+        f"One network{f' ({of})' if of else ''}, tried {n} times on {one.name} and {n} times on {other.name}, each on "
+        f"noise of its own; {labels}, {steps}. Above: all paths{shown}; the first "
         "with its robot, what it sees and the cells that it visits. Below: how far repeat k on the one is from repeat "
         f"k + 1 on the other after each step, mean and 10th to 90th percentile of n = {n}; thin lines: what noise "
         f"alone does, the mean between repeat k and k + 1 on one platform. After {last} steps {distance:.2f} m apart, "

@@ -1,8 +1,8 @@
 """One network, two simulators: the gap before there is a robot.
 
 The best network of a typical run in the paper's simulator, tried thirty times there and thirty times in `sim`, which
-has the Scribbler's real outline, wheels, sensors and the half second that a command takes over Bluetooth. Below, how far
-the two come apart; thin lines show how far repeats on one platform do, which is what noise alone does.
+has the Scribbler's real outline, wheels, sensors and the half second that a command takes over Bluetooth. Below, how
+far the two come apart; thin lines show how far repeats on one platform do, which is what noise alone does.
 """
 
 import sys

@@ -15,7 +15,7 @@ from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import Condition
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
 from ._named_files import find_files

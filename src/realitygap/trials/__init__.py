@@ -11,6 +11,8 @@ from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sim import SimTrials
 from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
+from ._sim_world import SimWorld
+from ._sim_world_robot import SimWorldRobot
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -28,6 +30,8 @@ __all__ = [
     "SimRobot",
     "SimScene",
     "SimTrials",
+    "SimWorld",
+    "SimWorldRobot",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",

@@ -39,10 +39,19 @@ from realitygap.study import (
     TrialsSection,
     load_study,
 )
-from realitygap.tasks import CLASSICAL_TASKS, MAZE_TASKS, CoverageTask
+from realitygap.tasks import (
+    CLASSICAL_TASKS,
+    MAZE_TASKS,
+    AvoidTask,
+    CoverageTask,
+    GoalTask,
+    LightTask,
+    WallTask,
+)
 from realitygap.world import ArenaSettings, Distribution, RobotModel
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
+TASK_STUDIES_DATA = Path(__file__).parent / "data" / "tasks.csv"
 MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
 FEATURES_DATA = Path(__file__).parent / "data" / "jyro-features.toml"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
@@ -51,6 +60,10 @@ TABLES: dict[str, type[BaseModel]] = {
     "[study]": StudySection,
     "[arena]": ArenaSettings,
     "[task]": CoverageTask,
+    '[task] with kind = "avoid"': AvoidTask,
+    '[task] with kind = "light"': LightTask,
+    '[task] with kind = "wall"': WallTask,
+    '[task] with kind = "goal"': GoalTask,
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
@@ -80,6 +93,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
     pages["parts/mazes.md"] = mazes()
+    pages["parts/tasks.md"] = task_studies()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
     pages |= description_parts()
@@ -214,6 +228,8 @@ def values_of(annotation: Any, metadata: list[Any]) -> str:
         return ", ".join(toml(value) for value in typing.get_args(annotation))
     if origin is dict:
         return f"a table of {values_of(typing.get_args(annotation)[1], []).replace('a number', 'numbers')}"
+    if origin is tuple:
+        return "a list of texts"
     if origin is list:
         (inner,) = typing.get_args(annotation)
         length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)
@@ -642,6 +658,26 @@ def mazes() -> str:
         + "."
     )
     return "\n".join([*lines, "", text]) + "\n"
+
+
+# --- tasks beside coverage ----------------------------------------------------------------------------------
+
+
+def task_studies() -> str:
+    """What the named studies of tasks came to, by `make_tasks.py`."""
+    with TASK_STUDIES_DATA.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    lines = ["| study | condition | runs | first | last | run [95 %] |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        first, last, median, low, high = (
+            figure(row[key], 2) for key in ("first", "last", "median", "low", "high")
+        )
+        name = row["study"] if row["condition"] == row["study"] else ""
+        lines.append(
+            f"| {f'`{name}`' if name else ''} | {row['condition']} | {row['n']} | {first} | {last} "
+            f"| {median} [{low}, {high}] |"
+        )
+    return "\n".join(lines) + "\n"
 
 
 # --- classical tasks ----------------------------------------------------------------------------------------

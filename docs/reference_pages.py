@@ -223,6 +223,8 @@ def values_of(annotation: Any, metadata: list[Any]) -> str:
         return ", or ".join(each)
     if origin is Literal:
         return ", ".join(toml(value) for value in typing.get_args(annotation))
+    if origin is tuple:
+        return "a list of names"
     if origin is list:
         (inner,) = typing.get_args(annotation)
         length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)

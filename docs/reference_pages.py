@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 import typer
+from description_pages import description_parts
 from numpy.typing import NDArray
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -47,7 +48,7 @@ from realitygap.tasks import (
     LightTask,
     WallTask,
 )
-from realitygap.world import ArenaSettings
+from realitygap.world import ArenaSettings, Distribution, RobotModel
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
 TASK_STUDIES_DATA = Path(__file__).parent / "data" / "tasks.csv"
@@ -95,6 +96,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/tasks.md"] = task_studies()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
+    pages |= description_parts()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -205,7 +207,8 @@ def setting(key: str, info: FieldInfo, model: type[BaseModel]) -> str:
     """One setting as an entry of a definition list."""
     facts = [values_of(info.annotation, info.metadata)]
     default = NAMED_SETTINGS[DEFAULT_NEAT].get(key, info.default) if model is NeatSettings else info.default
-    facts.append("no default" if info.is_required() else f"default {toml(default)}")
+    if info.default_factory is None:
+        facts.append("no default" if info.is_required() else f"default {toml(default)}")
     return f"`{key}`\n: {'; '.join(facts)}.\n\n  {escape(info.description or '')}"
 
 
@@ -223,14 +226,17 @@ def values_of(annotation: Any, metadata: list[Any]) -> str:
         return ", or ".join(each)
     if origin is Literal:
         return ", ".join(toml(value) for value in typing.get_args(annotation))
+    if origin is dict:
+        return f"a table of {values_of(typing.get_args(annotation)[1], []).replace('a number', 'numbers')}"
     if origin is tuple:
-        return "a list of names"
+        return "a list of texts"
     if origin is list:
         (inner,) = typing.get_args(annotation)
         length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)
         return f"a list of {length or 'any number of'} numbers{values_of(inner, []).removeprefix('a number')}"
     limits = limits_of(metadata)
     names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+    names |= {RobotModel: "a robot by name or file", Distribution: "how one is drawn"}
     return names[annotation] + (f", {limits}" if limits else "")
 
 

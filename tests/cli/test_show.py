@@ -200,7 +200,7 @@ def test_mistakes_in_python_are_told_too(results, tmp_path):
         (["DIR", "--speed", "2", "-o", "a.svg"], "--speed. Leave that out."),
         (["network", "DIR", "DIR", "-o", "a.svg"], "Only a movie shows several"),
         (["arena", "papr", "-o", "a.svg"], "Did you mean 'paper'?"),
-        (["robot", "r2d2", "-o", "a.svg"], "Known: jyro."),
+        (["robot", "r2d2", "-o", "a.svg"], "Known: e-puck, jyro, khepera"),
         (["arena", "--condition", "x", "-o", "a.svg"], "Of no meaning for arena: --condition"),
         (["nowhere", "-o", "a.svg"], "nowhere does not exist"),
         (["DIR", "--replicate", "9" * 20, "-o", "a.svg"], f"has no run {'9' * 20} in"),

@@ -136,8 +136,7 @@ class Screen:
                 self._add(self._field, artist)
         self._draw_names(_HEAD + up + 0.06)
         self._draw_foot(height - _FOOT + 0.02)
-        canvas.draw()
-        self._ground = canvas.copy_from_bbox(self._figure.bbox)
+        self._visits: list[float] = []
 
     def picture(self, time: float) -> Image:
         """The moment at a time since the start [s]."""
@@ -166,8 +165,8 @@ class Screen:
             x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
             tiles.append([(x + dx, y + dy) for dx in (gap, grid.cell - gap) for dy in (gap, grid.cell - gap)])
         corners = np.array(tiles)[:, [0, 1, 3, 2]]
-        self._tiles = PolyCollection(list(corners), linewidths=0)
-        self._add(self._field, self._tiles)
+        self._tiles = PolyCollection(list(corners), linewidths=0, zorder=0.1)
+        self._field.add_artist(self._tiles)
         for shape in things_in(arena):
             _draw_shape(self._field, shape)
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in arena.walls]
@@ -265,13 +264,22 @@ class Screen:
         return artist
 
     def _move_cells(self, moments: Sequence[Moment]) -> None:
+        """Cells fill in seldom, so they are part of what stands still, which is drawn anew whenever one does."""
         visits = np.zeros(self.trials[0].arena.grid.n_cells)
         for trial, moment in zip(self.trials, moments, strict=True):
             visits[list(trial.cells[: moment.n_cells])] += 1.0
+        if visits.tolist() == self._visits:
+            return
+        self._visits = visits.tolist()
         most = max(len(self.trials) - 1, 1)
         self._tiles.set_facecolor(
-            [_mixed(TILE_VISITED, TILE_OFTEN, (n - 1) / most) if n else _mixed(TILE, TILE, 0) for n in visits]
+            [
+                _mixed(TILE_VISITED, TILE_OFTEN, (n - 1) / most) if n else _mixed(TILE, TILE, 0)
+                for n in self._visits
+            ]
         )
+        self._canvas.draw()
+        self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _move_letters(self, moments: Sequence[Moment]) -> None:
         """Letters stand on the robots, and around the spot where several robots stand on one."""
@@ -296,8 +304,8 @@ class Screen:
         parts = [f"step {counted}" if is_roomy else counted, f"{min(time, self.duration_s):.1f} s"]
         if not self._several and is_roomy:
             parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}".replace("0.", ".", 1))
-            if moments[0].stalled:
-                parts.insert(0, "× blocked")
+        if not self._several and moments[0].stalled:
+            parts.insert(0, "× blocked" if is_roomy else "×")
         self._clock.set_text(" · ".join(parts))
         left, right = self._bar
         share = min(time / self.duration_s, 1.0) if self.duration_s else 1.0

@@ -1,0 +1,202 @@
+"""How fast trials of `sim` are with all their realism."""
+
+from __future__ import annotations
+
+import platform as python_platform
+import time
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap._version import __version__
+from realitygap.evolution import NeatSettings
+from realitygap.kernels._network import Networks, make_networks
+from realitygap.kernels._sim import run_sim_trials
+from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
+from realitygap.kernels._sim_shape import make_sim_shape, sim_table
+from realitygap.world import load_robot, paper_arena
+
+from ._bench import MOST_SECONDS
+from ._run import machine_facts
+
+N_TRIALS = 1_280
+N_STEPS = 100
+SPREAD = 0.03  # by which every number differs from trial to trial, up or down, as a part of it
+
+# Three infrared range sensors with the mixture of a Fluke's faults, ahead and to both sides.
+SENSORS = ((0.089, 0.03, 0.6), (0.089, 0.0, 0.0), (0.089, -0.03, -0.6))
+RANGE = {
+    "reach": 0.5,
+    "amplitude": 1.0,
+    "decay": 0.173,
+    "noise_uniform": 0.02,
+    "noise_gain": 0.05,
+    "drop_most": 0.5,
+    "drop_at": 0.2286,
+    "drop_width": 0.0254,
+    "outlier_most": 0.05,
+    "outlier_at": 0.1,
+    "outlier_width": 0.02,
+}
+DRIVE = {
+    "delay": 0.1,
+    "delay_jitter": 0.03,
+    "slip": 0.02,
+    "travel_noise_per_m": 0.01,
+    "travel_noise_per_s": 0.003,
+    "heading_noise_per_m": 0.1,
+    "heading_noise_per_s": 0.02,
+    "drift_per_m": 0.1,
+    "battery_sag": 0.0005,
+}
+# Two boxes: where their middles are, and half their sides [m].
+BOXES = ((0.55, 0.2), (0.75, 0.42))
+HALF_SIDE = 0.05
+
+# Weights of the inputs (left, ahead, right, constant) for move and turn.
+AVOIDING = ((-0.2, -1.6, -0.2, 0.9), (-3.0, -1.2, 3.0, 0.1))
+PRESSED = ((0.0, 0.0, 0.0, 2.5), (0.2, 0.0, -0.1, 0.03))
+
+
+def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
+    """Robot-steps a second of one core, with everything that `sim` has for a Scribbler.
+
+    Outline of ten corners and their radius, contact `slide`, three infrared sensors with their mixture of noise,
+    a drive with lag, delay and noise; every number of robot and drive is different in each trial. Steps of
+    0.5 s in the paper's arena, in single precision. Time is that of the thread: what else the machine does counts
+    little.
+
+    Args:
+        seconds: How long each figure is measured, after everything is compiled.
+
+    Returns:
+        `avoiding`: of networks that turn away from walls; `pressed`: of such as push into them; `boxes`:
+        that avoid, among two boxes. `stalled`: the share of their steps in which they stall, and `visited`: how
+        many cells they visit. `machine` and `versions`.
+
+    Raises:
+        ValueError: `seconds` is not more than 0 and at most 3600.
+    """
+    if not 0 < seconds <= MOST_SECONDS:
+        raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
+    kinds = {"avoiding": (AVOIDING, False), "pressed": (PRESSED, False), "boxes": (AVOIDING, True)}
+    rates, stalled, visited = {}, {}, {}
+    for name, (weights, boxes) in kinds.items():
+        work = RealisticTrials(weights, boxes=boxes)
+        rates[name] = work.rate(seconds)
+        stalled[name] = float(work.counts[:, 2].mean() / N_STEPS)
+        visited[name] = float(work.counts[:, 0].mean())
+    versions = {
+        "realitygap": __version__,
+        "python": python_platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+    }
+    return {**rates, "stalled": stalled, "visited": visited, "machine": machine_facts(), "versions": versions}
+
+
+class RealisticTrials:
+    """Trials of one network with all the realism there is, ready to be run again and again.
+
+    Args:
+        weights: Of the network, for move and turn.
+        boxes: Whether two boxes stand in the arena.
+    """
+
+    def __init__(self, weights: tuple[tuple[float, ...], ...], *, boxes: bool) -> None:
+        arena = paper_arena()
+        numbers = _numbers(boxes=boxes)
+        parts = [sum(name.startswith("body.0.corner.") and name.endswith(".x") for name in numbers)]
+        self.shape = make_sim_shape(
+            parts=parts,
+            contact="slide",
+            range_response=["ir"] * len(SENSORS),
+            n_walls=4,
+            enclosed=True,
+            obstacles=[4] * (len(BOXES) if boxes else 0),
+            columns=arena.grid.columns,
+            rows=arena.grid.rows,
+            inputs=[("range", 0), ("range", 1), ("range", 2), ("bias", 0)],
+        )
+        start = arena.start
+        self.table = sim_table(self.shape, _spread(numbers), np.float32, (start.x, start.y))
+        grid = arena.grid
+        place = [(start.x - grid.x) / grid.cell, (start.y - grid.y) / grid.cell]
+        self.rules = SimRules(N_STEPS, 0.5, True, 1.0, np.array([*place, 1 / grid.cell, 1e-5], np.float32))
+        self.neat = NeatSettings.named("rosenzweig-remy").rules(4, 2, bias_input=3)
+        self.networks = _networks(self.neat, weights)
+        self.which = np.zeros(N_TRIALS, np.int32)
+        self.counters = np.zeros((N_TRIALS, 3), np.uint32)
+        self.counters[:, 0] = np.arange(N_TRIALS) << 8 | 1
+        self.cells = np.zeros((N_TRIALS, grid.n_cells), np.uint8)
+        self.counts = np.zeros((N_TRIALS, 3), np.int32)
+        self.room = make_sim_room(self.shape, self.neat, 0, np.float32)
+        self.trace = make_sim_trace(self.shape, 4, -1, 1, np.float32)
+
+    def run(self) -> None:
+        """Carry out all trials."""
+        run_sim_trials(
+            self.shape,
+            self.table,
+            self.rules,
+            self.neat,
+            self.networks,
+            self.which,
+            np.uint64(1),
+            self.counters,
+            self.room,
+            self.cells,
+            self.counts,
+            self.trace,
+        )
+
+    def rate(self, seconds: float) -> float:
+        """Robot-steps a second of the fastest of the calls that fit into so many seconds."""
+        self.run()
+        until = time.perf_counter() + seconds
+        fastest = np.inf
+        while time.perf_counter() < until or not np.isfinite(fastest):
+            since = time.thread_time()
+            self.run()
+            fastest = min(fastest, time.thread_time() - since)
+        return float(N_TRIALS * N_STEPS / fastest)
+
+
+def _numbers(*, boxes: bool) -> dict[str, float]:
+    robot, arena = load_robot("scribbler-s2-fluke2").numbers(), paper_arena().numbers()
+    numbers: dict[str, float] = {}
+    for name, value in {**robot, **arena}.items():
+        if name.split(".")[0] in ("body", "contact", "drive", "arena"):
+            numbers[name] = value if isinstance(value, (int, float)) else value.center
+    numbers |= {f"drive.{name}": value for name, value in DRIVE.items()}
+    for k, (x, y, direction) in enumerate(SENSORS):
+        numbers |= {f"range.{k}.x": x, f"range.{k}.y": y, f"range.{k}.direction": direction}
+        numbers |= {f"range.{k}.{name}": value for name, value in RANGE.items()}
+    for k, (x, y) in enumerate(BOXES if boxes else ()):
+        numbers |= {f"arena.obstacle.{k}.x": x, f"arena.obstacle.{k}.y": y}
+        for j, (left, up) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
+            numbers[f"arena.obstacle.{k}.corner.{j}.x"] = left * HALF_SIDE
+            numbers[f"arena.obstacle.{k}.corner.{j}.y"] = up * HALF_SIDE
+    return numbers
+
+
+def _spread(numbers: dict[str, float]) -> dict[str, NDArray[np.float64]]:
+    """Every number but those of walls, differently for each trial."""
+    rng = np.random.default_rng(1)
+    spread = {}
+    for name, value in numbers.items():
+        part = 0.0 if name.startswith("arena.wall") else SPREAD
+        spread[name] = value * (1 + part * rng.uniform(-1, 1, N_TRIALS))
+    spread["arena.start.heading"] = rng.uniform(-np.pi, np.pi, N_TRIALS)
+    return spread
+
+
+def _networks(neat: Any, weights: tuple[tuple[float, ...], ...]) -> Networks:
+    """One network without hidden nodes."""
+    networks: Networks = make_networks(1, neat, 8, 0)
+    networks.first_edge[0] = [0, 4, 8]
+    networks.source[0] = [0, 1, 2, 3, 0, 1, 2, 3]
+    networks.weight[0] = np.ravel(weights)
+    return networks

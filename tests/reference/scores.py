@@ -11,13 +11,15 @@ from .maze import Point, Wall, distance_to_wall
 Pose = Sequence[float]
 
 
-def avoid(commands: Sequence[Sequence[float]], ranges: Sequence[Sequence[float]]) -> float:
+def avoid(commands: Sequence[Sequence[float]], ranges: Sequence[Sequence[float]], *, backward: bool) -> float:
     """The mean of V (1 - sqrt(dv)) (1 - i); ranges are those after each command."""
     values = []
     for (move, turn), seen in zip(commands, ranges, strict=True):
         left = min(max(move - turn, -1.0), 1.0)
         right = min(max(move + turn, -1.0), 1.0)
         speed, apart = (abs(left) + abs(right)) / 2, abs(left - right) / 2
+        if not backward:
+            speed = max((left + right) / 2, 0.0)
         values.append(speed * (1 - math.sqrt(apart)) * (1 - max(seen, default=0.0)))
     return sum(values) / len(values)
 

@@ -38,8 +38,9 @@ ARENA = Arena(
     lights=(Light(0.9, 0.3), Light(0.1, 0.7)),
     goal=Goal(0.8, 0.7, 0.1),
 )
-TASKS = [
+TASKS: list[Any] = [
     AvoidTask(),
+    AvoidTask(backward=False),
     LightTask(),
     GoalTask(),
     WallTask(side="left", within=0.2),
@@ -97,7 +98,9 @@ def wandering(
 def plain(task: Any, found: Trajectories, arena: Arena, k: int) -> float:
     poses = found.poses[k].tolist()
     if isinstance(task, AvoidTask):
-        return reference.avoid(found.commands[k].tolist(), found.readings[k][1:, [0, 2]].tolist())
+        return reference.avoid(
+            found.commands[k].tolist(), found.readings[k][1:, [0, 2]].tolist(), backward=task.backward
+        )
     if isinstance(task, LightTask):
         return reference.light(poses, found.stalled[k].tolist(), [(each.x, each.y) for each in arena.lights])
     if isinstance(task, GoalTask):
@@ -197,10 +200,12 @@ def test_scores_stay_within_their_bounds_and_the_way_back_takes_away_what_the_wa
     )
 
 
-def avoided(command: Sequence[float], reading: Sequence[float] = (0, 1, 0)) -> float:
+def avoided(
+    command: Sequence[float], reading: Sequence[float] = (0, 1, 0), task: AvoidTask = TASKS[0]
+) -> float:
     here = (ARENA.start.x, ARENA.start.y)
     found = trials([[here] * 4], commands=[[command] * 3], readings=[[[1, 1, 1], *[reading] * 3]])
-    return float(AvoidTask().fitness(found, ARENA)[0])
+    return float(task.fitness(found, ARENA)[0])
 
 
 def test_straight_on_in_the_open_is_worth_one_and_standing_spinning_or_touching_nothing() -> None:
@@ -211,6 +216,9 @@ def test_straight_on_in_the_open_is_worth_one_and_standing_spinning_or_touching_
     # The wheels are asked for 0.4 and 1.2, which is more than there is.
     assert avoided((0.8, 0.4)) == pytest.approx(0.7 * (1 - math.sqrt(0.3)))
     assert avoided((1, 0), (0.25, 1, 0.5)) == 0.5
+    forward = AvoidTask(backward=False)
+    assert (avoided((1, 0), task=forward), avoided((-1, 0), task=forward)) == (1, 0)
+    assert avoided((0.2, 0.6), task=forward) == pytest.approx(0.2 * (1 - math.sqrt(0.6)))
 
 
 def test_standing_seeks_no_light_and_being_blocked_costs() -> None:

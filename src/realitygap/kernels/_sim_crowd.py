@@ -8,10 +8,13 @@ from __future__ import annotations
 from ._compile import kernel
 from ._lanes import LANES
 from ._sim import _list, arrive, sense
-from ._sim_contact import clearance, settle
+from ._sim_contact import settle
 from ._sim_drive import drive, take_commands
-from ._sim_lanes import start_block
+from ._sim_lanes import NEAR, start_block
+from ._sim_near import gather
 from ._sim_outline import place_obstacle
+from ._sim_senses import feel_motion
+from ._sim_touch import touch
 
 
 @kernel
@@ -41,7 +44,8 @@ def move_sim(shape, rules, key, room, cells, step, commands):
     lanes = room.lanes
     take_commands(commands[0], commands[1], lanes)
     drive(shape, rules, key, lanes, step)
-    settle(shape, lanes)
+    settle(shape, lanes, room.near)
+    feel_motion(shape, rules, key, lanes, step)
     arrive(shape, rules, lanes)
     _list(shape, lanes, 1, cells, 0)
 
@@ -55,6 +59,9 @@ def look_sim(shape, rules, key, room, step):
 @kernel
 def gap_sim(shape, room):
     """How far the body is from the nearest wall or obstacle where it stands [m]; negative where it is in one."""
-    lanes = room.lanes
-    clearance(shape, lanes, lanes.pose)
-    return lanes.low[0]
+    near = room.near
+    for k in range(NEAR):
+        near.lane[k] = k
+    gather(shape, room.lanes, near, True)
+    touch(shape, near)
+    return near.gap[0]

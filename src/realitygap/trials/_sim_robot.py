@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import TracebackType
@@ -152,6 +153,45 @@ class SimRobot:
         """Way of the left and the right wheel since the start of the trial [m]."""
         left, right = self._room.lanes.wheels[:, 0].tolist()
         return left, right
+
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """(rays,) to what is nearest along the rays of the range sensors in turn, without noise [m]."""
+        distances: NDArray[np.float64] = self._room.lanes.distances[:, 0].astype(np.float64)
+        return distances
+
+    @property
+    def encoders(self) -> tuple[float, float]:
+        """Way of the left and the right wheel since the start as the robot's encoders tell it [m].
+
+        Raises:
+            RobotError: The robot has none.
+        """
+        self._check_encoders()
+        left, right = self._room.lanes.senses.counted[:, 0].tolist()
+        return left, right
+
+    @property
+    def odometry(self) -> Pose:
+        """Where a program reckons the robot to be, from its encoders and where it began.
+
+        Raises:
+            RobotError: The robot has no encoders.
+        """
+        self._check_encoders()
+        values = {**self._scene.fixed, **self.drawn}
+        x, y, heading = (values[f"arena.start.{name}"] for name in ("x", "y", "heading"))
+        ahead, left, turned = self._room.lanes.senses.reckoned[:, 0].tolist()
+        sine, cosine = math.sin(heading), math.cos(heading)
+        return Pose(
+            x + ahead * cosine - left * sine,
+            y + ahead * sine + left * cosine,
+            (heading + turned * math.tau) % math.tau,
+        )
+
+    def _check_encoders(self) -> None:
+        if self._scene.robot.encoder is None:
+            raise RobotError(f"Robot {self._scene.robot.name!r} has no encoders: nothing counts its wheels.")
 
     @property
     def pose(self) -> Pose:

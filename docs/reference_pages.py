@@ -228,6 +228,8 @@ def values_of(annotation: Any, metadata: list[Any]) -> str:
         return ", ".join(toml(value) for value in typing.get_args(annotation))
     if origin is dict:
         return f"a table of {values_of(typing.get_args(annotation)[1], []).replace('a number', 'numbers')}"
+    if origin is tuple:
+        return "a list of texts"
     if origin is list:
         (inner,) = typing.get_args(annotation)
         length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)

@@ -335,7 +335,9 @@ def test_what_the_page_of_distances_says_is_what_the_numbers_say():
         assert coverage[name][-1].startswith("not shown"), name
     for name in ("jaccard", "alignment", "final", "random"):
         assert coverage[name][-1] == f"paper above {name}"
-    assert _number(coverage["random"][1]) < min(_number(coverage[name][1]) for name in ("jaccard", "alignment"))
+    assert _number(coverage["random"][1]) < min(
+        _number(coverage[name][1]) for name in ("jaccard", "alignment")
+    )
     _, behaviors = _distance_rows("behaviors")
     novelty = {name: _number(row[6]) for name, row in behaviors.items() if row[6]}
     for name in ("jaccard", "alignment"):

@@ -14,6 +14,7 @@ from realitygap.world import Arena, Pose, RobotModel, arena_picture, paper_arena
 
 from ._batch import NoiseKey, counters_of
 from ._draws import Draws
+from ._sim_overlap import as_obstacles, overlaps
 from ._sim_world_robot import SimWorldRobot
 
 PENS = ("royalblue3", "darkorange3", "seagreen4", "orchid3", "goldenrod3", "firebrick3")
@@ -101,7 +102,7 @@ class SimWorld:
             raise RobotError(
                 "The world has begun: add all robots before the first step, or call reset first."
             )
-        platform = robot if isinstance(robot, SimPlatform) else SimPlatform(robot=robot, precision="double")
+        platform = robot if isinstance(robot, SimPlatform) else SimPlatform(robot=robot)
         k = len(self.robots)
         color = color or PENS[k % len(PENS)]
         hex_of(color)
@@ -173,14 +174,17 @@ class SimWorld:
     def _prepare(self) -> None:
         if self._is_ready:
             return
-        for robot in reversed(self.robots):  # the one added last is the one to name
-            parts = [part for other in self._others(robot) for part in other._parts()]
-            if any(part.distance(*robot.start[:2]) < 0 for part in (*self.arena.obstacles, *parts)):
-                raise _in_the_way(robot)
+        standing = as_obstacles(self.arena)
+        for robot in self.robots:
+            parts = robot._parts()
+            if any(overlaps(part, other) for part in parts for other in standing):
+                raise RobotError(
+                    f"{robot.name} stands in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
+                    f"{robot.start.y:.3f}). Start it elsewhere."
+                )
+            standing += parts
+        for robot in self.robots:
             robot._begin(self.arena, self._others(robot))
-        for robot in reversed(self.robots):
-            if robot._gap() < 0:
-                raise _in_the_way(robot)
         self._is_ready = True
 
     def picture(self) -> Picture:
@@ -200,13 +204,6 @@ class SimWorld:
 
     def _repr_svg_(self) -> str:
         return self.picture().to_svg()
-
-
-def _in_the_way(robot: SimWorldRobot) -> RobotError:
-    return RobotError(
-        f"{robot.name} stands in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
-        f"{robot.start.y:.3f}). Start it elsewhere."
-    )
 
 
 def _drawn_arena(arena: Arena, key: NoiseKey) -> Arena:

@@ -191,7 +191,8 @@ class SimWorld:
         """The arena from above with all robots, their trails and what their range sensors see."""
         self._prepare()
         ground = arena_picture(self.arena)
-        shapes: list[Shape] = [shape for robot in self.robots for shape in _robot_shapes(robot)]
+        layers = (_trail, _rays, _body)
+        shapes = [shape for layer in layers for robot in self.robots for shape in layer(robot)]
         return Picture(
             "World",
             f"Arena {self.arena.name} with {len(self.robots)} robots after {self.n_steps} steps, {self.time:.4g} s.",
@@ -215,28 +216,32 @@ def _drawn_arena(arena: Arena, key: NoiseKey) -> Arena:
     return arena.with_numbers(dict(zip(draws.names, drawn, strict=True)))
 
 
-def _robot_shapes(robot: SimWorldRobot) -> list[Shape]:
-    color = hex_of(robot.color)
-    x, y, heading = robot.pose
-    sine, cosine = math.sin(heading), math.cos(heading)
+def _trail(robot: SimWorldRobot) -> list[Shape]:
+    if len(robot.trail) < 2:
+        return []
+    return [Line(tuple((pose.x, pose.y) for pose in robot.trail), hex_of(robot.color), 1.2)]
 
-    def at(ahead: float, left: float) -> tuple[float, float]:
-        return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
 
+def _rays(robot: SimWorldRobot) -> list[Shape]:
+    """The rays of the range sensors, as far as they see."""
     shapes: list[Shape] = []
-    if len(robot.trail) > 1:
-        shapes.append(Line(tuple((pose.x, pose.y) for pose in robot.trail), color, 1.2))
-    rays = iter(robot.distances.tolist())
+    lengths = iter(robot.distances.tolist())
     for sensor in robot.model.range:
+        start = robot.point(sensor.x, sensor.y)
         for k in range(sensor.rays):
             share = 2 * k / (sensor.rays - 1) - 1 if sensor.rays > 1 else 0.0
-            angle, far = sensor.direction + share * sensor.cone, min(next(rays), sensor.reach)
-            end = at(sensor.x + far * math.cos(angle), sensor.y + far * math.sin(angle))
-            shapes.append(Line((at(sensor.x, sensor.y), end), color, 0.6, (2.0, 1.5)))
-    for part in robot.model.body:
-        outline = tuple(at(*point) for point in part.outline())
-        shapes.append(Line(outline, color, 1.4, closed=True, fill="#ffffff"))
-    size = robot.model.radius
-    nose = (at(0.0, 0.15 * size), at(0.5 * size, 0.0), at(0.0, -0.15 * size))
-    shapes.append(Line(nose, None, closed=True, fill=color))
+            angle, far = sensor.direction + share * sensor.cone, min(next(lengths), sensor.reach)
+            end = robot.point(sensor.x + far * math.cos(angle), sensor.y + far * math.sin(angle))
+            shapes.append(Line((start, end), hex_of(robot.color), 0.6, (2.0, 1.5)))
     return shapes
+
+
+def _body(robot: SimWorldRobot) -> list[Shape]:
+    """The outline, and an arrow ahead."""
+    color, size = hex_of(robot.color), robot.model.radius
+    shapes: list[Shape] = [
+        Line(tuple(robot.point(*point) for point in part.outline()), color, 1.4, closed=True, fill="#ffffff")
+        for part in robot.model.body
+    ]
+    nose = (robot.point(0.0, 0.15 * size), robot.point(0.5 * size, 0.0), robot.point(0.0, -0.15 * size))
+    return [*shapes, Line(nose, None, closed=True, fill=color)]

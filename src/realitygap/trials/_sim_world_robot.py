@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.drawing import Point
 from realitygap.errors import RobotError
 from realitygap.kernels import _sim_crowd as crowd
 from realitygap.kernels._lanes import LANES
@@ -87,6 +88,12 @@ class SimWorldRobot:
         """Where it is; the heading lies in -pi..pi."""
         self.world._prepare()
         return self._pose
+
+    def point(self, ahead: float, left: float) -> Point:
+        """Where a point of the robot is in the arena [m]."""
+        x, y, heading = self.pose
+        sine, cosine = math.sin(heading), math.cos(heading)
+        return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
 
     @property
     def stalled(self) -> bool:

@@ -64,7 +64,10 @@ def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.nda
     for k, (x, y) in enumerate(CORNERS):
         numbers |= {f"body.0.corner.{k}.x": x, f"body.0.corner.{k}.y": y}
     for k, ends in enumerate(walls):
-        numbers |= {f"arena.wall.{k}.{name}": float(end) for name, end in zip(("x1", "y1", "x2", "y2"), ends, strict=True)}
+        numbers |= {
+            f"arena.wall.{k}.{name}": float(end)
+            for name, end in zip(("x1", "y1", "x2", "y2"), ends, strict=True)
+        }
     numbers |= {
         "arena.start.x": 0.0,
         "arena.start.y": np.array([push.y for push in pushes]),
@@ -91,7 +94,9 @@ def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.nda
     return ends
 
 
-def _errors(pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float) -> tuple[np.ndarray, np.ndarray]:
+def _errors(
+    pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float
+) -> tuple[np.ndarray, np.ndarray]:
     parts = [_ends(pushes[k : k + LANES], friction, lat, ang) for k in range(0, len(pushes), LANES)]
     off = np.concatenate(parts) - truth
     return np.hypot(off[:, 0], off[:, 1]), np.abs(np.remainder(off[:, 2] + math.pi, math.tau) - math.pi)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from realitygap.evolution import NeatSettings
 from realitygap.kernels._lanes import LANES
 from realitygap.kernels._sim import start_sim, step_sim
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room
 from realitygap.kernels._sim_shape import make_sim_shape, sim_table
-from realitygap.evolution import NeatSettings
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'realitygap[twin]'")
 
-from tests.reference.pushed_body import Push, PushedBody  # noqa: E402
+from tests.reference.pushed_body import Push, PushedBody
 
 CORNERS = [(0.079, -0.05), (0.079, 0.05), (0.06, 0.0695), (-0.06, 0.0695),
            (-0.079, 0.05), (-0.079, -0.05), (-0.06, -0.0695), (0.06, -0.0695)]  # fmt: skip
@@ -64,7 +64,10 @@ def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.nda
     for k, (x, y) in enumerate(CORNERS):
         numbers |= {f"body.0.corner.{k}.x": x, f"body.0.corner.{k}.y": y}
     for k, ends in enumerate(walls):
-        numbers |= {f"arena.wall.{k}.{name}": float(end) for name, end in zip(("x1", "y1", "x2", "y2"), ends, strict=True)}
+        numbers |= {
+            f"arena.wall.{k}.{name}": float(end)
+            for name, end in zip(("x1", "y1", "x2", "y2"), ends, strict=True)
+        }
     numbers |= {
         "arena.start.x": 0.0,
         "arena.start.y": np.array([push.y for push in pushes]),
@@ -91,7 +94,9 @@ def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.nda
     return ends
 
 
-def _errors(pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float) -> tuple[np.ndarray, np.ndarray]:
+def _errors(
+    pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float
+) -> tuple[np.ndarray, np.ndarray]:
     parts = [_ends(pushes[k : k + LANES], friction, lat, ang) for k in range(0, len(pushes), LANES)]
     off = np.concatenate(parts) - truth
     return np.hypot(off[:, 0], off[:, 1]), np.abs(np.remainder(off[:, 2] + math.pi, math.tau) - math.pi)

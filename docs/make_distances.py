@@ -27,6 +27,7 @@ from realitygap.report import (
     DistanceAudit,
     Estimate,
     Interval,
+    MedianInterval,
     audit_distance,
     bca_interval,
     compare_choices,
@@ -121,26 +122,22 @@ def coverage(study: ResultsFolder) -> str:
     rows: list[list[object]] = []
     for choice in choices:
         each = compared.get(choice.condition)
-        interval = choice.interval
         row: list[object] = [
             choice.condition,
             choice.n,
-            f"{choice.median:.3f}",
-            "" if interval is None else f"{interval.low:.3f} to {interval.high:.3f}",
+            f"{choice.median:.3f} ({_span(choice.interval, '.3f')})",
         ]
         if each is not None:
-            share = each.a12_interval
             row += [
-                _signed(each.difference, ".3f"),
-                _span(each.difference_interval, "+.3f"),
-                f"{each.a12:.3f}",
-                "" if share is None else f"{share.low:.3f} to {share.high:.3f}",
+                f"{_signed(each.difference, '.3f')} ({_span(each.difference_interval, '+.3f')})",
+                f"{each.a12:.2f} ({_span(each.a12_interval, '.2f')})",
                 f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
-                each.verdict,
+                "" if each.detectable is None else f"{each.detectable:.3f}",
+                each.verdict.partition(";")[0],
             ]
-        rows.append([*row, *[""] * (10 - len(row))])
-    head = ["Condition", "n", "median", "95 % interval", "mean less paper’s", "95 % interval", "A12"]
-    return _csv([*head, "95 % interval", "p (Holm)", "What may be said"], rows)
+        rows.append([*row, *[""] * (8 - len(row))])
+    head = ["Condition", "n", "median", "mean less paper’s", "A12", "p (Holm)", "finds", "What may be said"]
+    return _csv(head, rows)
 
 
 def behaviors(study: ResultsFolder) -> str:
@@ -232,7 +229,7 @@ def _signed(value: float, form: str = "+.2f") -> str:
     return text.replace("-", "−")
 
 
-def _span(interval: Interval | Estimate | None, form: str = "+.2f") -> str:
+def _span(interval: Interval | MedianInterval | Estimate | None, form: str = "+.2f") -> str:
     if interval is None:
         return ""
     return " to ".join(f"{bound:{form}}".replace("-", "−") for bound in (interval.low, interval.high))

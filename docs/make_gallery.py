@@ -36,6 +36,7 @@ ORDER = (
     "leverage",
     "more_noise",
     "one_wall",
+    "light_seeking",
     "hundred_robots",
 )
 

@@ -2,8 +2,8 @@
 
     uv run python docs/make_images.py
 
-Carries out `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: paths of
-a typical run beside the best coverage of the nine conditions, and the divergence between `jyro` and `sim`.
+Carries out `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: paths
+of a typical run beside the best coverage of the nine conditions, and the divergence between `jyro` and `sim`.
 """
 
 from __future__ import annotations

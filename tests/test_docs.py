@@ -34,6 +34,7 @@ def _load(name):
 
 
 make_outputs = _load("make_outputs")
+description_pages = _load("description_pages")
 reference_pages = _load("reference_pages")
 PAGES = [path for path in make_outputs.documents() if path.name != "README.md"]
 
@@ -331,7 +332,7 @@ def test_what_the_page_of_distances_says_is_what_the_numbers_say():
         assert coverage[name][-1].startswith("not shown"), name
     for name in ("jaccard", "alignment", "final", "random"):
         assert coverage[name][-1] == f"paper above {name}"
-    assert float(coverage["random"][1]) < min(float(coverage[name][1]) for name in ("jaccard", "alignment"))
+    assert _number(coverage["random"][1]) < min(_number(coverage[name][1]) for name in ("jaccard", "alignment"))
     _, behaviors = _distance_rows("behaviors")
     novelty = {name: _number(row[6]) for name, row in behaviors.items() if row[6]}
     for name in ("jaccard", "alignment"):

@@ -26,4 +26,5 @@ trials = []
 for platform in platforms:
     trajectory = trace_genome(platform, arena, chosen, noise=0.0, noise_key=key)
     trials.append(in_motion(trajectory, arena, platform, title=platform.contact))
-realitygap.write_movie(trials, sys.argv[1] if len(sys.argv) > 1 else "wall.gif", speed=6, width=480)
+picture = sys.argv[1] if len(sys.argv) > 1 else "wall.gif"
+realitygap.write_movie(trials, picture, title="freeze, stop or slide", speed=6, width=480)

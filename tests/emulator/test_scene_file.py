@@ -97,8 +97,8 @@ def test_a_robot_sees_obstacles_and_stops_at_them(tmp_path):
     assert robot.table.robot.ranges(mounts, 2.0) == pytest.approx([0.5, 0.5, 1.6])
     robot.receive(bytes((109, 200, 200)) + bytes(6))
     robot.advance(3.5)
-    assert robot.table.stalled
     assert robot.pose.x + 0.089 == pytest.approx(0.9, abs=0.01), "at the disc"
+    assert robot.table.stalled
 
 
 def test_a_robot_drives_past_the_rounded_corner_of_a_box(tmp_path):

@@ -192,7 +192,7 @@ def test_a_platform_without_noise_is_the_same_in_every_repeat():
         ({"set": {"drive.track": -0.1}}, "drive.track: expected more than 0"),
         ({"set": {"drive.track": "wide"}}, "drive.track: expected a number, or how it is drawn"),
         ({"set": {"drive.track": {"normal": [0.1]}}}, "drive.track.normal"),
-        ({"set": {"drive.track": {"uniform": [-1.0, 1.0]}}}, "drive.track: expected numbers more than 0"),
+        ({"set": {"drive.track": {"uniform": [-1.0, 2.0]}}}, "drive.track: expected numbers more than 0"),
         ({"contact": "bounce"}, "expected 'robot', 'freeze', 'stop' or 'slide', came 'bounce'"),
     ],
 )

@@ -18,7 +18,8 @@ def bench(
         str | None,
         typer.Argument(
             metavar="[TASK]",
-            help="xor, double-pole, double-pole-no-velocity, maze-medium or maze-hard; without it, speed.",
+            help="xor, double-pole, double-pole-no-velocity, maze-medium or maze-hard; realism: speed of sim; "
+            "without it, speed.",
         ),
     ] = None,
     settings: Annotated[
@@ -47,6 +48,9 @@ def bench(
     Speed: robot-steps and whole paper runs a second, on one core and on all. A robot-step holds its noise and
     its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted.
 
+    Realism: robot-steps a second of one core on the platform sim with a real outline, sliding contact, infrared sensors
+    with their noise and a noisy drive, all numbers different in each trial.
+
     A task: runs of NEAT from many seeds, beside the results of Stanley & Miikkulainen (2002). An evaluation is
     one network tried once, counted up to and with the first that solves the task; figures are over the runs that
     solved it.
@@ -56,6 +60,8 @@ def bench(
 
     Example: realitygap bench --json
 
+    Example: realitygap bench realism
+
     Example: realitygap bench xor --settings stanley-2002 --seeds 100
 
     Example: realitygap bench double-pole --seeds 20 --change crossover=0
@@ -63,6 +69,8 @@ def bench(
     Example: realitygap bench maze-medium --seeds 10
 
     In Python: realitygap.study.measure_speed()
+
+    In Python: realitygap.study.measure_realism()
 
     In Python: realitygap.study.measure_task("xor", "stanley-2002", seeds=100)
 
@@ -74,6 +82,9 @@ def bench(
             if value is not None:
                 raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
         _bench_speed(2.0 if seconds is None else seconds, as_json=as_json)
+        return
+    if task == "realism":
+        _bench_realism(2.0 if seconds is None else seconds, as_json=as_json)
         return
     if seconds is not None:
         raise StudyError("--seconds goes with the measurement of speed, which has no task.")
@@ -186,6 +197,23 @@ def _shown(key: str, value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:,.2f}" if key in ("mean_hidden", "mean_connections") else f"{value:,.0f}"
+
+
+def _bench_realism(seconds: float, *, as_json: bool) -> None:
+    from realitygap.study import measure_realism
+
+    figures = measure_realism(seconds)
+    if as_json:
+        typer.echo(json.dumps(figures, indent=2))
+        return
+    names = {
+        "avoiding": "avoiding walls",
+        "pressed": "pressed into walls",
+        "boxes": "avoiding, two boxes",
+    }
+    typer.echo(f"{'robot-steps/s, one core':28} {'':>12} {'stalled':>8}")
+    for key, name in names.items():
+        typer.echo(f"{name:28} {figures[key]:>12,.0f} {figures['stalled'][key]:>8.1%}")
 
 
 def _bench_speed(seconds: float, *, as_json: bool) -> None:

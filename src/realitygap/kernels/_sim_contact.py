@@ -101,7 +101,9 @@ def _flag_near_shapes(shape, lanes, flag):
     real = lanes.low.dtype.type
     p, spare = lanes.p, lanes.spare
     x, y, far, most = spare[1], spare[2], spare[3], spare[4]
-    look_ahead(lanes.moved, p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far)
+    look_ahead(
+        lanes.moved[0], lanes.moved[2], p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far
+    )
     for q in range(shape.row_shape.size):
         n, first = shape.shape_corners[q], shape.row_shape[q]
         radius = first + PER_CORNER * n
@@ -337,7 +339,7 @@ def _resolve(shape, near):
             if not shape.late:
                 continue
             parts = shape.late_substeps
-        sizes_asked(near.moved, reach, phase, length, turn)
+        sizes_asked(near.moved[2 * phase], near.moved[2 * phase + 1], reach, length, turn)
         for _ in range(parts):
             copy_poses(near.pose, near.before)
             _go_part(shape, near.moved[2 * phase], near.moved[2 * phase + 1], 1.0 / parts, near.pose)

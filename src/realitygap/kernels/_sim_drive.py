@@ -52,14 +52,14 @@ def _quantize(levels, lowest, left, right):
     """The faster wheel gets the nearest speed that exists, the other one follows in proportion."""
     real = left.dtype.type
     for lane in range(LANES):
-        l = left[lane]
-        r = right[lane]
-        faster = abs(l) if abs(l) > abs(r) else abs(r)
+        one = left[lane]
+        two = right[lane]
+        faster = abs(one) if abs(one) > abs(two) else abs(two)
         level = np.floor(faster * real(levels) + real(0.5))
         level = level if (level >= real(lowest)) | (level == real(0.0)) else real(lowest)
         scale = level * real(1.0 / levels) / (faster if faster > real(0.0) else real(1.0))
-        left[lane] = l * scale
-        right[lane] = r * scale
+        left[lane] = one * scale
+        right[lane] = two * scale
 
 
 @stage
@@ -68,10 +68,10 @@ def _to_speeds(speed, sag, seconds, gain_left, gain_right, bias_left, bias_right
     for lane in range(LANES):
         charge = real(1.0) - sag[lane] * real(seconds)
         full = speed[lane] * (charge if charge > real(0.0) else real(0.0))
-        l = left[lane]
-        r = right[lane]
-        left[lane] = full * gain_left[lane] * l + (bias_left[lane] if l != real(0.0) else real(0.0))
-        right[lane] = full * gain_right[lane] * r + (bias_right[lane] if r != real(0.0) else real(0.0))
+        one = left[lane]
+        two = right[lane]
+        left[lane] = full * gain_left[lane] * one + (bias_left[lane] if one != real(0.0) else real(0.0))
+        right[lane] = full * gain_right[lane] * two + (bias_right[lane] if two != real(0.0) else real(0.0))
 
 
 @stage
@@ -160,11 +160,11 @@ def _to_motion(left, right, slip, track, drift, length, turn):
     real = length.dtype.type
     for lane in range(LANES):
         grip = real(1.0) - slip[lane]
-        l = left[lane] * grip
-        r = right[lane] * grip
-        middle = real(0.5) * (l + r)
+        one = left[lane] * grip
+        two = right[lane] * grip
+        middle = real(0.5) * (one + two)
         length[lane] = middle
-        turn[lane] = (r - l) / (real(TWO_PI) * track[lane]) + drift[lane] * middle
+        turn[lane] = (two - one) / (real(TWO_PI) * track[lane]) + drift[lane] * middle
 
 
 @stage

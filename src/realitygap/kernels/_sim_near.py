@@ -155,22 +155,20 @@ def flag_near(most, radius, far, flag):
 
 
 @stage
-def look_ahead(moved, reach, axle, pose, from_x, from_y, far):
+def look_ahead(first, second, reach, axle, pose, from_x, from_y, far):
     """The axles' places, and how far from them any point of the bodies can be during a step."""
-    s1, w1, s2, w2 = moved[0], moved[1], moved[2], moved[3]
     x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
     real = far.dtype.type
     for lane in range(LANES):
         from_x[lane] = x[lane] + axle[lane] * cosine[lane]
         from_y[lane] = y[lane] + axle[lane] * sine[lane]
-        far[lane] = reach[lane] + abs(s1[lane]) + abs(s2[lane]) + real(1e-4)
+        far[lane] = reach[lane] + abs(first[lane]) + abs(second[lane]) + real(1e-4)
 
 
 @stage
-def sizes_asked(moved, reach, k, length, turn):
-    """What part k of a step asks for, as lengths [m]: straight on, and of the farthest point by turning."""
+def sizes_asked(asked, around, reach, length, turn):
+    """What a part of a step asks for, as lengths [m]: straight on, and of the farthest point by turning."""
     real = length.dtype.type
-    s, w = moved[2 * k], moved[2 * k + 1]
     for lane in range(NEAR):
-        length[lane] = length[lane] + abs(s[lane])
-        turn[lane] = turn[lane] + abs(w[lane]) * (real(TWO_PI) * reach[lane])
+        length[lane] = length[lane] + abs(asked[lane])
+        turn[lane] = turn[lane] + abs(around[lane]) * (real(TWO_PI) * reach[lane])

@@ -82,7 +82,6 @@ def outline_of(p, first, n, outline, area):
 @stage
 def reach_of(x, y, radius, axle, reach):
     """Move a corner's x to be from the axle, and note how far it reaches."""
-    real = x.dtype.type
     for lane in range(LANES):
         shifted = x[lane] - axle[lane]
         x[lane] = shifted

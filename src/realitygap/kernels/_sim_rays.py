@@ -227,7 +227,7 @@ def _meet_wall(shape, lanes, q):
 @stage
 def _meet_shape(shape, lanes, q):
     n = shape.shape_corners[q]
-    if q < shape.obstacle_round.size and shape.obstacle_round[q] or n == 1:
+    if (q < shape.obstacle_round.size and shape.obstacle_round[q]) or n == 1:
         _meet_round(shape, lanes, q)
     elif n == 2:
         _meet_wall(shape, lanes, q)

@@ -1,7 +1,7 @@
 """Where bodies meet walls and obstacles most deeply, in lanes.
 
-A body is convex polygons grown by a radius each, in the frame of its axle; obstacles and open walls are likewise, in the
-world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are nearest at
+A body is convex polygons grown by a radius each, in the frame of its axle; obstacles and open walls are likewise,
+in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are nearest at
 the face of either of them that has the other one farthest in front of it: either there or, where the way to the
 other leads past an end of the face, at that end (a face of the Minkowski difference that is farthest from the origin
 has the point nearest to it).
@@ -163,19 +163,20 @@ def _tilt(normal_x, normal_y, tilt, tilted_x, tilted_y):
 
 
 @stage
-def _consider_face(x, y, end_x, end_y, normal_x, normal_y, length, sign, q_x, q_y, best):
+def _consider_face(
+    x, y, end_x, end_y, normal_x, normal_y, length, sign, q_x, q_y,
+    score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y,
+):  # fmt: skip
     """Keep a face if it has the other outline farther in front of it than any before.
 
     Args:
         x, y, end_x, end_y, normal_x, normal_y, length: The face.
         sign: 1 for a face of the obstacle, -1 for one of the body.
         q_x, q_y: The other's corner that is lowest over it.
-        best: (8, NEAR) score, separation, whether the end is nearest, normal towards the body, point of the
-            body, and of the obstacle less that of the body where the end is nearest.
+        score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y: Of the best one so far: score, separation, how far
+            the end is passed, normal towards the body, point on the body, and the way to it from the end.
     """
     real = x.dtype.type
-    score, apart, at_end, n_x, n_y, on_x, on_y = best[0], best[1], best[2], best[3], best[4], best[5], best[6]
-    way_x, way_y = best[7], best[8]
     for k in range(NEAR):
         a = normal_x[k]
         b = normal_y[k]
@@ -222,11 +223,9 @@ def _consider_face(x, y, end_x, end_y, normal_x, normal_y, length, sign, q_x, q_
 
 
 @stage
-def _begin_pair(x, y, q_x, q_y, best):
+def _begin_pair(x, y, q_x, q_y, score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y):
     """Of two corners, which is all that two discs have."""
     real = x.dtype.type
-    score, apart, at_end, n_x, n_y, on_x, on_y = best[0], best[1], best[2], best[3], best[4], best[5], best[6]
-    way_x, way_y = best[7], best[8]
     for k in range(NEAR):
         score[k] = real(-FAR)
         apart[k] = real(1.0)
@@ -240,11 +239,11 @@ def _begin_pair(x, y, q_x, q_y, best):
 
 
 @stage
-def _deeper_in_shape(best, body_radius, radius, near_gap, facing, beside, point_x, point_y):
+def _deeper_in_shape(
+    apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y,
+    body_radius, radius, near_gap, facing, beside, point_x, point_y,
+):  # fmt: skip
     real = near_gap.dtype.type
-    apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y = (
-        best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
-    )  # fmt: skip
     for k in range(NEAR):
         d_x = way_x[k]
         d_y = way_y[k]
@@ -282,7 +281,21 @@ def touch_shape(shape, near, q):
         )  # fmt: skip
     for part in range(shape.part_corners.size):
         n, outline = shape.part_corners[part], shape.row_outline[part]
-        _begin_pair(p[outline], p[outline + 1], seen[0], seen[1], best)
+        _begin_pair(
+            p[outline],
+            p[outline + 1],
+            seen[0],
+            seen[1],
+            best[0],
+            best[1],
+            best[2],
+            best[3],
+            best[4],
+            best[5],
+            best[6],
+            best[7],
+            best[8],
+        )
         if m > 1:
             for corner in range(m):
                 row = PER_CORNER * corner
@@ -291,7 +304,8 @@ def touch_shape(shape, near, q):
                 _lowest(p, outline, n, t_x, t_y, low, x, y)
                 _consider_face(
                     seen[row], seen[row + 1], seen[end], seen[end + 1], seen[row + 2], seen[row + 3],
-                    p[first + row + 4], 1, x, y, best,
+                    p[first + row + 4], 1, x, y,
+                    best[0], best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
                 )  # fmt: skip
         if n > 1:
             for corner in range(n):
@@ -300,10 +314,29 @@ def touch_shape(shape, near, q):
                 _tilt(p[row + 2], p[row + 3], TILT, t_x, t_y)
                 _lowest(seen, 0, m, t_x, t_y, low, x, y)
                 _consider_face(
-                    p[row], p[row + 1], p[end], p[end + 1], p[row + 2], p[row + 3], p[row + 4], -1, x, y, best
+                    p[row],
+                    p[row + 1],
+                    p[end],
+                    p[end + 1],
+                    p[row + 2],
+                    p[row + 3],
+                    p[row + 4],
+                    -1,
+                    x,
+                    y,
+                    best[0],
+                    best[1],
+                    best[2],
+                    best[3],
+                    best[4],
+                    best[5],
+                    best[6],
+                    best[7],
+                    best[8],
                 )
         _deeper_in_shape(
-            best, p[shape.row_part[part] + 2 * n], p[first + PER_CORNER * m],
+            best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
+            p[shape.row_part[part] + 2 * n], p[first + PER_CORNER * m],
             near.gap, near.facing, near.beside, near.point_x, near.point_y,
         )  # fmt: skip
 

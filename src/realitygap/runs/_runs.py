@@ -228,7 +228,7 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
     if condition.coverage is None:
         extra["task_fitness"] = flat(rows.task_fitness)
     if condition.records_behavior:
-        start = condition.arena.arena().start
+        start = condition.placed_arena.start
         extra["behavior"] = list_column(flat(rows.ended) + np.array([start.x, start.y]), np.full(total, 2))
     return pl.DataFrame(
         {

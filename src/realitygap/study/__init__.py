@@ -5,6 +5,7 @@ from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy
+from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
@@ -29,6 +30,7 @@ __all__ = [
     "load_study",
     "machine_facts",
     "measure_maze",
+    "measure_realism",
     "measure_speed",
     "measure_task",
     "named_studies",

@@ -147,6 +147,7 @@ class JyroTrials:
     def __init__(
         self, platform: JyroPlatform, arena: Arena, rules: NeatRules, *, noise: float, bias_value: float
     ) -> None:
+        self.arena = arena
         self.n_steps = platform.steps
         self.sensors = tuple(f"range.{k}" for k in range(len(platform.sensors.mounts)))
         self.distance_unit = platform.sensor_range

@@ -66,6 +66,7 @@ class Described(Settings):
     vary: dict[str, Distribution] = Field(
         default_factory=dict,
         description="Which numbers are drawn, by dotted name; a file writes the distribution in the number's place.",
+        json_schema_extra={"hidden": True},
     )
 
     @model_validator(mode="before")

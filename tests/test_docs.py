@@ -18,6 +18,7 @@ from realitygap.records import column_table, derived_table
 from realitygap.records._derived import DERIVED
 from realitygap.report import audit_distance
 from realitygap.robots import JyroPlatform
+from realitygap.settings import is_hidden
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings, load_robot
@@ -62,6 +63,8 @@ def test_examples_of_a_page_run_and_print_what_it_shows(path):
 def test_every_setting_is_in_the_reference_with_a_description(model):
     page = reference_pages.settings_page()
     for name, info in model.model_fields.items():
+        if is_hidden(info):
+            continue
         assert info.description, name
         assert f"`{name}`\n: " in page
         assert reference_pages.escape(info.description) in page

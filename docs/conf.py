@@ -8,6 +8,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import make_billion  # noqa: E402
+import make_gallery  # noqa: E402
+import make_sensors  # noqa: E402
 import make_speed  # noqa: E402
 import reference_pages  # noqa: E402
 
@@ -97,7 +99,12 @@ def in_section(lines):
 
 def setup(app):
     """Write the generated pages before Sphinx looks for pages."""
-    more = {"parts/billion.md": make_billion.page_tables(), **make_speed.page_parts()}
+    more = {
+        "parts/billion.md": make_billion.page_tables(),
+        "parts/gallery.md": make_gallery.page_part(),
+        **make_speed.page_parts(),
+        **make_sensors.page_parts(),
+    }
     reference_pages.write_all(HERE / "generated", more)
     app.connect("autodoc-skip-member", skip_pydantic)
     app.connect("autodoc-process-docstring", as_restructured, priority=1)

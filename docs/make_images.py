@@ -1,8 +1,9 @@
-"""The picture of the README: paths of a typical run, and the best coverage of the paper's nine conditions.
+"""The pictures of the README: what the paper's study gives, and one network of it on two platforms.
 
     uv run python docs/make_images.py
 
-Carries out `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records.
+Carries out `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: paths
+of a typical run beside the best coverage of the nine conditions, and the divergence between `jyro` and `sim`.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
 from realitygap import Condition, ResultsFolder, replay, run_study
+from realitygap.report import save_divergence
 
 IMAGE = Path(__file__).parent / "images" / "paper.svg"
+DIVERGENCE = Path(__file__).parent / "images" / "divergence.svg"
 SHOWN = "coverage-50"
 COLORS = {"coverage": "#0a4f8f", "novelty": "#b8480a", "random": "#6d7580"}
 DASHES = {0.1: (0, (1, 1.2)), 0.5: "solid", 0.8: (0, (4, 1.5))}
@@ -154,10 +157,13 @@ def main() -> None:
         figure = Figure(figsize=(9.6, 3.7), facecolor="white")
         draw_run(figure.add_axes((0.01, 0.15, 0.52, 0.70)), folder)
         draw_study(figure.add_axes((0.60, 0.13, 0.30, 0.72)), folder)
+        DIVERGENCE.parent.mkdir(exist_ok=True)
+        save_divergence(folder, DIVERGENCE, condition="novelty-50", against="sim")
     IMAGE.parent.mkdir(exist_ok=True)
     figure.savefig(IMAGE, metadata={"Date": None, "Creator": None})
     IMAGE.write_text(_shorter(IMAGE.read_text("utf-8")), "utf-8")
-    print(f"Written: {IMAGE} ({IMAGE.stat().st_size / 1000:.0f} kB)")
+    for image in (IMAGE, DIVERGENCE):
+        print(f"Written: {image} ({image.stat().st_size / 1000:.0f} kB)")
 
 
 def _shorter(svg: str) -> str:

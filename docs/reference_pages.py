@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 import typer
+from description_pages import description_parts
 from numpy.typing import NDArray
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -24,10 +25,10 @@ from scipy import stats
 
 from realitygap import myro
 from realitygap.cli import app
-from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
+from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.robots import JyroPlatform, ScribblerPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import MAZE_REWARDS, Condition
 from realitygap.settings import is_hidden
 from realitygap.study import (
@@ -38,10 +39,19 @@ from realitygap.study import (
     TrialsSection,
     load_study,
 )
-from realitygap.tasks import CLASSICAL_TASKS, MAZE_TASKS, CoverageTask
-from realitygap.world import ArenaSettings
+from realitygap.tasks import (
+    CLASSICAL_TASKS,
+    MAZE_TASKS,
+    AvoidTask,
+    CoverageTask,
+    GoalTask,
+    LightTask,
+    WallTask,
+)
+from realitygap.world import ArenaSettings, Distribution, RobotModel
 
 CHOICES_DATA = Path(__file__).parent / "data" / "choices.csv"
+TASK_STUDIES_DATA = Path(__file__).parent / "data" / "tasks.csv"
 MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
 FEATURES_DATA = Path(__file__).parent / "data" / "jyro-features.toml"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
@@ -50,9 +60,14 @@ TABLES: dict[str, type[BaseModel]] = {
     "[study]": StudySection,
     "[arena]": ArenaSettings,
     "[task]": CoverageTask,
+    '[task] with kind = "avoid"': AvoidTask,
+    '[task] with kind = "light"': LightTask,
+    '[task] with kind = "wall"': WallTask,
+    '[task] with kind = "goal"': GoalTask,
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
+    "[platform.sim]": SimPlatform,
     "[platform.scribbler]": ScribblerPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,
@@ -73,12 +88,15 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/ledger.md"] = ledger()
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
+    pages["parts/distances.md"] = distances()
     pages["parts/classical-tasks.md"] = classical_tasks()
     pages["parts/open-choices.md"] = open_choices()
     pages["parts/ablations.md"] = ablations()
     pages["parts/mazes.md"] = mazes()
+    pages["parts/tasks.md"] = task_studies()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
+    pages |= description_parts()
     pages |= {f"commands/{name.replace(' ', '-')}.md": page for name, page in command_pages().items()}
     for name, text in pages.items():
         path = folder / name
@@ -189,7 +207,8 @@ def setting(key: str, info: FieldInfo, model: type[BaseModel]) -> str:
     """One setting as an entry of a definition list."""
     facts = [values_of(info.annotation, info.metadata)]
     default = NAMED_SETTINGS[DEFAULT_NEAT].get(key, info.default) if model is NeatSettings else info.default
-    facts.append("no default" if info.is_required() else f"default {toml(default)}")
+    if info.default_factory is None:
+        facts.append("no default" if info.is_required() else f"default {toml(default)}")
     return f"`{key}`\n: {'; '.join(facts)}.\n\n  {escape(info.description or '')}"
 
 
@@ -207,12 +226,17 @@ def values_of(annotation: Any, metadata: list[Any]) -> str:
         return ", or ".join(each)
     if origin is Literal:
         return ", ".join(toml(value) for value in typing.get_args(annotation))
+    if origin is dict:
+        return f"a table of {values_of(typing.get_args(annotation)[1], []).replace('a number', 'numbers')}"
+    if origin is tuple:
+        return "a list of texts"
     if origin is list:
         (inner,) = typing.get_args(annotation)
         length = next((part.max_length for part in metadata if getattr(part, "max_length", None)), None)
         return f"a list of {length or 'any number of'} numbers{values_of(inner, []).removeprefix('a number')}"
     limits = limits_of(metadata)
     names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+    names |= {RobotModel: "a robot by name or file", Distribution: "how one is drawn"}
     return names[annotation] + (f", {limits}" if limits else "")
 
 
@@ -349,6 +373,27 @@ def option_text(option: Any) -> str:
     word = option.metavar or ("NAME" if option.type_descriptor.annotation is str else "N")
     takes = "" if option.is_flag else f" {word}"
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
+
+
+# --- distances ----------------------------------------------------------------------------------------------
+
+
+def distances() -> str:
+    """What each distance of behaviors says of itself, and in full."""
+    compared = {
+        "position": "where trials end",
+        True: "the list of cells, in order",
+        False: "the set of cells",
+    }
+    lines = ["| distance | compares | needs the order | metric | unit | steps |", "|---|---|---|---|---|---|"]
+    told = []
+    for name, each in DISTANCES.items():
+        what = compared["position" if each.compares == "position" else each.needs_order]
+        unit = "0 to 1" if each.unit == "1" else each.unit
+        words = ["yes" if value else "no" for value in (each.needs_order, each.is_metric)]
+        lines.append(f"| `{name}` | {what} | {' | '.join(words)} | {unit} | {each.cost} |")
+        told.append(f"`{name}`\n: {escape(each.description)} Source: {escape(each.source)}")
+    return "\n".join(lines) + "\n\n" + "\n\n".join(told) + "\n"
 
 
 # --- choices ------------------------------------------------------------------------------------------------
@@ -613,6 +658,26 @@ def mazes() -> str:
         + "."
     )
     return "\n".join([*lines, "", text]) + "\n"
+
+
+# --- tasks beside coverage ----------------------------------------------------------------------------------
+
+
+def task_studies() -> str:
+    """What the named studies of tasks came to, by `make_tasks.py`."""
+    with TASK_STUDIES_DATA.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    lines = ["| study | condition | runs | first | last | run [95 %] |", "|---|---|---|---|---|---|"]
+    for row in rows:
+        first, last, median, low, high = (
+            figure(row[key], 2) for key in ("first", "last", "median", "low", "high")
+        )
+        name = row["study"] if row["condition"] == row["study"] else ""
+        lines.append(
+            f"| {f'`{name}`' if name else ''} | {row['condition']} | {row['n']} | {first} | {last} "
+            f"| {median} [{low}, {high}] |"
+        )
+    return "\n".join(lines) + "\n"
 
 
 # --- classical tasks ----------------------------------------------------------------------------------------

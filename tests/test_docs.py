@@ -15,7 +15,9 @@ from realitygap.cli import app
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.records import column_table, derived_table
 from realitygap.records._derived import DERIVED
+from realitygap.report import audit_distance
 from realitygap.robots import JyroPlatform
+from realitygap.settings import is_hidden
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings
@@ -33,6 +35,7 @@ def _load(name):
 
 
 make_outputs = _load("make_outputs")
+description_pages = _load("description_pages")
 reference_pages = _load("reference_pages")
 PAGES = [path for path in make_outputs.documents() if path.name != "README.md"]
 
@@ -59,6 +62,8 @@ def test_examples_of_a_page_run_and_print_what_it_shows(path):
 def test_every_setting_is_in_the_reference_with_a_description(model):
     page = reference_pages.settings_page()
     for name, info in model.model_fields.items():
+        if is_hidden(info):
+            continue
         assert info.description, name
         assert f"`{name}`\n: " in page
         assert reference_pages.escape(info.description) in page
@@ -296,3 +301,63 @@ def test_figures_of_the_page_of_speed_are_those_that_its_command_measures():
     assert {figure: list(answers)[1:] for figure, answers in measured["figures"].items()} == expected
     assert expected.keys() == make_speed.FIGURES.keys()
     assert all("median" in answers["ours"] for answers in measured["figures"].values())
+
+
+def _distance_rows(name):
+    path = _load("make_distances").TABLES / f"{name}.csv"
+    head, *rows = list(csv.reader(path.read_text("utf-8").splitlines()))
+    return head, {row[0]: row[1:] for row in rows}
+
+
+@pytest.mark.long
+def test_numbers_on_the_page_of_distances_are_those_of_its_commands(tmp_path):
+    make_distances = _load("make_distances")
+    tables, figures = make_distances.make(tmp_path)
+    assert {path.name: path.read_text("utf-8") for path in make_distances.TABLES.iterdir()} == tables
+    assert {path.name for path in make_distances.FIGURES.iterdir()} == set(figures)
+
+
+def test_weights_on_the_page_of_distances_are_those_of_the_audit():
+    make_distances = _load("make_distances")
+    audits = {name: audit_distance(name) for name in ("paper", "hamming")}
+    _, *rows = make_distances.weights(audits).splitlines()
+    committed = (make_distances.TABLES / "weights.csv").read_text("utf-8").splitlines()
+    assert set(rows) <= set(committed)
+    assert (
+        make_distances.times(n=5, seconds=0.01).splitlines()[0]
+        == make_distances.TIMES.read_text("utf-8").splitlines()[0]
+    )
+
+
+def test_what_the_page_of_distances_says_is_what_the_numbers_say():
+    _, coverage = _distance_rows("coverage")
+    for name in ("paper-by-y", "ordered", "hamming", "edit", "coverage"):
+        assert coverage[name][-1].startswith("not shown"), name
+    for name in ("jaccard", "alignment", "final", "random"):
+        assert coverage[name][-1] == f"paper above {name}"
+    assert _number(coverage["random"][1]) < min(
+        _number(coverage[name][1]) for name in ("jaccard", "alignment")
+    )
+    _, behaviors = _distance_rows("behaviors")
+    novelty = {name: _number(row[6]) for name, row in behaviors.items() if row[6]}
+    for name in ("jaccard", "alignment"):
+        assert 0.4 < novelty[name] / novelty["paper"] < 0.65
+    assert min(novelty["hamming"], novelty["edit"]) > novelty["paper"] > 0.5
+    for name in ("paper-by-y", "ordered"):
+        assert abs(_number(behaviors[name][3])) < 0.12
+        assert abs(_number(behaviors[name][5])) < 0.02
+    variety = {name: _number(row[7]) for name, row in behaviors.items()}
+    assert min(variety, key=variety.get) == "final"
+    del variety["final"]
+    assert max(variety.values()) - min(variety.values()) < 0.03
+    _, lengths = _distance_rows("lengths")
+    assert all(0.75 < _number(cell) ** 2 < 0.95 for cell in lengths["paper"])
+    for name in ("jaccard", "alignment"):
+        assert all(_number(cell) ** 2 < 0.125 for cell in lengths[name])
+    _, trials = _distance_rows("trials")
+    assert all(_number(row[1]) > _number(row[0]) for row in trials.values())
+
+
+def _number(cell):
+    """The first number of a cell."""
+    return float(cell.replace("−", "-").split()[0])

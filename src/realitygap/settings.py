@@ -152,7 +152,10 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "value_error":
         # of the model as a whole there is nothing short to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
-        return f"{context['error']}." if is_table else f"{context['error']}, came {came}."
+        said = str(context["error"])
+        if is_table:
+            return said if said.endswith("?") else f"{said}."
+        return f"{said}, came {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
         words, key = _LIMITS[kind]

@@ -2,13 +2,14 @@
 
 import io
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from realitygap.emulator import Emulator, Scene
-from realitygap.world import Pose, paper_arena
+from realitygap.world import Floor, Pose, paper_arena
 
 from .wire import make, say
 
@@ -106,7 +107,7 @@ def test_cell_marks_and_tape_are_on_the_floor():
     pose = Pose(0.3, 0.3, 0.0)
     plain = raw("1", pose)
     assert (plain[150:, 1::2] < 180).any(), "marks between cells"
-    taped = raw("1", pose, Scene(paper_arena(), tape=((0.8, 0.1, 0.8, 0.5),)))
+    taped = raw("1", pose, Scene(replace(paper_arena(), floor=Floor(((0.8, 0.1, 0.8, 0.5),)))))
     assert (taped[:, 1::2] < 60).any()
     assert not (plain[:, 1::2] < 60).any()
 

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from realitygap.errors import RealityGapError
 from realitygap.playback import _movie, in_motion, save_movie
 from realitygap.playback._movie import picture_period
 from realitygap.playback._screen import TILE, TILE_VISITED, Screen, plain_style, ray_color, rgb
+from realitygap.robots import JyroPlatform
 from realitygap.runs import replay, run_replicates
+from realitygap.world import load_arena
+from realitygap.world._floor import BARE_FLOOR
 
 from .trials import straight, turning
 
@@ -122,7 +126,7 @@ def test_trails_cells_and_rays_have_their_colors():
 def test_words_say_step_time_label_and_that_it_is_blocked():
     trial = replace(turning(8), label="EMULATED")
     with plain_style():
-        screen = Screen([trial], 400)
+        screen = Screen([trial], 720)
         texts = [text.get_text() for text in screen._all.texts]
         screen.picture(0.0)
         before = screen._clock.get_text()
@@ -131,6 +135,36 @@ def test_words_say_step_time_label_and_that_it_is_blocked():
     assert texts[:2] == ["EMULATED", "turning"]
     assert before == "step 0 of 8 · 0.0 s · coverage .014"
     assert after == "× blocked · step 8 of 8 · 4.0 s · coverage .014"
+
+
+def test_a_small_picture_has_room_for_what_matters():
+    trial = replace(turning(8), title="a name that is far too long for a picture as small as this one is")
+    with plain_style():
+        screen = Screen([trial], 320)
+        screen.picture(4.0)
+        renderer = screen._canvas.get_renderer()
+        title = screen._all.texts[1].get_window_extent(renderer)
+        clock = screen._clock.get_window_extent(renderer)
+    assert screen._clock.get_text() == "× · 8 of 8 · 4.0 s"
+    assert title.x1 < clock.x0
+
+
+@pytest.mark.parametrize("name", ["goal", "light", "paper-boxes", "maze-hard"])
+def test_what_stands_in_an_arena_is_shown(name):
+    arena = load_arena(name)
+    still = SimpleNamespace(
+        step_s=0.1,
+        poses=np.array([arena.start, arena.start]),
+        readings=np.full((2, 3), 0.2),
+        stalled=np.zeros(2, np.bool_),
+    )
+    with plain_style():
+        shown, bare = (
+            np.asarray(Screen([in_motion(still, where, JyroPlatform())], 400).picture(0.0)).astype(int)
+            for where in (arena, replace(arena, obstacles=(), lights=(), goal=None, floor=BARE_FLOOR))
+        )
+    same = shown.shape == bare.shape
+    assert not same or (np.abs(shown - bare).max(axis=2) > 30).sum() > 20
 
 
 def test_an_mp4_plays_as_long_as_the_trial(tmp_path):

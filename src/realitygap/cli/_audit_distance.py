@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import shutil
+import textwrap
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from realitygap.errors import RealityGapError
+
+WIDEST = 110
+"""Letters of a line of prose, on a terminal that has more."""
 
 
 def audit_distance(
@@ -60,7 +65,8 @@ def audit_distance(
     if as_json:
         typer.echo(json.dumps(audit.to_dict(), indent=2))
     else:
+        width = min(shutil.get_terminal_size().columns, WIDEST)
         for note in distance_notes(audit):
-            typer.echo(note)
+            typer.echo(textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False))
     if path is not None:
         typer.echo(f"Written: {path}", err=as_json)

@@ -27,7 +27,9 @@ NARROWEST = 78
 def run(
     study: Annotated[
         str,
-        typer.Argument(metavar="STUDY", help="paper, paper-choices, paper-robot, or a study file (.toml)."),
+        typer.Argument(
+            metavar="STUDY", help="paper, paper-choices, paper-robot, distances, or a study file (.toml)."
+        ),
     ],
     replicates: Annotated[
         int | None, typer.Option(min=1, help="Runs of each condition, in place of the study's.")
@@ -240,7 +242,7 @@ class RunsBar:
 
 
 def _print_result(result: StudyResult, *, as_json: bool) -> None:
-    from realitygap.report import summarize
+    from realitygap.report import summarize, summarize_tasks
 
     there = result.n_runs or (result.physical is not None and result.physical.n_complete)
     if not there:  # nothing to summarize yet
@@ -248,7 +250,7 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
             typer.echo(json.dumps({"folder": str(result.folder.path), **_physical_json(result)}, indent=2))
         _print_physical(result, to_stderr=as_json)
         return
-    summary = summarize(result.folder)
+    summary, tasks = summarize(result.folder), summarize_tasks(result.folder)
     if as_json:
         found = {
             "folder": str(result.folder.path),
@@ -257,18 +259,23 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
             "seconds": result.seconds,
             **_physical_json(result),
             "conditions": summary.to_dicts(),
+            **({"tasks": tasks.to_dicts()} if len(tasks) else {}),
         }
         typer.echo(json.dumps(found, indent=2))
         _print_physical(result, to_stderr=True)
         return
     from rich.console import Console
 
-    from ._tables import summary_table
+    from ._tables import summary_table, task_table
 
     console = Console()
     if console.width < NARROWEST:
         console = Console(width=NARROWEST)
-    console.print(summary_table(summary, result.folder.description["title"]))
+    title = result.folder.description["title"]
+    if len(tasks):
+        console.print(task_table(tasks, title))
+    if len(tasks) < len(summary):
+        console.print(summary_table(summary, title))
     if note := result.folder.description.get("note"):
         console.print(note, style="italic", highlight=False, markup=False)
     path = result.folder.path

@@ -47,8 +47,37 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
     return table
 
 
+def task_table(summary: pl.DataFrame, title: str) -> Table:
+    """Best fitness of a run by its task: one row a condition, and how far evolution brought it."""
+    labels = ", ".join(sorted(set(summary["label"].to_list())))
+    tasks = ", ".join(dict.fromkeys(summary["task"].to_list()))
+    table = Table(
+        title=Text(f"{title}\nFitness by the task {tasks} ({labels})"),
+        caption=Text(
+            "first, last: median of the best in the first and in the last generation; run: of the best of a whole run, "
+            "median [its interval, at least 95 %] and quartiles"
+        ),
+        title_justify="left",
+        caption_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+    )
+    table.add_column("condition", overflow="fold")
+    for name in ("runs", "first", "last"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("run", no_wrap=True)
+    for row in summary.iter_rows(named=True):
+        first, last, median, q25, q75, low, high = (
+            _number(row[name]) for name in ("first", "last", "median", "q25", "q75", "low", "high")
+        )
+        interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
+        cells = [row["condition"], f"{row['n']:,}", first, last, f"{median} {interval}\n{q25} to {q75}"]
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
 def _number(value: float | None) -> str:
     if value is None:
         return "-"
     text = f"{value:.3f}"
-    return text.removeprefix("0") if value < 1 else text
+    return text.replace("0.", ".", 1) if abs(value) < 1 else text

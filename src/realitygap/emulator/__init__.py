@@ -6,7 +6,7 @@ Importing this package lets pyserial open ports such as `emulator://s2?fluke=2&s
 from ._emulator import Emulator
 from ._faults import Faults
 from ._port import EmulatedPort, EmulatorClock, register
-from ._scene import Lamp, Scene
+from ._scene import Scene
 from ._scene_file import open_scene
 from ._serve import Server, serve_pty, serve_tcp
 from ._simulated import SCRIBBLER_BODY, BoxOnWheels, SimulatedRobot
@@ -22,7 +22,6 @@ __all__ = [
     "Emulator",
     "EmulatorClock",
     "Faults",
-    "Lamp",
     "RemoteWitness",
     "Scene",
     "Server",

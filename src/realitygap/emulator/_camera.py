@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ._scene import TAPE_WIDTH, Scene
+from realitygap.world import FloorImage
+
+from ._scene import Scene
 from ._simulated import SimulatedRobot
 from ._walls import Walls
 
@@ -61,7 +63,7 @@ class Camera:
 
     def __init__(self, robot: SimulatedRobot, scene: Scene, model: str) -> None:
         self._robot, self._scene, self._model = robot, scene, model
-        self._walls = Walls(scene.arena.walls)
+        self._walls = Walls.of(scene.arena)
         self.restart()
 
     def restart(self) -> None:
@@ -261,8 +263,11 @@ def _draw_floor(
     colors = np.empty((*floor_x.shape, 3))
     colors[:] = FLOOR
     colors[_is_marked(scene, floor_x, floor_y)] = MARKS
-    for line in scene.tape:
-        colors[_is_on(line, floor_x, floor_y)] = TAPE
+    floor = scene.arena.floor
+    if floor.image is not None:
+        colors[..., 0] *= _brightness(floor.image, floor_x, floor_y)
+    for line in floor.tape:
+        colors[_is_on(line, floor.tape_width, floor_x, floor_y)] = TAPE
     part = is_floor[below]
     rows = image[below]
     rows[part] = colors[part]
@@ -278,12 +283,20 @@ def _is_marked(scene: Scene, x: Floats, y: Floats) -> NDArray[np.bool_]:
     return np.asarray(inside & ((np.abs(u - np.rint(u)) < half) | (np.abs(v - np.rint(v)) < half)))
 
 
-def _is_on(line: tuple[float, float, float, float], x: Floats, y: Floats) -> NDArray[np.bool_]:
+def _brightness(image: FloorImage, x: Floats, y: Floats) -> Floats:
+    """How bright the floor's image is at points, or at its edge: 0 black, 1 white."""
+    scale = image.columns / image.width
+    columns = np.clip(((x - image.x) * scale).astype(int), 0, image.columns - 1)
+    rows = np.clip(((y - image.y) * scale).astype(int), 0, image.rows - 1)
+    return np.asarray(image.brightness[rows, columns], dtype=float)
+
+
+def _is_on(line: tuple[float, float, float, float], width: float, x: Floats, y: Floats) -> NDArray[np.bool_]:
     x1, y1, x2, y2 = line
     along_x, along_y = x2 - x1, y2 - y1
     squared = along_x**2 + along_y**2 or 1.0
     share = np.clip(((x - x1) * along_x + (y - y1) * along_y) / squared, 0, 1)
-    return np.asarray(np.hypot(x - x1 - share * along_x, y - y1 - share * along_y) <= TAPE_WIDTH / 2)
+    return np.asarray(np.hypot(x - x1 - share * along_x, y - y1 - share * along_y) <= width / 2)
 
 
 def _whole(picture: Bytes) -> tuple[Bytes, Bytes, Bytes]:

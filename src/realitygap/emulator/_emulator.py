@@ -42,7 +42,7 @@ class Emulator:
     Args:
         model: "s1" or "s2", which an S3 is too.
         fluke: "none", "1" or "2".
-        arena: Where it stands: an arena, or a scene with lamps and tape. Default: the paper's arena.
+        arena: Where it stands: an arena, or a scene of one. Default: the paper's arena.
         seed: Of the noise of its sensors, and of faults.
         faults: What goes wrong on the link; nothing by default.
         timing: Whether bytes, tones, sensors and writing to memory take their time.

@@ -1,4 +1,4 @@
-"""What stands around an emulated robot: an arena, and lamps and dark tape that its other sensors see."""
+"""What stands around an emulated robot, as its sensors see it."""
 
 from __future__ import annotations
 
@@ -7,47 +7,33 @@ from dataclasses import dataclass
 
 from realitygap.world import Arena, paper_arena
 
-TAPE_WIDTH = 0.019  # of a line on the floor [m]: the usual 3/4 in
-
-
-@dataclass(frozen=True)
-class Lamp:
-    """A light that shines from a point to all sides, through walls.
-
-    Attributes:
-        x, y: Where [m].
-        strength: Its share of the light in the room, at a distance of 1 m.
-    """
-
-    x: float
-    y: float
-    strength: float = 1.0
+DARK = 0.5  # a floor less bright than this is dark to a line sensor: 0 is black, 1 white
+NEAREST = 0.05  # a light counts as no nearer than this [m]
 
 
 @dataclass(frozen=True)
 class Scene:
-    """An arena with what else the sensors see.
+    """An arena as the sensors see it.
+
+    Its lights shine to all sides and through walls, besides the room's own light, which is the same everywhere; their
+    strength is a share of it, at a distance of 1 m.
 
     Attributes:
-        arena: Walls, grid of cells and start.
-        lamps: Lights besides the room's own, which is the same everywhere.
-        tape: Dark lines on the floor, x1, y1, x2, y2 of each [m].
+        arena: Walls, obstacles, lights, floor, grid of cells and start.
     """
 
     arena: Arena
-    lamps: tuple[Lamp, ...] = ()
-    tape: tuple[tuple[float, float, float, float], ...] = ()
 
     def is_dark(self, x: float, y: float) -> bool:
-        """Whether a point of the floor [m] lies on tape."""
-        return any(_distance(x, y, line) <= TAPE_WIDTH / 2 for line in self.tape)
+        """Whether a point of the floor [m] is dark."""
+        return self.arena.floor.brightness(x, y) < DARK
 
     def light(self, x: float, y: float, direction: float) -> float:
         """The light that a sensor sees which looks from (x, y) [m] in a direction [rad]; the room's own is 1."""
         total = 1.0
-        for lamp in self.lamps:
+        for lamp in self.arena.lights:
             to_x, to_y = lamp.x - x, lamp.y - y
-            far = max(0.05, math.hypot(to_x, to_y))
+            far = max(NEAREST, math.hypot(to_x, to_y))
             facing = (to_x * math.cos(direction) + to_y * math.sin(direction)) / far
             total += lamp.strength * max(0.0, facing) ** 2 / far**2
         return total
@@ -56,13 +42,3 @@ class Scene:
 def paper_scene() -> Scene:
     """The paper's arena and nothing else."""
     return Scene(paper_arena())
-
-
-def _distance(x: float, y: float, line: tuple[float, float, float, float]) -> float:
-    """From a point to a straight line with two ends."""
-    x1, y1, x2, y2 = line
-    along_x, along_y = x2 - x1, y2 - y1
-    squared = along_x**2 + along_y**2
-    share = 0.0 if not squared else ((x - x1) * along_x + (y - y1) * along_y) / squared
-    share = min(1.0, max(0.0, share))
-    return math.hypot(x - x1 - share * along_x, y - y1 - share * along_y)

@@ -11,6 +11,8 @@ import random
 
 import numpy as np
 
+from realitygap.world import BARE_FLOOR
+
 from ._scene import Scene
 from ._simulated import SimulatedRobot
 
@@ -58,7 +60,7 @@ class Senses:
 
     Args:
         robot: Where they are.
-        scene: What lamps and tape there are.
+        scene: What lights there are and what is on the floor.
         seed: Of their noise.
     """
 
@@ -106,7 +108,7 @@ class Senses:
 
     def line(self) -> tuple[bool, bool]:
         """Whether the floor is dark, left and right."""
-        if not self._scene.tape:
+        if self._scene.arena.floor == BARE_FLOOR:
             return False, False
         x, y, heading = self._robot.pose
         cos, sin = math.cos(heading), math.sin(heading)

@@ -50,10 +50,10 @@ class SimulatedRobot(Protocol):
 
 
 class BoxOnWheels:
-    """A box with two wheels between straight walls: a blocked robot stays where it is, as in Jyro, and its wheels slip.
+    """A box with two wheels between walls and obstacles: blocked it stays where it is, as in Jyro, and its wheels slip.
 
     Args:
-        arena: The walls, and the start.
+        arena: The walls, the obstacles, and the start.
         spacing: Of its wheels [m].
         body: Its outline.
     """
@@ -61,7 +61,7 @@ class BoxOnWheels:
     def __init__(self, arena: Arena, spacing: float, body: Body = SCRIBBLER_BODY) -> None:
         self.arena = arena
         self.spacing = spacing
-        self.walls = Walls(arena.walls)
+        self.walls = Walls.of(arena)
         self._corners = np.array(body.corners)
         self._radius = float(np.hypot(*self._corners.T).max())
         self.place(arena.start)
@@ -70,7 +70,7 @@ class BoxOnWheels:
         """Put it somewhere else."""
         self.pose = Pose(*map(float, pose))
         self.stalled = False
-        self._free = 0.0  # how far the origin can go before the outline may touch a wall [m]
+        self._free = 0.0  # how far the origin can go before the outline may touch something [m]
         self._refused: tuple[float, float] | None = None  # how the wheels turned when it was blocked here
 
     def advance(self, left: float, right: float, seconds: float) -> tuple[float, float]:
@@ -91,7 +91,7 @@ class BoxOnWheels:
         return rolled_left, rolled_right
 
     def _is_blocked(self, pose: Pose, moved: float) -> bool:
-        """Whether the outline touches a wall at a pose this far on."""
+        """Whether the outline touches a wall or an obstacle at a pose this far on."""
         self._free -= moved
         if self._free > 0:
             return False
@@ -103,7 +103,7 @@ class BoxOnWheels:
         return self.walls.touch(pose.x + cos * xs - sin * ys, pose.y + sin * xs + cos * ys)
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:
-        """Distances to the walls [m]."""
+        """Distances to walls and obstacles [m]."""
         x, y, heading = self.pose
         cos, sin = math.cos(heading), math.sin(heading)
         forward, left = mounts[:, 0], mounts[:, 1]

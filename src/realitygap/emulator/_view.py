@@ -60,11 +60,13 @@ class LiveView:
 
 
 def picture(emulator: Emulator, width: int = WIDTH, height: int = HEIGHT) -> list[str]:
-    """The arena from above in at most so many characters: walls #, the pen's path ·, the robot as an arrow."""
+    """The arena from above in at most so many characters: walls, obstacles #, the pen's path ·, the robot an arrow."""
     width, height = max(10, width), max(5, height)
     arena = emulator.scene.arena
     path = emulator.path()
-    walls = np.array(arena.walls, dtype=float).reshape(-1, 4)
+    outlines = [obstacle.outline() for obstacle in arena.obstacles]
+    sides = [(*a, *b) for line in outlines for a, b in zip(line, (*line[1:], line[0]), strict=True)]
+    walls = np.array([*arena.walls, *sides], dtype=float).reshape(-1, 4)
     grid = arena.grid
     far_x, far_y = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
     xs = np.concatenate([walls[:, 0], walls[:, 2], [grid.x, far_x]])

@@ -101,7 +101,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             unit="cells",
             cost="n + m",
             description="The same, with the cells in the order in which they were visited first.",
-            source="Rosenzweig & Remy, section 4: “by not sorting the behaviors”.",
+            source="Rosenzweig & Remy, section 5: “by not sorting the behaviors”.",
         ),
         BehaviorDistance(
             "jaccard",

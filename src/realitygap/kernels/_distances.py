@@ -181,7 +181,7 @@ def describe(measure, cells, n, x, y, behaviors, row):
 @kernel
 def copy_behavior(behaviors, row, to, place):
     """Copy one behavior to a place among others."""
-    for k in range(behaviors.marks.shape[1]):
+    for k in range(min(behaviors.marks.shape[1], to.marks.shape[1])):
         to.marks[place, k] = behaviors.marks[row, k]
     to.n_cells[place] = behaviors.n_cells[row]
     to.points[place, 0] = behaviors.points[row, 0]
@@ -228,7 +228,7 @@ def _set_distance(one, other, as_share):
     return np.float64(alone)
 
 
-@kernel
+@inlined
 def distance_of(measure, one, row, other, place):
     """The distance of one behavior and another.
 

@@ -17,13 +17,14 @@ def _limited(value):
 
 
 @kernel
-def avoid_scores(commands, readings, ranges, scores):
+def avoid_scores(commands, readings, ranges, backward, scores):
     """Floreano & Mondada's product V (1 - sqrt(dv)) (1 - i), its mean over steps.
 
     Args:
         commands: (t, 2, n) move and turn; the wheels are asked for move - turn and move + turn, each within -1..1.
         readings: (t + 1, s, n) 0..1.
         ranges: (k,) which of them are of the range sensors.
+        backward: Whether V counts speeds without their signs; else it is their mean, and at least 0.
         scores: (n,) float64, written: 0..1.
     """
     n_steps, _, n = commands.shape
@@ -38,7 +39,7 @@ def avoid_scores(commands, readings, ranges, scores):
             nearest = 0.0
             for k in range(ranges.size):
                 nearest = max(nearest, float(readings[step + 1, ranges[k], trial]))
-            speed = 0.5 * (abs(left) + abs(right))
+            speed = 0.5 * (abs(left) + abs(right)) if backward else max(0.5 * (left + right), 0.0)
             apart = 0.5 * abs(left - right)
             scores[trial] += speed * (1.0 - math.sqrt(apart)) * (1.0 - min(nearest, 1.0))
     for trial in range(n):

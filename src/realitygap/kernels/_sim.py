@@ -14,6 +14,7 @@ from ._marks import count_cells, list_fresh, mark_ends, mark_line, place_line
 from ._sim_contact import settle
 from ._sim_drive import drive, take_commands
 from ._sim_encoders import as_input
+from ._sim_goal import see_goal_distance, see_goal_sector
 from ._sim_lanes import start_block
 from ._sim_rays import cast_rays
 from ._sim_senses import answer, feel_motion
@@ -21,6 +22,8 @@ from ._sim_shape import (
     BIAS,
     BUMP,
     ENCODER,
+    GOAL_DISTANCE,
+    GOAL_SECTOR,
     LAST_MOVE,
     LAST_TURN,
     LIGHT,
@@ -54,6 +57,7 @@ def observe(shape, rules, lanes, step):
     """Write what the networks see before a step to the first of `lanes.values`."""
     real = lanes.low.dtype.type
     n_range, n_light, n_line = shape.row_range.size, shape.row_light.size, shape.row_line.size
+    goal, start = shape.row_goal, shape.row_start
     for i in range(shape.inputs.shape[0]):
         kind, index, value = shape.inputs[i, 0], shape.inputs[i, 1], lanes.values[i]
         if kind == OBSTACLE:
@@ -76,6 +80,12 @@ def observe(shape, rules, lanes, step):
             copy_row(lanes.readings[n_range + n_light + n_line + index], value)
         elif kind == ENCODER:
             as_input(lanes.senses.counted_step[index], lanes.p[shape.row_drive], rules.step_s, value)
+        elif kind == GOAL_SECTOR:
+            see_goal_sector(lanes.p[goal], lanes.p[goal + 1], index, lanes.pose, value)
+        elif kind == GOAL_DISTANCE:
+            see_goal_distance(
+                lanes.p[goal], lanes.p[goal + 1], lanes.p[start], lanes.p[start + 1], lanes.pose, value
+            )
         elif kind == LAST_MOVE:
             copy_row(lanes.commands[0], value)
         elif kind == LAST_TURN:

@@ -169,14 +169,15 @@ def _plain(value: Any) -> Any:
 
 
 def _random_pose(arena: Arena, seed: int) -> Pose:
-    """A pose by chance at which the robot touches no wall."""
+    """A pose by chance at which the robot touches neither wall nor obstacle."""
     draw = np.random.default_rng(seed)
     walls = np.array(arena.walls)
     xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
     for _ in range(_TRIES):
         x, y = draw.uniform(xs.min(), xs.max()), draw.uniform(ys.min(), ys.max())
         heading = draw.uniform(-math.pi, math.pi)
-        if is_inside(arena, x, y) and _nearest(walls, x, y) > _CLEARANCE:
+        is_clear = all(obstacle.distance(x, y) > _CLEARANCE for obstacle in arena.obstacles)
+        if is_clear and is_inside(arena, x, y) and _nearest(walls, x, y) > _CLEARANCE:
             return Pose(float(x), float(y), float(heading))
     raise MyroError(f"The arena {arena.name} has no place where the robot fits.")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape
 from realitygap.errors import RealityGapError
-from realitygap.world import Pose
+from realitygap.world import Pose, obstacle_shapes
 
 from ._mistakes import choice, notebook_shell
 
@@ -150,6 +150,7 @@ def to_svg(simulation: Simulation) -> str:
         for k in range(grid.rows + 1)
     ]
     shapes += [Line(((x1, y1), (x2, y2)), Ink.TEXT, 2.4) for x1, y1, x2, y2 in arena.walls]
+    shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
     line = thinned([(float(x), float(y)) for _, x, y, _ in simulation.path()])
     if len(line) > 1:
         shapes.append(Line(tuple(line), Ink.OURS, 1.4))

@@ -10,8 +10,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.drawing import Shape
 from realitygap.kernels._coverage import to_grid, visit, visit_line
-from realitygap.world import Arena, Body, Grid, RangeSensors
+from realitygap.world import (
+    Arena,
+    Body,
+    Grid,
+    RangeSensors,
+    RobotModel,
+    floor_shapes,
+    goal_shapes,
+    light_shapes,
+    obstacle_shapes,
+)
 
 Outline = tuple[tuple[float, float], ...]
 """(b, 2) corners, forward and left of the robot's origin [m]."""
@@ -69,8 +80,14 @@ class RobotShape:
         return max(forward for outline in self.outlines for forward, _ in outline)
 
     @classmethod
-    def of(cls, robot: Ranging) -> RobotShape:
-        """The shape of a robot of one part."""
+    def of(cls, robot: Ranging | RobotModel) -> RobotShape:
+        """The shape of a robot; of one that a file describes, with all its parts and what each sensor reaches."""
+        model: Any = getattr(robot, "model", None)
+        if isinstance(robot, RobotModel) or isinstance(model, RobotModel):
+            model = robot if isinstance(robot, RobotModel) else model
+            mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in model.range)
+            parts = tuple(part.outline() for part in model.body)
+            return cls(parts, mounts, tuple(sensor.reach for sensor in model.range))
         mounts = robot.sensors.mounts
         return cls((robot.body.corners,), mounts, (robot.sensors.max_range,) * len(mounts))
 
@@ -179,7 +196,7 @@ class Moment:
 def in_motion(
     trajectory: Driven,
     arena: Arena,
-    robot: Ranging | RobotShape,
+    robot: Ranging | RobotModel | RobotShape,
     *,
     title: str = "trial",
     label: str = "SIM",
@@ -272,6 +289,32 @@ def first_visits(
             n_ends[step] = visit(column, row, *shape, at_ends, order_ends, n_ends[step - 1])
     steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))
     return order[: n[-1]].astype(np.int64), steps, end_steps
+
+
+def things_in(arena: Arena) -> list[Shape]:
+    """What lies and stands in an arena beside its walls, as plain shapes, from the hindmost to the foremost."""
+    shapes = floor_shapes(arena.floor)
+    shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
+    shapes += [shape for light in arena.lights for shape in light_shapes(light)]
+    return shapes + (goal_shapes(arena.goal) if arena.goal is not None else [])
+
+
+def extent(arena: Arena) -> tuple[float, float, float, float]:
+    """Left, right, lower and upper end of what is shown of an arena [m]."""
+    grid = arena.grid
+    points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
+    points += [(light.x, light.y) for light in arena.lights]
+    points += [point for obstacle in arena.obstacles for point in obstacle.outline()]
+    if not arena.walls:
+        points += [(grid.x, grid.y), (grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell)]
+    xs, ys = np.array(points, np.float64).T
+    margin = 0.012 * float(np.ptp(xs))
+    return (
+        float(xs.min()) - margin,
+        float(xs.max()) + margin,
+        float(ys.min()) - margin,
+        float(ys.max()) + margin,
+    )
 
 
 def placed(points: Sequence[tuple[float, float]], pose: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.drawing import PENS, Ink
+from realitygap.drawing import PENS, Disc, Ink, Line, Shape
 from realitygap.errors import RealityGapError
 from realitygap.world import Arena
 
-from ._moving import MovingTrial, all_trials
-from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED, extent
+from ._moving import MovingTrial, all_trials, extent, things_in
+from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED
 
 _DIGITS = 4
 """Of lengths [m] and angles [rad] that a page is sent."""
@@ -106,10 +106,27 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
     return {
         "title": title,
         "extent": [round(float(end), _DIGITS) for end in extent(arena)],
+        "shapes": [_pack_shape(shape) for shape in things_in(arena)],
         "walls": [list(wall) for wall in arena.walls],
         "grid": {"x": grid.x, "y": grid.y, "cell": grid.cell, "columns": grid.columns, "rows": grid.rows},
         "colors": _COLORS,
     }
+
+
+def _pack_shape(shape: Shape) -> dict[str, Any]:
+    """A plain shape of something that stands in the arena, ready for JSON."""
+    if isinstance(shape, Line):
+        points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
+        return {
+            "points": [*points, points[0]] if shape.closed else points,
+            "fill": shape.fill or "none",
+            "stroke": shape.color or "none",
+            "width": shape.width,
+            "dash": list(shape.dash),
+        }
+    if isinstance(shape, Disc):
+        return {"x": shape.x, "y": shape.y, "radius": shape.radius, "fill": shape.fill}
+    return {"x": shape.x, "y": shape.y, "text": shape.text, "up": shape.shift[1], "fill": shape.color}
 
 
 def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[dict[str, Any]]:

@@ -11,16 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import PENS, Ink
+from realitygap.drawing import PENS, Disc, Ink, Line, Shape
 from realitygap.world import Arena
 
-from ._moving import Moment, MovingTrial, nearness, placed, ray_ends
+from ._moving import Moment, MovingTrial, extent, nearness, placed, ray_ends, things_in
 
 if TYPE_CHECKING:
     from PIL.Image import Image
-
-DOTS = 100
-"""Per inch; all sizes here are for a picture of 8 in, and grow and shrink with it."""
 
 LABEL_COLORS = {"SIM": Ink.OURS, "TWIN": Ink.PEN3, "EMULATED": Ink.PEN5, "REAL": Ink.REACH}
 LETTERS = "ABCDEFGH"
@@ -36,11 +33,17 @@ TILE, TILE_VISITED, TILE_OFTEN = "#f3f5f8", "#cfe0f1", "#7fb0dd"
 """A cell that nobody visited, one visited by the only robot or by one of several, and by all of several."""
 
 _EDGE, _HEAD, _FOOT, _ROW = 0.12, 0.36, 0.26, 0.21
-_ACROSS = 4
-"""Names side by side below the arena."""
+_NAME = 1.9
+"""Width of a name below the arena."""
 
-_FAN = 0.045
-"""How far from a robot's middle its letter stands where several robots stand on one spot [m]."""
+_DOTS = 90
+"""Of a picture, per inch; one that is smaller than 4.8 in would be in smaller letters."""
+
+_ROOMY = 6.0
+"""A picture of this width has room for words in its head [in]."""
+
+_FAN = 0.042
+"""How far from a robot's middle its letter stands where several robots stand on one spot, as a part of the width."""
 
 
 _DOT = 1e-4
@@ -105,20 +108,22 @@ class Screen:
         self._several = len(trials) > 1
         self._title = title or (trials[0].title if len(trials) == 1 else f"{len(trials)} trials")
         left, right, bottom, top = extent(trials[0].arena)
-        rows = math.ceil(len(trials) / _ACROSS) if self._several else 0
-        across = 8.0 - 2 * _EDGE
+        self._wide = max(4.8, width / _DOTS)
+        self._columns = max(1, int((self._wide - _EDGE) / _NAME))
+        rows = math.ceil(len(trials) / self._columns) if self._several else 0
+        across = self._wide - 2 * _EDGE
         up = across * (top - bottom) / (right - left)
         height = _HEAD + up + _ROW * rows + _FOOT + 0.02
-        dots = width / 8.0
+        dots = width / self._wide
         pixels = [2 * round(width / 2), 2 * round(height * dots / 2)]  # video wants even numbers
         self._figure = Figure(figsize=(pixels[0] / dots, pixels[1] / dots), dpi=dots, facecolor=Ink.GROUND)
         canvas: Any = FigureCanvasAgg(self._figure)
         self._canvas = canvas
         height = pixels[1] / dots
         self._all: Any = self._figure.add_axes((0, 0, 1, 1))
-        self._all.set(xlim=(0, 8.0), ylim=(height, 0))
+        self._all.set(xlim=(0, self._wide), ylim=(height, 0))
         self._all.set_axis_off()
-        box = (_EDGE / 8, 1 - (_HEAD + up) / height, across / 8, up / height)
+        box = (_EDGE / self._wide, 1 - (_HEAD + up) / height, across / self._wide, up / height)
         self._field: Any = self._figure.add_axes(box)
         self._field.set(xlim=(left, right), ylim=(bottom, top))
         self._field.set_axis_off()
@@ -131,8 +136,7 @@ class Screen:
                 self._add(self._field, artist)
         self._draw_names(_HEAD + up + 0.06)
         self._draw_foot(height - _FOOT + 0.02)
-        canvas.draw()
-        self._ground = canvas.copy_from_bbox(self._figure.bbox)
+        self._visits: list[float] = []
 
     def picture(self, time: float) -> Image:
         """The moment at a time since the start [s]."""
@@ -161,8 +165,10 @@ class Screen:
             x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
             tiles.append([(x + dx, y + dy) for dx in (gap, grid.cell - gap) for dy in (gap, grid.cell - gap)])
         corners = np.array(tiles)[:, [0, 1, 3, 2]]
-        self._tiles = PolyCollection(list(corners), linewidths=0)
-        self._add(self._field, self._tiles)
+        self._tiles = PolyCollection(list(corners), linewidths=0, zorder=0.1)
+        self._field.add_artist(self._tiles)
+        for shape in things_in(arena):
+            _draw_shape(self._field, shape)
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in arena.walls]
         self._field.add_artist(
             LineCollection(walls, colors=Ink.TEXT, linewidths=3.2, capstyle="projecting", clip_on=False)
@@ -187,11 +193,25 @@ class Screen:
             )
             box = badge.get_window_extent(self._canvas.get_renderer())
             x = box.x1 / self._figure.dpi + 0.2
+        size, room = (10.0, 2.3) if self._wide >= _ROOMY else (8.5, 1.35)
+        letters = int((self._wide - x - room) * 95 / size)
         self._all.text(
-            x, _HEAD / 2 + 0.01, self._title, fontsize=10, weight="bold", color=Ink.TEXT, va="center_baseline"
+            x,
+            _HEAD / 2 + 0.01,
+            _short(self._title, letters),
+            fontsize=size,
+            weight="bold",
+            color=Ink.TEXT,
+            va="center_baseline",
         )
         self._clock = self._all.text(
-            8.0 - _EDGE, _HEAD / 2 + 0.01, "", fontsize=9.5, color=Ink.MUTED, ha="right", va="center_baseline"
+            self._wide - _EDGE,
+            _HEAD / 2 + 0.01,
+            "",
+            fontsize=size - 0.5,
+            color=Ink.MUTED,
+            ha="right",
+            va="center_baseline",
         )
         self._add(self._all, self._clock)
 
@@ -200,9 +220,9 @@ class Screen:
         self._words: list[Any] = []
         if not self._several:
             return
-        wide = (8.0 - 2 * _EDGE) / _ACROSS
+        wide = (self._wide - 2 * _EDGE) / self._columns
         for pen, trial in enumerate(self.trials):
-            x, y = _EDGE + wide * (pen % _ACROSS), top + _ROW * (pen // _ACROSS) + 0.09
+            x, y = _EDGE + wide * (pen % self._columns), top + _ROW * (pen // self._columns) + 0.09
             color, dashes = PENS[pen]
             self._all.plot([x, x + 0.28], [y, y], color=color, lw=2.0, dashes=dashes or (1, 0))
             name = f"{LETTERS[pen]}  {_short(trial.title, 16)}"
@@ -219,7 +239,7 @@ class Screen:
 
         y = top + 0.1
         has_rays = any(trial.shape.mounts and np.isfinite(trial.rays).any() for trial in self.trials)
-        right = 8.0 - _EDGE
+        right = self._wide - _EDGE
         if has_rays:
             xs = np.linspace(right - 0.84, right - 0.36, 17)
             pieces = [[(x, y), (onward, y)] for x, onward in itertools.pairwise(xs)]
@@ -244,21 +264,32 @@ class Screen:
         return artist
 
     def _move_cells(self, moments: Sequence[Moment]) -> None:
+        """Cells fill in seldom, so they are part of what stands still, which is drawn anew whenever one does."""
         visits = np.zeros(self.trials[0].arena.grid.n_cells)
         for trial, moment in zip(self.trials, moments, strict=True):
             visits[list(trial.cells[: moment.n_cells])] += 1.0
+        if visits.tolist() == self._visits:
+            return
+        self._visits = visits.tolist()
         most = max(len(self.trials) - 1, 1)
         self._tiles.set_facecolor(
-            [_mixed(TILE_VISITED, TILE_OFTEN, (n - 1) / most) if n else _mixed(TILE, TILE, 0) for n in visits]
+            [
+                _mixed(TILE_VISITED, TILE_OFTEN, (n - 1) / most) if n else _mixed(TILE, TILE, 0)
+                for n in self._visits
+            ]
         )
+        self._canvas.draw()
+        self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _move_letters(self, moments: Sequence[Moment]) -> None:
         """Letters stand on the robots, and around the spot where several robots stand on one."""
         places = np.array([moment.pose[:2] for moment in moments])
+        left, right = self._field.get_xlim()
+        fan = _FAN * (right - left)
         for pen, robot in enumerate(self._robots):
-            crowd = np.hypot(*(places - places[pen]).T) < _FAN
+            crowd = np.hypot(*(places - places[pen]).T) < fan
             angle = math.pi / 2 - math.tau * pen / len(self._robots)
-            away = _FAN if crowd.sum() > 1 else 0.0
+            away = fan if crowd.sum() > 1 else 0.0
             robot.move_letter(places[pen] + away * np.array([math.cos(angle), math.sin(angle)]))
 
     def _move_words(self, time: float, moments: Sequence[Moment]) -> None:
@@ -268,11 +299,13 @@ class Screen:
             word.set_text(f"{blocked}{moment.n_cells / n_cells:.3f}".replace("0.", ".", 1))
             word.set_color(Ink.REACH if moment.stalled else Ink.MUTED)
         step = max(moment.step for moment in moments)
-        parts = [f"step {step} of {self.n_steps}", f"{min(time, self.duration_s):.1f} s"]
-        if not self._several:
+        counted = f"{step} of {self.n_steps}"
+        is_roomy = self._wide >= _ROOMY
+        parts = [f"step {counted}" if is_roomy else counted, f"{min(time, self.duration_s):.1f} s"]
+        if not self._several and is_roomy:
             parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}".replace("0.", ".", 1))
-            if moments[0].stalled:
-                parts.insert(0, "× blocked")
+        if not self._several and moments[0].stalled:
+            parts.insert(0, "× blocked" if is_roomy else "×")
         self._clock.set_text(" · ".join(parts))
         left, right = self._bar
         share = min(time / self.duration_s, 1.0) if self.duration_s else 1.0
@@ -351,12 +384,30 @@ class _Robot:
         self._letter.set_position((float(place[0]), float(place[1])))
 
 
-def extent(arena: Arena) -> tuple[float, float, float, float]:
-    """Left, right, lower and upper end of what is shown of an arena [m]."""
-    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
-    margin = 0.012 * float(np.ptp(walls[:, [0, 2]]))
-    xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]
-    return xs.min() - margin, xs.max() + margin, ys.min() - margin, ys.max() + margin
+def _draw_shape(axes: Any, shape: Shape) -> None:
+    """A plain shape of something that stands in the arena."""
+    if isinstance(shape, Line):
+        points = np.array([*shape.points, shape.points[0]] if shape.closed else shape.points)
+        if shape.fill is not None:
+            axes.fill(points[:, 0], points[:, 1], color=shape.fill, linewidth=0, zorder=0.5)
+        if shape.color is not None:
+            dashes = tuple(part / shape.width for part in shape.dash)
+            style = (0, dashes) if dashes else "solid"
+            axes.plot(points[:, 0], points[:, 1], color=shape.color, lw=shape.width, ls=style, zorder=0.6)
+    elif isinstance(shape, Disc):
+        axes.plot([shape.x], [shape.y], "o", color=shape.fill, markersize=2 * shape.radius, mew=0, zorder=0.7)
+    else:
+        axes.annotate(
+            shape.text,
+            (shape.x, shape.y),
+            shape.shift,
+            textcoords="offset points",
+            fontsize=shape.size,
+            color=shape.color,
+            ha="center",
+            va="center",
+            zorder=0.8,
+        )
 
 
 def _short(text: str, n_letters: int) -> str:

@@ -6,7 +6,7 @@
 const NS = "http://www.w3.org/2000/svg";
 const MM = 1000;
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
-const FAN = 0.045; // around a robot's middle, where several letters would stand on one spot [m]
+const FAN = 0.042; // around a robot's middle, where several letters would stand on one spot, as a part of the width
 
 const make = (name, attributes = {}, parent = null) => {
   const element = document.createElementNS(NS, name);
@@ -70,7 +70,7 @@ function render({ model, el }) {
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
   const root = tag("div", { class: "rg-player", role: "group", "aria-label": "Trials in motion" });
   el.append(root);
-  let scene, trials, drawn, frame, tiles, duration, nSteps;
+  let scene, trials, drawn, frame, tiles, duration, nSteps, unit;
   let at = 0, playing = false, last = null, request = null, closed = false;
   let live = null; // of a robot that runs: where it was and is shown, since when, and what it has done
 
@@ -123,7 +123,8 @@ function render({ model, el }) {
         tiles.push(make("rect", { class: "rg-tile", ...attributes }, svg));
       }
     }
-    for (const shape of scene.shapes || []) make("polygon", { class: "rg-solid", points: shape.map(([x, y]) => `${short(toX(x))},${short(toY(y))}`).join(" ") }, svg);
+    unit = ((right - left) * MM) / 820; // of a page that is 820 px wide
+    for (const shape of scene.shapes || []) buildShape(shape);
     const walls = (scene.walls || []).map(([x1, y1, x2, y2]) => `M${short(toX(x1))} ${short(toY(y1))}L${short(toX(x2))} ${short(toY(y2))}`);
     make("path", { class: "rg-walls", d: walls.join("") }, svg);
     frame = { trails: make("g", {}, svg), robots: make("g", {}, svg), letters: make("g", {}, svg) };
@@ -140,6 +141,18 @@ function render({ model, el }) {
     draw();
   }
 
+  // what stands in the arena beside walls: lines and areas, discs, words
+  function buildShape(shape) {
+    if (shape.points) {
+      const points = shape.points.map(([x, y]) => `${short(toX(x))},${short(toY(y))}`).join(" ");
+      make("polyline", { class: "rg-shape", points, fill: shape.fill, stroke: shape.stroke, "stroke-width": shape.width, "stroke-dasharray": shape.dash.join(" ") }, svg);
+    } else if (shape.text) {
+      make("text", { class: "rg-word", x: short(toX(shape.x)), y: short(toY(shape.y) - shape.up * 1.4 * unit), fill: shape.fill, "font-size": short(11 * unit) }, svg).textContent = shape.text;
+    } else {
+      make("circle", { cx: short(toX(shape.x)), cy: short(toY(shape.y)), r: short(shape.radius * 1.4 * unit), fill: shape.fill }, svg);
+    }
+  }
+
   function buildRobot(trial) {
     const several = trials.length > 1, style = `--pen: ${trial.color}`;
     const trail = make("polyline", { class: "rg-trail", style, "stroke-dasharray": several ? trial.dashes.map((part) => part * 1.5).join(" ") : "" }, frame.trails);
@@ -151,8 +164,8 @@ function render({ model, el }) {
     make("path", { class: "rg-nose", d: `M${short(0.55 * front)} ${short(-0.28 * front)}L${short(0.85 * front)} 0L${short(0.55 * front)} ${short(0.28 * front)}` }, robot);
     const hits = trial.mounts.map(() => make("circle", { class: "rg-hit", r: "0" }, robot));
     const letter = make("g", { class: "rg-letter", style, visibility: several ? "visible" : "hidden" }, frame.letters);
-    make("circle", { r: "17" }, letter);
-    make("text", {}, letter).textContent = trial.letter;
+    make("circle", { r: short(12.5 * unit) }, letter);
+    make("text", { "font-size": short(16.5 * unit) }, letter).textContent = trial.letter;
     const line = tag("span", { class: "rg-name" });
     const swatch = make("svg", { class: "rg-swatch", viewBox: "0 0 30 8", "aria-hidden": "true" });
     make("path", { d: "M0 4H30", stroke: trial.color, "stroke-width": "2.4", "stroke-dasharray": trial.dashes.join(" ") }, swatch);
@@ -189,7 +202,7 @@ function render({ model, el }) {
       part.rays[k].style.display = known ? "" : "none";
       part.hits[k].setAttribute("cx", short(endX));
       part.hits[k].setAttribute("cy", short(endY));
-      part.hits[k].setAttribute("r", known && near > 0 ? "5" : "0");
+      part.hits[k].setAttribute("r", known && near > 0 ? short(3.6 * unit) : "0");
     });
   }
 
@@ -200,13 +213,13 @@ function render({ model, el }) {
       part.blocked.setAttribute("d", "");
       return;
     }
-    const { trial, points } = part;
+    const { trial, points } = part, arm = 4.5 * unit;
     if (moment.row < points.row) Object.assign(points, { row: -1, text: "", crosses: "" });
     while (points.row < moment.row) {
       points.row += 1;
       const [u, v] = trial.poses[points.row];
       points.text += `${short(toX(u))},${short(toY(v))} `;
-      if (trial.stalled[points.row]) points.crosses += `M${short(toX(u) - 6)} ${short(toY(v) - 6)}l12 12m0-12l-12 12`;
+      if (trial.stalled[points.row]) points.crosses += `M${short(toX(u) - arm)} ${short(toY(v) - arm)}l${short(2 * arm)} ${short(2 * arm)}m0 ${short(-2 * arm)}l${short(-2 * arm)} ${short(2 * arm)}`;
     }
     part.trail.setAttribute("points", `${points.text}${short(toX(x))},${short(toY(y))}`);
     part.blocked.setAttribute("d", points.crosses);
@@ -214,11 +227,12 @@ function render({ model, el }) {
 
   // on the robots, and around the spot where several robots stand on one
   function drawLetters(moments) {
+    const fan = FAN * (scene.extent[1] - scene.extent[0]);
     drawn.forEach((part, k) => {
       if (!moments[k]) return;
       const [x, y] = moments[k].pose;
-      const crowd = moments.filter(({ pose }) => Math.hypot(pose[0] - x, pose[1] - y) < FAN).length > 1;
-      const angle = Math.PI / 2 - (2 * Math.PI * k) / drawn.length, away = crowd ? FAN : 0;
+      const crowd = moments.filter(({ pose }) => Math.hypot(pose[0] - x, pose[1] - y) < fan).length > 1;
+      const angle = Math.PI / 2 - (2 * Math.PI * k) / drawn.length, away = crowd ? fan : 0;
       part.letter.setAttribute("transform", `translate(${short(toX(x + away * Math.cos(angle)))} ${short(toY(y + away * Math.sin(angle)))})`);
     });
   }

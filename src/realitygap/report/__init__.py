@@ -67,6 +67,7 @@ from realitygap.report._statistics import (
     quartiles,
 )
 from realitygap.report._summary import SUMMARY_SCHEMA, summarize
+from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
 from realitygap.report._trial_figure import draw_trial
 
 __all__ = [  # noqa: RUF022 - grouped by subject
@@ -75,7 +76,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "REPORT_NAME",
     # numbers
     "summarize",
+    "summarize_tasks",
     "SUMMARY_SCHEMA",
+    "TASK_SCHEMA",
     "compare_choices",
     "Choice",
     "compare_conditions",

@@ -75,12 +75,17 @@ def _caption(tally: Tally, condition: Condition, described: Mapping[str, Any]) -
     whose = "All conditions have this arena." if same else f"Shown is condition {condition.name}."
     platform = condition.tried_on
     simulated = "" if condition.is_physical else " as simulated"
-    outline = "the box that holds the robot’s" if condition.is_physical else "Jyro’s"
+    outline = {
+        "jyro": "Jyro’s; the paper does not state the start and where the sensors are mounted",
+        "sim": f"that of robot {condition.sim.model.name}",
+        "scribbler": "the box that holds the robot’s; the paper does not state the start and where the sensors are "
+        "mounted",
+    }[condition.platform]
     return (
         f"The arena, with its reachable cells outlined, and the robot{simulated}, both to scale. Trials begin at "
         f"({start.x:.4f}, {start.y:.4f}) m with the robot facing as the arrow does; the gray outline is what can "
         f"collide, the dashed lines are how far its {len(platform.sensors.mounts)} sensors see. {whose} The outline is "
-        f"{outline}; the paper does not state the start and where the sensors are mounted. "
+        f"{outline}. "
         f"{label_of(described)}: a drawing of the settings; n and interval do not apply."
     )
 

@@ -184,6 +184,7 @@ def audit_distance(
     n_walks = whole_number("n_walks", n_walks, 10, 1_000_000)
     n_pairs = whole_number("n_pairs", n_pairs, _LEAST_PAIRS, 1_000_000)
     straight = real_number("straight", straight, 0.0, 1.0)
+    study = None if folder is None else _open_for(distance, folder)
     columns, rows = 12, 6
     rng = np.random.default_rng(seed)
     walks = [random_walk(rng, columns, rows, straight) for _ in range(max(n_walks, 2 * n_pairs))]
@@ -194,8 +195,8 @@ def audit_distance(
     low[order], high[order] = np.quantile(means, _BEYOND, axis=0)
     mean = leverages.mean(axis=0)
     confounds = [_confound("random walks", "", distance, walks[: 2 * n_pairs], columns, rows, sort)]
-    if folder is not None:
-        confounds += _confounds_of(folder, distance, rng, n_pairs, sort)
+    if study is not None:
+        confounds += _confounds_of(study, distance, rng, n_pairs, sort)
     return DistanceAudit(
         distance=distance,
         columns=columns,
@@ -354,20 +355,20 @@ def spearman(one: Values, other: Values) -> Estimate:
     return Estimate(value, low, high)
 
 
-def _confounds_of(
-    folder: ResultsFolder | str | Path,
-    distance: BehaviorDistance,
-    rng: np.random.Generator,
-    n_pairs: int,
-    sort: Sort,
-) -> list[Confound]:
-    """On the trials of each condition of a study."""
+def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) -> ResultsFolder:
+    """Results on whose trials a distance can be audited."""
     if distance.compares != "cells":
         raise ValueError(
             f"Distance {distance.name!r} compares where trials ended, which the rows of a study do not hold. Audit it "
             "without a folder, on random walks."
         )
-    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    return folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+
+
+def _confounds_of(
+    folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: Sort
+) -> list[Confound]:
+    """On the trials of each condition of a study."""
     found = []
     for condition in folder.description["conditions"]:
         rows = folder.read(condition["name"], columns=["replicate", "cells"])

@@ -195,7 +195,7 @@ def _draw_correlations(axes: Axes, confounds: list[Confound], names: float, *, w
         if not math.isnan(found.value):
             draw_line(axes, [found.low, found.high], [row, row], color=color, linewidth=2.2)
             draw_line(axes, [found.value], [row], color=color, marker="o", markersize=5)
-        label = f"{each.label}  {each.of}" if each.label else each.of
+        label = f"{each.label}, {each.of}" if each.label else each.of
         for text, at, x, side in (
             (shorten(label, int(names / 0.075)), 0.0, -6, "right"),
             ("none" if math.isnan(found.value) else in_words(found), 1.0, 8, "left"),

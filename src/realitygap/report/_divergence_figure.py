@@ -48,7 +48,7 @@ _GHOSTS = 7
 _MOST_TRAILS = 30
 """Repeats whose paths are drawn; more would be a blot."""
 
-PLATFORMS = ("jyro",)
+PLATFORMS = ("jyro", "sim")
 """That a network can be tried on beside its own, with their defaults."""
 
 
@@ -99,7 +99,7 @@ def save_divergence(
     path = Path(path)
     check_ending(path, (".pdf", ".png", ".svg"))
     refuse_results(path)
-    sides = compare_trials(
+    which, *sides = _compare(
         results,
         against=against,
         condition=condition,
@@ -109,7 +109,8 @@ def save_divergence(
         repeats=repeats,
     )
     title = f"{sides[0].name} and {sides[1].name}"
-    return save_drawing(captioned(draw_divergence(*sides), "divergence"), path, title=title)
+    drawing = draw_divergence(sides[0], sides[1], of=which)
+    return save_drawing(captioned(drawing, "divergence"), path, title=title)
 
 
 def compare_trials(
@@ -126,6 +127,29 @@ def compare_trials(
 
     Arguments and errors as in `save_divergence`.
     """
+    _, one, other = _compare(
+        results,
+        against=against,
+        condition=condition,
+        replicate=replicate,
+        generation=generation,
+        individual=individual,
+        repeats=repeats,
+    )
+    return one, other
+
+
+def _compare(
+    results: ResultsFolder | str | Path,
+    *,
+    against: str,
+    condition: str | None,
+    replicate: int | None,
+    generation: int | None,
+    individual: int | None,
+    repeats: int,
+) -> tuple[str, Side, Side]:
+    """Which network it is, and its trials on both sides."""
     whole_number("repeats", repeats, 2, 1000)
     tally = read_tally(results)
     trial = choose_trial(tally, condition, replicate, generation, individual)
@@ -134,8 +158,10 @@ def compare_trials(
         if each.is_physical:
             raise refuse_replay(each.name)
     genome = genome_of(trial.condition, trial.row)
+    own = trial.condition.platform if against in PLATFORMS else trial.condition.name
     return (
-        _try_again(trial, trial.condition, trial.condition.name, genome, repeats),
+        trial.title,
+        _try_again(trial, trial.condition, own, genome, repeats),
         _try_again(trial, other, against, genome, repeats),
     )
 
@@ -146,8 +172,9 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
     if against in names:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
     if against in PLATFORMS:
-        fresh = Condition(name=own.name)
-        return own.model_copy(update={"platform": against, against: getattr(fresh, against)})
+        fresh = Condition(name=own.name, platform=against)
+        changed = {"platform": against, against: getattr(fresh, against), "noise": fresh.noise}
+        return own.model_copy(update=changed)
     raise ValueError(
         f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
     )
@@ -159,25 +186,27 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
     trials = []
     for repeat in range(1, repeats + 1):
         trajectory = trace_genome(
-            on.tried_on,  # type: ignore[arg-type]  # a robot was refused
+            on.simulated_on,
             arena,
             genome,
             noise=on.noise,
             noise_key=replace(key, repeat=repeat),
+            inputs=trial.condition.network_inputs,
         )
-        trials.append(in_motion(trajectory, arena, on.tried_on, title=name, label=on.label))
+        trials.append(in_motion(trajectory, arena, on.simulated_on, title=name, label=on.label))
     return Side(name, tuple(trials))
 
 
 # --- drawing ------------------------------------------------------------------------------------------------
 
 
-def draw_divergence(one: Side, other: Side, *, width: float = WIDE) -> Drawing:
+def draw_divergence(one: Side, other: Side, *, of: str = "", width: float = WIDE) -> Drawing:
     """Trials of one network on two platforms, side by side, and how far they come apart step by step.
 
     Args:
         one, other: as many repeats of both; repeat k of the one is compared with repeat k + 1 of the other, so that
             the two never drew the same noise, and the comparison is fair to that of repeats on one platform.
+        of: which network it is.
         width: of the figure [in].
 
     Raises:
@@ -195,8 +224,8 @@ def draw_divergence(one: Side, other: Side, *, width: float = WIDE) -> Drawing:
     )
     shown = f" of the first {_MOST_TRAILS} repeats" if n > _MOST_TRAILS else ""
     caption = (
-        f"One network, tried {n} times on {one.name} and {n} times on {other.name}, each on noise of its own; "
-        f"{labels}, {steps}. Above: all paths{shown}; the first "
+        f"One network{f' ({of})' if of else ''}, tried {n} times on {one.name} and {n} times on {other.name}, each on "
+        f"noise of its own; {labels}, {steps}. Above: all paths{shown}; the first "
         "with its robot, what it sees and the cells that it visits. Below: how far repeat k on the one is from repeat "
         f"k + 1 on the other after each step, mean and 10th to 90th percentile of n = {n}; thin lines: what noise "
         f"alone does, the mean between repeat k and k + 1 on one platform. After {last} steps {distance:.2f} m apart, "
@@ -280,6 +309,8 @@ def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong:
     moment = trial.at(row / trial.parts * trial.step_s)
     for outline in trial.shape.outlines:
         corners = placed([*outline, outline[0]], moment.pose)
+        if strong:
+            axes.fill(corners[:, 0], corners[:, 1], color=Ink.GROUND, alpha=0.75, linewidth=0, zorder=7.5)
         draw_line(
             axes,
             corners[:, 0],

@@ -49,6 +49,7 @@ def write_movie(
     generation: int | None = None,
     individual: int | None = None,
     speed: float = 1.0,
+    title: str = "",
     width: int = WIDTH,
 ) -> Path:
     """Write trials in motion as GIF or MP4: rays, trails in the pens' colors, and the cells that they visit.
@@ -64,6 +65,7 @@ def write_movie(
         generation: of the run; that of its best trial when not given.
         individual: of the generation; the one of highest coverage when not given.
         speed: 1 is as fast as it was; 2 is twice as fast.
+        title: in the head; which trials they are when not given.
         width: of the pictures [px].
 
     Returns:
@@ -83,10 +85,10 @@ def write_movie(
     if ready and len(ready) < len(many):
         raise TypeError(_MIXED)
     if ready:
-        return save_movie(ready, path, speed=speed, width=width)
+        return save_movie(ready, path, speed=speed, title=title, width=width)
     folders = [one for one in many if not isinstance(one, MovingTrial)]
-    title, trials = choose_moving(folders, each, condition, replicate, generation, individual)
-    return save_movie(trials, path, speed=speed, title=title, width=width)
+    named, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    return save_movie(trials, path, speed=speed, title=title or named, width=width)
 
 
 def choose_moving(
@@ -173,7 +175,7 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
         condition.arena.arena(),
         condition.simulated_on,
         title=title,
-        label=condition.simulated_on.label,
+        label=condition.label,
     )
 
 

@@ -26,6 +26,7 @@ from realitygap.records import (
     write_whole,
 )
 from realitygap.report import _gallery
+from realitygap.report._assumed import sim_assumptions
 from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
 from realitygap.report._coverage_figure import draw_tally_coverage
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
@@ -53,6 +54,7 @@ _LABELS = {
 
 _PLATFORMS = {
     "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
+    "sim": "a robot simulated with its outline, contact, motors and sensors, as its file and the settings have them",
     "scribbler": "the paper’s robot, driven over its own protocol",
 }
 
@@ -313,6 +315,7 @@ def _facts(tally: Tally) -> list[tuple[str, str]]:
             "; ".join(f"{each}: {_PLATFORMS[each]}" if each in _PLATFORMS else each for each in platforms),
         )
     )
+    facts += [(f"Assumed of {names}", text) for names, text in sim_assumptions(tally.conditions)]
     numbers = {
         "True": "; all conditions draw the same random numbers",
         "False": "; conditions draw apart",

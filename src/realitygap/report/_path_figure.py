@@ -266,6 +266,9 @@ def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: 
         draw_line(
             axes, [x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3
         )
+    for obstacle in arena.obstacles:
+        xs, ys = zip(*obstacle.outline(), strict=True)
+        axes.fill(xs, ys, facecolor=Ink.RULE, edgecolor=Ink.TEXT, linewidth=1.2, zorder=3)
 
 
 def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> None:

@@ -8,9 +8,10 @@ from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
 from ._scribbler_platform import ScribblerPlatform
-from ._sim import SimPlatform
+from ._sim import ARENA, SimPlatform
 
 __all__ = [
+    "ARENA",
     "STEP_S",
     "Clock",
     "Command",

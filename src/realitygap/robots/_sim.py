@@ -83,11 +83,8 @@ class SimPlatform(Settings):
     steps: int = Field(
         100, ge=1, le=100_000, description="Steps of a trial: commands (section 2.2, the paper's robot: 100)."
     )
-    step_s: float | None = Field(
-        None,
-        gt=0,
-        le=60,
-        description="How long a command lasts [s]; as the robot's file has it when not given.",
+    step_s: float = Field(
+        0.0, ge=0, le=60, description="How long a command lasts [s]; 0: as the robot's file has it."
     )
     contact: Literal["robot", "freeze", "stop", "slide"] = Field(
         "robot",
@@ -155,7 +152,7 @@ class SimPlatform(Settings):
     @property
     def command_s(self) -> float:
         """How long a command lasts [s]."""
-        return self.model.step_s if self.step_s is None else self.step_s
+        return self.step_s or self.model.step_s
 
     @property
     def label(self) -> str:

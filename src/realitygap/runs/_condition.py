@@ -17,7 +17,7 @@ from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask, Task, as_task
 from realitygap.trials import sim_scene
-from realitygap.world import ArenaSettings, check_start
+from realitygap.world import Arena, ArenaSettings, check_start
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -145,7 +145,10 @@ class Condition(Settings):
 
     @model_validator(mode="after")
     def _robot_fits_at_start(self) -> Self:
-        check_start(self.arena.arena(), self.tried_on.body)
+        arena = self.arena.arena()
+        if self.platform == "jyro":
+            arena.straight_walls()  # which says where there are none
+        check_start(arena, self.sim.model if self.platform == "sim" else self.tried_on.body)
         return self
 
     @model_validator(mode="after")
@@ -207,6 +210,13 @@ class Condition(Settings):
         if self.platform != "sim":
             return ()
         return sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise).drawn_names
+
+    @property
+    def placed_arena(self) -> Arena:
+        """Its arena, with what its platform's settings say of the arena's numbers; of what is drawn, the centers."""
+        arena = self.arena.arena()
+        changed = self.sim.arena_numbers if self.platform == "sim" else {}
+        return arena.with_numbers(changed) if changed else arena
 
     @property
     def records_behavior(self) -> bool:

@@ -175,8 +175,8 @@ class _Staged:
         batch = tried.batch
         fitness = np.empty(0)
         if self.task is not None:
-            seen = trajectories_of(self.trials, tried, self.arena, self.condition.network_inputs)
-            fitness = np.asarray(self.task.fitness(seen, self.arena), np.float64)
+            seen = trajectories_of(self.trials, tried, self.condition.network_inputs)
+            fitness = np.asarray(self.task.fitness(seen, self.trials.arena), np.float64)
         counts = np.stack([batch.n_line, batch.n_ends, batch.n_stalls], axis=1)
         return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness)
 

@@ -15,9 +15,10 @@ from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.runs import Condition
-from realitygap.tasks import CoverageTask
+from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
+from ._named_files import find_files
 from ._problems import Problems
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
@@ -101,24 +102,13 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     except tomllib.TOMLDecodeError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
     problems = Problems()
-    _look_beside(data, origin)
+    find_files(data, Path(origin).parent)
     study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyError("\n  ".join([head, *problems.lines]))
     return study
-
-
-def _look_beside(data: dict[str, Any], origin: str) -> None:
-    """Arena files that are named without a folder lie beside the study file."""
-    listed = data.get("condition", [])
-    for part in [data, *(listed if isinstance(listed, list) else [])]:
-        arena = part.get("arena") if isinstance(part, dict) else None
-        file = arena.get("file") if isinstance(arena, dict) else None
-        if isinstance(arena, dict) and isinstance(file, str) and Path(origin).is_file():
-            beside = Path(origin).parent / file
-            arena["file"] = str(beside) if beside.is_file() else file
 
 
 def _plain(number: Any) -> Any:
@@ -201,7 +191,26 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
                 f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}"
             )
             values = {**values, "settings": DEFAULT_NEAT}
-    problems.check(SECTIONS[section], values, place)
+    model = SECTIONS[section]
+    if section == "task":
+        try:
+            model = task_model(values)
+        except ValueError as error:
+            problems.add(f"{place}.kind", f"{error}.")
+            return
+        if model is CoverageTask:
+            values = {key: value for key, value in values.items() if key != "kind"}
+    problems.check(model, values, place)
+
+
+def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
+    """A section of a condition over that of the study: key by key, and numbers by name; another task has its own."""
+    if section == "task" and above.get("kind", below.get("kind")) != below.get("kind"):
+        return above
+    merged = {**below, **above}
+    if section == "sim" and isinstance(below.get("set"), dict) and isinstance(above.get("set"), dict):
+        merged["set"] = {**below["set"], **above["set"]}
+    return merged
 
 
 def _condition(
@@ -222,7 +231,7 @@ def _condition(
     note_values = {key: values[key] for key in ConditionNotes.model_fields if key in values}
     notes = problems.check(ConditionNotes, note_values, place)
     merged: dict[str, Any] = {}
-    platform = values.get("platform", "jyro")
+    platform = str(values.get("platform", "jyro")).partition(":")[0]
     for section in SECTIONS:
         if section in PLATFORMS and section in values and platform in PLATFORMS and section != platform:
             problems.add(
@@ -230,8 +239,9 @@ def _condition(
             )
         changed = problems.table(f"{place}.{section}", values.get(section, {}))
         if changed:
-            _check_section(section, changed, f"{place}.{section}", problems)
-        merged[section] = {**base.get(section, {}), **changed}
+            checked = _laid_over(section, base.get(section, {}), changed) if section == "task" else changed
+            _check_section(section, checked, f"{place}.{section}", problems)
+        merged[section] = _laid_over(section, base.get(section, {}), changed)
     merged["neat"] = {"settings": DEFAULT_NEAT, **merged["neat"]}
     if "name" in own:
         problems.check(Condition, own, place)

@@ -159,6 +159,7 @@ class Study(Settings):
                 {
                     "name": condition.name,
                     "label": condition.label,
+                    **({"drawn": list(condition.drawn_names)} if condition.platform == "sim" else {}),
                     "hash": condition.hash(),
                     **notes.model_dump(mode="json"),
                     "settings": condition.settings(),

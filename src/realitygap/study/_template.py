@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from realitygap.evolution import NAMED_SETTINGS
 from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import is_hidden
+from realitygap.world import RobotModel
 
 from ._file import DEFAULT_NEAT, PLATFORMS, SECTIONS
 from ._study import ConditionNotes, ReportSection, StudySection, TrialsSection
@@ -23,7 +24,6 @@ _EXAMPLES = {
     "published_source": "Table 2",
     "baseline": "coverage-10",
     "change": "trials begin in the center",
-    "file": "arena.toml",
 }
 
 
@@ -60,8 +60,8 @@ def study_template(name: str) -> str:
     parts.append(
         _comment(
             "One [[condition]] for each cell of the design. What differs from the sections above goes into "
-            "[condition.arena], [condition.task], [condition.neat], [condition.novelty], and [condition.jyro] or "
-            "[condition.scribbler], whichever its platform is."
+            "[condition.arena], [condition.task], [condition.neat], [condition.novelty], and [condition.jyro], "
+            "[condition.sim] or [condition.scribbler], whichever its platform is."
         )
     )
     own = ["name", "selection", "platform", "noise"]
@@ -109,7 +109,8 @@ def _section(
         if key in written:
             lines.append(f"{key} = {_toml(written[key])}")
         else:
-            default = (defaults or {}).get(key, _EXAMPLES.get(key) if info.default is None else info.default)
+            default = info.get_default(call_default_factory=True, validated_data={})
+            default = (defaults or {}).get(key, default)
             lines.append(f"# {key} = {_toml(default)}")
     return "\n".join(lines)
 
@@ -121,6 +122,8 @@ def _comment(text: str) -> str:
 def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, RobotModel):
+        value = value.name
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     return repr(value)

@@ -7,7 +7,7 @@ from ._goal import GoalTask
 from ._kinds import TASKS, as_task, task_model
 from ._light import LightTask
 from ._mazes import MAZE_TASKS, MazeAgent, MazeTask
-from ._python import PythonTask
+from ._python import PYTHON, PythonTask
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
 from ._wall import WallTask
@@ -15,6 +15,7 @@ from ._wall import WallTask
 __all__ = [
     "CLASSICAL_TASKS",
     "MAZE_TASKS",
+    "PYTHON",
     "TASKS",
     "AvoidTask",
     "ClassicalTask",

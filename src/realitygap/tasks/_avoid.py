@@ -29,6 +29,11 @@ class AvoidTask(Settings):
 
     kind: Literal["avoid"] = Field("avoid", description="Obstacle avoidance.")
     inputs: Inputs = ("range.0", "range.1", "bias")
+    backward: bool = Field(
+        True,
+        description="Whether driving backward counts as driving forward does, as published; going to and fro in one "
+        "place then pays, too. Without it V is the mean of the wheels' speeds, and at least 0.",
+    )
 
     @property
     def name(self) -> str:
@@ -47,5 +52,5 @@ class AvoidTask(Settings):
         ranges = np.array(
             [k for k, name in enumerate(trajectories.sensors) if name.startswith("range.")], np.int64
         )
-        avoid_scores(arrays.commands, arrays.readings, ranges, scores)
+        avoid_scores(arrays.commands, arrays.readings, ranges, self.backward, scores)
         return scores

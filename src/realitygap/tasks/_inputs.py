@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
+
+
+def _as_tuple(names: Any) -> Any:
+    return tuple(names) if isinstance(names, list) else names
+
 
 Inputs = Annotated[
     tuple[str, ...],
+    BeforeValidator(_as_tuple),
     Field(
         min_length=1,
         max_length=256,

@@ -12,7 +12,7 @@ from ._avoid import AvoidTask
 from ._coverage import CoverageTask
 from ._goal import GoalTask
 from ._light import LightTask
-from ._python import PREFIX, PythonTask
+from ._python import PYTHON, PythonTask
 from ._wall import WallTask
 
 TASKS: dict[str, type[Settings]] = {
@@ -32,7 +32,7 @@ def task_model(values: Mapping[str, Any]) -> type[Settings]:
         ValueError: There is no task of this kind.
     """
     kind = values.get("kind", "coverage")
-    if isinstance(kind, str) and kind.startswith(PREFIX):
+    if isinstance(kind, str) and kind.startswith(PYTHON):
         return PythonTask
     if not isinstance(kind, str) or kind not in TASKS:
         raise ValueError(

@@ -20,7 +20,7 @@ from realitygap.world import Arena
 
 from ._trajectories import Trajectories
 
-PREFIX = "python:"
+PYTHON = "python:"
 
 
 class PythonTask(Settings):
@@ -29,7 +29,7 @@ class PythonTask(Settings):
     `kind = "python:FILE.py:function"` names it. The function gets `Trajectories` of n trials and returns n numbers,
     more for what is better. One that Numba compiled (`numba.njit`) gets the kernels' own arrays, `TraceArrays`, the
     length of a step [s] and an array of n numbers to write to: nothing is converted for it. The text of the file is
-    part of the condition: results stay with the function that they were computed with.
+    part of the condition, its folder is not: results stay with the function that they were computed with.
     """
 
     kind: str = Field(
@@ -42,7 +42,12 @@ class PythonTask(Settings):
         description="What networks see, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
         "encoder.K, goal_sector.K, goal_distance, last_move, last_turn.",
     )
-    source: str = Field("", description="The file's text; read from the file where it is empty.")
+    source: str = Field(
+        "",
+        description="The file's text; read from the file where it is empty.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -53,9 +58,10 @@ class PythonTask(Settings):
             values = {**values, "inputs": tuple(values["inputs"])}
         if values.get("source") or str(values.get("kind")).count(":") < 2:
             return values
-        path = Path(str(values["kind"]).removeprefix(PREFIX).rpartition(":")[0])
+        path = Path(str(values["kind"]).removeprefix(PYTHON).rpartition(":")[0])
+        bare = f"{PYTHON}{path.name}:{str(values['kind']).rpartition(':')[2]}"
         try:
-            return {**values, "source": path.read_text("utf-8")}
+            return {**values, "kind": bare, "source": path.read_text("utf-8")}
         except (OSError, UnicodeDecodeError) as error:
             said = getattr(error, "strerror", None) or error
             raise ValueError(f"task file {path} cannot be read: {said}") from None
@@ -81,7 +87,7 @@ class PythonTask(Settings):
     @property
     def file(self) -> str:
         """The file's path as it was given."""
-        return self.kind.removeprefix(PREFIX).rpartition(":")[0]
+        return self.kind.removeprefix(PYTHON).rpartition(":")[0]
 
     @property
     def function_name(self) -> str:

@@ -9,7 +9,10 @@ from ._preflight import Preflight, preflight
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sim import SimTrials
+from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
+from ._sim_world import SimWorld
+from ._sim_world_robot import SimWorldRobot
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -24,8 +27,11 @@ __all__ = [
     "PlatformTrials",
     "Preflight",
     "SceneTrack",
+    "SimRobot",
     "SimScene",
     "SimTrials",
+    "SimWorld",
+    "SimWorldRobot",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",

@@ -16,7 +16,7 @@ from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import Networks
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
 from realitygap.tasks import TraceArrays
-from realitygap.world import Pose
+from realitygap.world import Arena, Pose
 
 REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
@@ -174,6 +174,7 @@ class PlatformTrials(Protocol):
     One of these serves one thread. What it hands out may be written over by the next call.
 
     Attributes:
+        arena: Where, with what the platform's settings say of its numbers; of what is drawn, the centers.
         step_s: How long a step lasts [s].
         n_steps: Of each trial.
         sensors: Names of the readings in a trace.
@@ -181,6 +182,7 @@ class PlatformTrials(Protocol):
         drawn_names: Of the numbers that are drawn for trials, runs or the study.
     """
 
+    arena: Arena
     step_s: float
     n_steps: int
     sensors: tuple[str, ...]

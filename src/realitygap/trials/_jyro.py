@@ -76,13 +76,13 @@ def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
     """Arena, body and sensors in the form that kernels read.
 
     Raises:
-        ValueError: More than 256 cells: a cell is kept as one byte.
+        ValueError: More than 256 cells: a cell is kept as one byte; or the arena is not of straight walls.
     """
     if arena.grid.n_cells > 256:
         raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
     real = REAL[platform.precision]
     start = arena.start
-    walls = np.array(arena.walls, np.float64).reshape(-1, 4) - [start.x, start.y, start.x, start.y]
+    walls = np.array(arena.straight_walls(), np.float64).reshape(-1, 4) - [start.x, start.y, start.x, start.y]
     sensors = np.empty((len(platform.sensors.mounts), 4))
     for k, (forward, left, direction) in enumerate(platform.sensors.mounts):
         sine, cosine = sin_cos(direction) if direction else (0.0, 1.0)
@@ -147,6 +147,7 @@ class JyroTrials:
     def __init__(
         self, platform: JyroPlatform, arena: Arena, rules: NeatRules, *, noise: float, bias_value: float
     ) -> None:
+        self.arena = arena
         self.n_steps = platform.steps
         self.sensors = tuple(f"range.{k}" for k in range(len(platform.sensors.mounts)))
         self.distance_unit = platform.sensor_range

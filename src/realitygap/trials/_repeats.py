@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from realitygap.evolution import Genome
 from realitygap.kernels._philox import MAX_REPEATS
@@ -51,6 +52,8 @@ def retry_genomes(
     n_repeats = len(repeats)
     cells = np.zeros((len(genomes), n_repeats, arena.grid.n_cells), np.uint8)
     counts = np.zeros((3, len(genomes), n_repeats), np.int32)
+    drawn: dict[int, NDArray[np.float64]] = {}
+    names: tuple[str, ...] = ()
     for key in {noise_key.key for noise_key in noise_keys}:
         rows = [row for row, noise_key in enumerate(noise_keys) if noise_key.key == key]
         if not n_repeats:
@@ -62,5 +65,11 @@ def retry_genomes(
         _, tried = try_all(platform, arena, genomes, which, key, counters, inputs=inputs, noise=noise)
         batch = tried.batch
         cells[rows] = batch.cells.reshape(len(rows), n_repeats, -1)
+        drawn |= dict(zip(rows, batch.drawn.reshape(len(rows), n_repeats, -1), strict=True))
+        names = batch.drawn_names
         counts[:, rows] = np.reshape([batch.n_line, batch.n_ends, batch.n_stalls], (3, len(rows), n_repeats))
-    return TrialBatch(cells.reshape(-1, arena.grid.n_cells), *counts.reshape(3, -1))
+    all_drawn = np.concatenate([drawn[row] for row in range(len(genomes))]) if drawn else np.empty((0, 0))
+    n_line, n_ends, n_stalls = counts.reshape(3, -1)
+    return TrialBatch(
+        cells.reshape(-1, arena.grid.n_cells), n_line, n_ends, n_stalls, drawn=all_drawn, drawn_names=names
+    )

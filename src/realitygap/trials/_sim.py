@@ -47,6 +47,7 @@ class SimTrials:
         bias_value: float,
     ) -> None:
         self.scene = sim_scene(platform, arena, inputs, noise)
+        self.arena = self.scene.arena
         self.n_steps = platform.steps
         self.step_s = platform.command_s
         self.sensors = sensor_names(self.scene.shape)

@@ -20,7 +20,7 @@ from realitygap.kernels._sim_shape import (
     sim_table,
     substeps_for,
 )
-from realitygap.robots import SimPlatform
+from realitygap.robots import ARENA, SimPlatform
 from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
 
 from ._batch import REAL
@@ -94,7 +94,13 @@ def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise:
         raise ValueError(f"The arena has {arena.grid.n_cells} reachable cells, expected at most 256.")
     robot = platform.model
     if platform.arena_numbers:
-        arena = arena.with_numbers(platform.arena_numbers)
+        try:
+            arena = arena.with_numbers(platform.arena_numbers)
+        except ValueError as error:
+            lines = [line.removeprefix("ArenaFile").lstrip(".: ") for line in str(error).split("\n")]
+            raise ValueError(
+                "sim.set: " + "; ".join(f"{ARENA}{line.rstrip('.')}" for line in lines)
+            ) from None
     numbers: dict[str, float | Distribution] = {**robot.numbers(), **arena.numbers()}
     if noise > 0:
         numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}
@@ -154,7 +160,6 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
 
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:
-    shadows = any(sensor.shadows for sensor in robot.light)
     return {
         "range_response": [sensor.response for sensor in robot.range],
         "range_rays": [sensor.rays for sensor in robot.range],
@@ -162,8 +167,10 @@ def _sensors(robot: RobotModel) -> dict[str, Any]:
         "range_pulses": [sensor.pulses for sensor in robot.range],
         "encoders": robot.encoder is not None,
         "n_light": len(robot.light),
-        "light_shadows": "dark" if shadows else "none",
+        "light_shadows": robot.shadows,
+        "stall": robot.stall.kind,
         "n_line": len(robot.line),
+        "line_levels": [sensor.level for sensor in robot.line],
         "n_bump": len(robot.bump),
     }
 

@@ -127,16 +127,14 @@ def trace_genomes(
     """Try each of n genomes once and keep every step; arguments and errors as in `try_genomes`."""
     trials, tried = _try_in_order(platform, arena, genomes, noise, noise_key, inputs, trace=True)
     names = paper_inputs(genomes[0].rules) if inputs is None else tuple(inputs)
-    return trajectories_of(trials, tried, arena, names)
+    return trajectories_of(trials, tried, names)
 
 
-def trajectories_of(
-    trials: PlatformTrials, tried: Tried, arena: Arena, network_inputs: tuple[str, ...]
-) -> Trajectories:
+def trajectories_of(trials: PlatformTrials, tried: Tried, network_inputs: tuple[str, ...]) -> Trajectories:
     """Trials as a task sees them."""
     batch = tried.batch
     return Trajectories(
-        arena,
+        trials.arena,
         trials.step_s,
         tried.trace,
         trials.sensors,
@@ -161,7 +159,7 @@ def trace_genome(
     batch, trace = tried.batch, tried.trace
     return Trajectory(
         trials.step_s,
-        poses_of(trace.poses[:, :, 0], arena.start),
+        poses_of(trace.poses[:, :, 0], trials.arena.start),
         tried.distances[:, :, 0].astype(np.float64) * trials.distance_unit,
         trace.inputs[:, :, 0].astype(np.float64),
         trace.commands[:, :, 0].astype(np.float64),

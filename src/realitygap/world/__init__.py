@@ -10,11 +10,11 @@ from ._arena import (
 from ._arena_file import ArenaFile
 from ._case import Case
 from ._distribution import Distribution
-from ._floor import Floor, FloorImage
+from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_robot, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
-from ._pictures import arena_picture, robot_picture
+from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RobotModel
@@ -23,6 +23,7 @@ from ._settings import ArenaSettings
 from ._units import INCH
 
 __all__ = [
+    "BARE_FLOOR",
     "INCH",
     "JYRO_SCRIBBLER",
     "NAMED_STARTS",
@@ -45,10 +46,14 @@ __all__ = [
     "arena_names",
     "arena_picture",
     "check_start",
+    "floor_shapes",
+    "goal_shapes",
     "is_inside",
+    "light_shapes",
     "load_arena",
     "load_robot",
     "model_picture",
+    "obstacle_shapes",
     "paper_arena",
     "robot_names",
     "robot_picture",

@@ -76,6 +76,24 @@ class Arena:
         """(w, 4) walls and the straight sides of obstacles [m]."""
         return (*self.walls, *(edge for obstacle in self.obstacles for edge in obstacle.edges()))
 
+    def straight_walls(self) -> tuple[Segment, ...]:
+        """(w, 4) all that stands in it as straight walls [m], which is all that Jyro knows.
+
+        Raises:
+            ValueError: An obstacle is round, or a number is drawn anew.
+        """
+        round_ones = [str(k) for k, obstacle in enumerate(self.obstacles) if obstacle.radius]
+        if round_ones:
+            raise ValueError(
+                f"arena {self.name!r} has round obstacles ({', '.join(round_ones)}), expected straight walls, which is "
+                "all that Jyro knows. Use platform 'sim'"
+            )
+        if self.vary:
+            raise ValueError(
+                f"in arena {self.name!r} {', '.join(self.vary)} are drawn, expected plain numbers. Use platform 'sim'"
+            )
+        return self.segments
+
     def to_dict(self) -> dict[str, Any]:
         """The arena as plain values; of what may be there, only what is."""
         values: dict[str, Any] = {

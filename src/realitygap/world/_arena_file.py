@@ -22,6 +22,7 @@ from ._units import INCH
 MOST_CELLS = 256
 MOST_WALLS = 2048
 PREFIX = "arena."
+FROM_FILE: dict[str, Any] = {"json_schema_extra": {"hidden": True}}
 
 
 FILE_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": INCH}
@@ -80,7 +81,7 @@ class Row(Settings):
     @model_validator(mode="before")
     @classmethod
     def _is_a_whole_row(cls, values: Any) -> Any:
-        if isinstance(values, list | tuple):  # one of the right length is a table by now
+        if not isinstance(values, Mapping | Settings):  # a list of the right length is a table by now
             raise ValueError(f"expected [{', '.join(cls.model_fields)}]")
         return values
 
@@ -148,9 +149,9 @@ class ImageEntry(Settings):
     y: float = Field(0.0, description="[m].")
     width: float = Field(gt=0, description="How wide it lies there [m]; its pixels are square.")
     file: str = Field("", description="An image file beside the arena file; its brightness counts.")
-    columns: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
-    rows: int = Field(0, ge=0, le=MOST_PIXELS, description="Of pixels; comes from the file.")
-    pixels: str = Field("", description="The pixels themselves; come from the file.")
+    columns: int = Field(ge=1, le=MOST_PIXELS, description="Of pixels; comes from the file.", **FROM_FILE)
+    rows: int = Field(ge=1, le=MOST_PIXELS, description="Of pixels; comes from the file.", **FROM_FILE)
+    pixels: str = Field(description="The pixels themselves; come from the file.", **FROM_FILE)
 
 
 class FloorEntry(Settings):
@@ -170,7 +171,7 @@ class GridEntry(Settings):
     y: float = Field(description="[m].")
     cell: float = Field(gt=0, description="Size of a cell [m].")
     columns: int = Field(ge=1, le=MOST_CELLS, description=f"How many; at most {MOST_CELLS} cells in all.")
-    rows: int = Field(ge=1, le=MOST_CELLS)
+    rows: int = Field(ge=1, le=MOST_CELLS, description="How many.")
 
     @model_validator(mode="after")
     def _has_not_too_many(self) -> Self:

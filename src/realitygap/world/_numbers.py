@@ -66,6 +66,7 @@ class Described(Settings):
     vary: dict[str, Distribution] = Field(
         default_factory=dict,
         description="Which numbers are drawn, by dotted name; a file writes the distribution in the number's place.",
+        json_schema_extra={"hidden": True},
     )
 
     @model_validator(mode="before")
@@ -111,13 +112,11 @@ class Described(Settings):
         tree = self.to_dict()
         vary = tree.pop("vary", {})
         for name, value in values.items():
-            if isinstance(value, Mapping):
-                vary[name] = _distribution(name, value)
-            elif isinstance(value, Distribution):
-                vary[name] = value
-            else:
-                vary.pop(name, None)
-                _set(tree, name.split("."), value)
+            drawn = _distribution(name, value) if isinstance(value, Mapping) else value
+            vary.pop(name, None)
+            if isinstance(drawn, Distribution):
+                vary[name], drawn = drawn, drawn.center
+            _set(tree, name.split("."), drawn)
         return type(self)(**tree, vary=vary)
 
     def to_dict(self) -> dict[str, Any]:

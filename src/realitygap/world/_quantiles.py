@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # their sum is ln 2, after fdlibm
-SMALLEST = 2.0**-53  # a uniform number of 0 is taken as this one: 8.2 standard deviations below the mean
+SMALLEST = (
+    2.0**-33
+)  # uniform numbers count as no nearer to 0 or 1, half a step of 32 random bits: 6.4 deviations
 
 # Numerators and denominators of three rational functions, highest power first. Source: Wichura (1988), AS 241.
 _MIDDLE = (
@@ -124,7 +126,8 @@ def normal_quantile(u: Floats) -> Floats:
     Args:
         u: Any shape, 0 <= u < 1.
 
-    Source: Wichura (1988), Algorithm AS 241 (PPND16). Differs: 0 counts as the smallest number that can be drawn.
+    Source: Wichura (1988), Algorithm AS 241 (PPND16). Differs: nothing lies beyond half a step of 32 random bits from
+    0 and 1, so all numbers are within 6.5 standard deviations.
     """
     u = np.clip(np.asarray(u, dtype=np.float64), SMALLEST, 1 - SMALLEST)
     q = u - 0.5

@@ -109,8 +109,8 @@ class RangeSensor(Settings):
         1,
         ge=1,
         le=63,
-        description="Spread over the cone: 1, or an odd number. linear and table answer to the nearest, ir and pulses to "
-        "the light of all.",
+        description="Spread over the cone: 1, or an odd number. linear and table answer to the nearest, ir and pulses "
+        "to the light of all.",
     )
     response: Literal["linear", "ir", "table", "pulses"] = Field(
         "linear",

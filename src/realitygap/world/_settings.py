@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -35,6 +35,17 @@ class ArenaSettings(Settings):
         description="The arena by name. paper: 42 x 24 in, cells of 3 in, the inner 12 x 6 reachable (section 2.1). "
         "`realitygap show arena` draws it and the others: arena files have the list.",
     )
+    read: dict[str, Any] | None = Field(
+        None,
+        description="The arena as it was read from the file, so that results need no file.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
+    file: str = Field(
+        "",
+        description="In place of a name: a file of your own, TOML or SVG, beside the study file. The results hold the "
+        "arena itself.",
+    )
     start: StartName | Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
         "corner",
         description="Where trials begin: a name, or [x, y, heading] in meters and radians from +x, "
@@ -42,16 +53,6 @@ class ArenaSettings(Settings):
         "junction of cells, which belongs to the upper right one; left: middle of the left side, on a border of "
         "cells, which belongs to the upper one. The paper says only that it is always the same. Names go with the "
         "paper's arena; any other begins where its file says.",
-    )
-    read: dict[str, Any] | None = Field(
-        None,
-        description="The arena as it was read from the file, so that results need no file.",
-        json_schema_extra={"hidden": True},
-        repr=False,
-    )
-    file: str | None = Field(
-        None,
-        description="In place of a name: a file of your own, TOML or SVG. The results hold the arena itself.",
     )
 
     @model_validator(mode="before")
@@ -61,16 +62,16 @@ class ArenaSettings(Settings):
         if not isinstance(values, Mapping):
             return values
         values = dict(values)
-        file, preset = values.get("file"), values.get("preset", "paper")
-        if isinstance(file, str) and values.get("read") is None:
+        file, preset = values.get("file", ""), values.get("preset", "paper")
+        if isinstance(file, str) and file and values.get("read") is None:
             arena = _read(file)
             if arena is not None:
                 values |= {"file": Path(file).name, "read": arena.to_dict()}
-        elif isinstance(file, str):
+        elif values.get("read") is not None:
             arena = Arena.from_dict(values["read"])
         else:
             arena = load_arena(preset) if preset in arena_names() else None
-        if arena is not None and "start" not in values and (file is not None or preset != "paper"):
+        if arena is not None and "start" not in values and (file or preset != "paper"):
             values["start"] = list(arena.start)
         return values
 
@@ -83,44 +84,43 @@ class ArenaSettings(Settings):
 
     @field_validator("file")
     @classmethod
-    def _was_read(cls, file: str | None, info: ValidationInfo) -> str | None:
-        if file is not None and info.data.get("read") is None:
+    def _was_read(cls, file: str, info: ValidationInfo) -> str:
+        if file and info.data.get("read") is None:
             try:
                 load_arena(_as_path(file))
             except DescriptionError as error:
                 raise ValueError(str(error).rstrip(".")) from None
-        if file is not None and info.data.get("preset") != "paper":
+        if file and info.data.get("preset") != "paper":
             raise ValueError("expected preset or file and not both")
         return file
 
-    @model_validator(mode="after")
-    def _begins_inside(self) -> Self:
-        if isinstance(self.start, str):
-            if self.file is not None or self.preset != "paper":
-                raise ValueError(
-                    f"start is {self.start!r}, which goes with the paper's arena. Expected [x, y, heading]"
-                )
-            return self
-        arena = self._without_start()
-        x, y, heading = self.start
+    @field_validator("start")
+    @classmethod
+    def _begins_inside(cls, start: StartName | list[float], info: ValidationInfo) -> StartName | list[float]:
+        if "preset" not in info.data or "file" not in info.data:
+            return start  # what is wrong is said of these
+        arena = _arena_of(info.data["preset"], info.data["read"])
+        if isinstance(start, str):
+            if info.data["read"] is not None or arena.name != "paper":
+                raise ValueError("goes with the paper's arena, expected [x, y, heading]")
+            return start
+        x, y, heading = start
         if enclosing_walls(arena.walls) and not is_inside(arena, x, y):
             xs = [x for wall in arena.walls for x in wall[::2]]
             ys = [y for wall in arena.walls for y in wall[1::2]]
             raise ValueError(
                 f"start lies outside the arena: expected {min(xs):g} < x < {max(xs):g} and {min(ys):g} < y < "
-                f"{max(ys):g} [m], came {self.start}"
+                f"{max(ys):g} [m]"
             )
         if abs(heading) > 2 * math.pi:
-            raise ValueError(f"start: heading is in radians, expected -2 pi to 2 pi, came {heading:g}")
-        return self
+            raise ValueError("heading is in radians, expected -2 pi to 2 pi")
+        return start
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Of an arena by name there is no file: conditions keep the hash that they had before files."""
         values: dict[str, Any] = handler(self)
-        return {
-            key: value for key, value in values.items() if value is not None or key not in ("file", "read")
-        }
+        return {key: value for key, value in values.items() if value or key not in ("file", "read")}
 
     def pose(self) -> Pose:
         """Where trials begin."""
@@ -132,16 +132,18 @@ class ArenaSettings(Settings):
 
     def arena(self) -> Arena:
         """The arena."""
-        if self.file is None and self.preset == "paper":
+        if not self.file and self.preset == "paper":
             return paper_arena(self.pose())
-        arena = self._without_start()
+        arena = _arena_of(self.preset, self.read)
         if arena.start == self.pose():
             return arena  # its start may be drawn
         vary = {name: drawn for name, drawn in arena.vary.items() if not name.startswith("arena.start.")}
         return replace(arena, start=self.pose(), vary=vary)
 
-    def _without_start(self) -> Arena:
-        return Arena.from_dict(self.read) if self.read is not None else load_arena(self.preset)
+
+def _arena_of(preset: str, read: Mapping[str, Any] | None) -> Arena:
+    """The arena as it was read, or that of the name."""
+    return Arena.from_dict(dict(read)) if read is not None else load_arena(preset)
 
 
 def _read(file: str) -> Arena | None:

@@ -1,0 +1,79 @@
+"""The best fitness of each run by another task than coverage, and how far evolution brought it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap.records import ResultsFolder
+from realitygap.report._statistics import median_interval, quartiles
+from realitygap.report._tally import label_of, settings_of
+
+_COLUMNS = ["replicate", "generation", "task_fitness"]
+
+TASK_SCHEMA = pl.Schema(
+    {
+        "condition": pl.String(),
+        "label": pl.String(),
+        "task": pl.String(),
+        "n": pl.UInt32(),
+        **{name: pl.Float64() for name in ("first", "last", "median", "q25", "q75", "low", "high")},
+    }
+)
+
+
+def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
+    """One row per condition of another task than coverage, on the best fitness of each run by it.
+
+    Args:
+        folder: the results of a study, or the path to them. They are read chunk by chunk.
+
+    Returns:
+        Columns `condition`; `label`, such as SIM; `task`, its kind; `n`, the number of runs; `first` and `last`, the
+        median of the best in the first and in the last generation; then of the best of the whole run `median`, the
+        quartiles `q25` and `q75`, and the bounds `low` and `high` of the median's 95 % interval. Null where there
+        are no runs, or too few for an interval (below 6). No rows where all conditions are of coverage.
+
+    Raises:
+        RecordError: there is no such folder, or a file in it is damaged.
+    """
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    rows: list[dict[str, Any]] = []
+    for condition in folder.description["conditions"]:
+        task = settings_of(condition).get("task", {}).get("kind", "coverage")
+        if task == "coverage":
+            continue
+        best = _bests(folder, condition["name"])
+        row = {"condition": condition["name"], "label": label_of(condition), "task": task, "n": len(best)}
+        rows.append(row | _described(best) if len(best) else row)
+    return pl.DataFrame(rows, schema=TASK_SCHEMA)
+
+
+def _bests(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
+    """(n, g) best fitness by the task in each generation of each run."""
+    parts = [
+        frame.group_by("replicate", "generation", maintain_order=True).agg(pl.col("task_fitness").max())
+        for frame in folder.frames(condition, _COLUMNS)
+    ]
+    if not parts:
+        return np.empty((0, 0))
+    best = pl.concat(parts).sort("replicate", "generation")
+    return best["task_fitness"].to_numpy().reshape(best["replicate"].n_unique(), -1)
+
+
+def _described(best: npt.NDArray[np.float64]) -> dict[str, float | None]:
+    of_runs = best.max(axis=1)
+    middle, interval = quartiles(of_runs), median_interval(of_runs)
+    return {
+        "first": float(np.median(best[:, 0])),
+        "last": float(np.median(best[:, -1])),
+        "median": middle.median,
+        "q25": middle.q25,
+        "q75": middle.q75,
+        "low": None if interval is None else interval.low,
+        "high": None if interval is None else interval.high,
+    }

@@ -47,12 +47,12 @@ def avoid_scores(commands, readings, ranges, backward, scores):
 
 
 @inlined
-def _nearest_of(x, y, places):
-    """Distance to the nearest of places (k, 2)."""
+def _nearest_of(x, y, places, trial):
+    """Distance to the nearest of the places (n, k, 2) of a trial."""
     nearest = math.inf
-    for k in range(places.shape[0]):
-        dx = x - places[k, 0]
-        dy = y - places[k, 1]
+    for k in range(places.shape[1]):
+        dx = x - places[trial, k, 0]
+        dy = y - places[trial, k, 1]
         nearest = min(nearest, dx * dx + dy * dy)
     return math.sqrt(nearest)
 
@@ -67,30 +67,31 @@ def nearness_scores(poses, stalled, places, scores):
     Args:
         poses: (t + 1, 3, n) from the start.
         stalled: (t + 1, n).
-        places: (k, 2) float64 from the start, none of them there.
+        places: (n, k, 2) float64 from the origin of the poses; a trial that starts at one is worth 0.
         scores: (n,) float64, written: 0..1.
     """
     n_steps, n = poses.shape[0] - 1, poses.shape[2]
     for trial in range(n):
         total = 0.0
         blocked = 0
-        first = _nearest_of(float(poses[0, 0, trial]), float(poses[0, 1, trial]), places)
+        first = _nearest_of(float(poses[0, 0, trial]), float(poses[0, 1, trial]), places, trial)
         for step in range(1, n_steps + 1):
-            away = _nearest_of(float(poses[step, 0, trial]), float(poses[step, 1, trial]), places)
-            total += max(0.0, 1.0 - away / first)
+            away = _nearest_of(float(poses[step, 0, trial]), float(poses[step, 1, trial]), places, trial)
+            if away < first:
+                total += 1.0 - away / first
             blocked += 1 if stalled[step, trial] else 0
         steps = max(n_steps, 1)
         scores[trial] = total / steps * (1.0 - blocked / steps)
 
 
 @kernel
-def goal_scores(poses, goal_x, goal_y, radius, scores):
+def goal_scores(poses, goals, radii, scores):
     """How much of the way to a goal was made good at the end: 1 - d / d0, or 1 where it was reached at any step.
 
     Args:
         poses: (t + 1, 3, n) from the start.
-        goal_x, goal_y: From the start, not there.
-        radius: Nearer than this is there.
+        goals: (n, 2) float64, of each trial, from the origin of the poses.
+        radii: (n,) float64, nearer than this is there, above 0.
         scores: (n,) float64, written: at most 1, below 0 where the robot went away from it.
     """
     n_steps, n = poses.shape[0] - 1, poses.shape[2]
@@ -99,12 +100,12 @@ def goal_scores(poses, goal_x, goal_y, radius, scores):
         first = 0.0
         away = 0.0
         for step in range(n_steps + 1):
-            dx = float(poses[step, 0, trial]) - goal_x
-            dy = float(poses[step, 1, trial]) - goal_y
+            dx = float(poses[step, 0, trial]) - goals[trial, 0]
+            dy = float(poses[step, 1, trial]) - goals[trial, 1]
             away = math.sqrt(dx * dx + dy * dy)
             if step == 0:
                 first = away
-            reached = reached or away < radius
+            reached = reached or away < radii[trial]
         scores[trial] = 1.0 if reached else 1.0 - away / first
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ._compile import kernel, stage
 from ._lanes import LANES, copy_row, fill
-from ._marks import count_cells, list_fresh, mark_ends, mark_line, place_line
+from ._marks import count_cells, list_cells, list_fresh, mark_ends, mark_line, place_line
 from ._sim_contact import settle
 from ._sim_drive import drive, take_commands
 from ._sim_encoders import as_input
@@ -170,7 +170,9 @@ def _run_block(shape, table, rules, neat, key, counters, first, n_lanes, room, c
 
 
 @kernel
-def run_sim_trials(shape, table, rules, neat, networks, which, key, counters, room, cells, counts, trace):
+def run_sim_trials(
+    shape, table, rules, neat, networks, which, key, counters, room, cells, ends, ended, counts, trace
+):
     """Carry out n trials, a block after the other.
 
     Args:
@@ -183,6 +185,8 @@ def run_sim_trials(shape, table, rules, neat, networks, which, key, counters, ro
         counters: (n, 3) uint32, the fixed words of each trial's random numbers, with the purpose NOISE.
         room: `SimRoom`.
         cells: (n, c) uint8, written: cells visited along the line, in order of first visit.
+        ends: (n, c) uint8, written: cells at the ends of steps, in ascending order; (0, c) keeps none.
+        ended: (n, 2) float64, written: where trials ended [m from the origin of the table].
         counts: (n, 3) int32, written: cells along the line, cells at the ends of steps (the start counts for
             both), stalled steps.
         trace: `SimTrace`; arrays of no rows keep nothing.
@@ -191,6 +195,12 @@ def run_sim_trials(shape, table, rules, neat, networks, which, key, counters, ro
         n_lanes = min(LANES, which.size - first)
         wire(networks, which, first, n_lanes, neat, room.wiring)
         _run_block(shape, table, rules, neat, key, counters, first, n_lanes, room, cells, counts, trace)
+        lanes = room.lanes
+        for lane in range(n_lanes):
+            ended[first + lane, 0] = lanes.pose.x[lane]
+            ended[first + lane, 1] = lanes.pose.y[lane]
+            if ends.shape[0] > 0:
+                list_cells(lanes.ends, lane, shape.columns, shape.rows, ends[first + lane])
 
 
 @kernel

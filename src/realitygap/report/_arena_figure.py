@@ -47,7 +47,7 @@ def draw_tally_arena(
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
     robot = resolved.tried_on.picture()
-    picture = arena_picture(resolved.arena.arena(), resolved.tried_on.body, resolved.tried_on.sensors)
+    picture = arena_picture(resolved.placed_arena, resolved.tried_on.body, resolved.tried_on.sensors)
     alt = f"{picture.description} {robot.description}"
     caption = _caption(tally, resolved, described)
     drawings = []

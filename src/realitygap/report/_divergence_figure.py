@@ -193,7 +193,9 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
             noise_key=replace(key, repeat=repeat),
             inputs=trial.condition.network_inputs,
         )
-        trials.append(in_motion(trajectory, arena, on.simulated_on, title=name, label=on.label))
+        trials.append(
+            in_motion(trajectory, on.arena_of(trajectory), on.simulated_on, title=name, label=on.label)
+        )
     return Side(name, tuple(trials))
 
 

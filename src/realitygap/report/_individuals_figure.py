@@ -121,7 +121,7 @@ def draw_tally_individuals(
         )
         + "."
     )
-    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
+    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):
@@ -194,7 +194,7 @@ def draw_tally_better(
             f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
         )
     )
-    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
+    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):

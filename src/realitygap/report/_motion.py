@@ -170,9 +170,10 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     if trial.condition.is_physical:
         return _driven(tally, trial, title)
     condition = trial.condition
+    trajectory = replay(condition, trial.row)
     return in_motion(
-        replay(condition, trial.row),
-        condition.arena.arena(),
+        trajectory,
+        condition.arena_of(trajectory),
         condition.simulated_on,
         title=title,
         label=condition.label,

@@ -109,7 +109,7 @@ def draw_tally_paths(
         + ", ".join(f"generation {path.generation} {path.coverage:.3f}" for path in paths)
         + "."
     )
-    arena, body, label = resolved.arena.arena(), resolved.tried_on.body, label_of(described)
+    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
     drawings = []
     with house_style():
         for index, width in enumerate(widths):

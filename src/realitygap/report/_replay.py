@@ -156,7 +156,7 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
 
 def _scene(condition: Condition) -> dict[str, Any]:
     """Where and with what body and sensors; lengths in meters."""
-    arena, platform = condition.arena.arena(), condition.simulated_on
+    arena, platform = condition.placed_arena, condition.simulated_on
     grid, mounts = arena.grid, platform.sensors.mounts
     return {
         "walls": [list(wall) for wall in arena.walls],

@@ -187,7 +187,7 @@ def _traced(trial: ChosenTrial, trajectory: Trajectory) -> TracedPath:
 
 
 def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
-    arena = trial.condition.arena.arena()
+    arena = trial.condition.arena_of(trajectory)
     x_range, y_range = arena_extent(arena)
     across = 0.56 * _WIDTH
     up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, model_validator
@@ -16,7 +18,7 @@ from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask, Task, as_task
-from realitygap.trials import sim_scene
+from realitygap.trials import Trajectory, paper_inputs, sim_scene
 from realitygap.world import Arena, ArenaSettings, check_start
 
 # A condition's name is part of file names.
@@ -144,17 +146,24 @@ class Condition(Settings):
         return self
 
     @model_validator(mode="after")
-    def _robot_fits_at_start(self) -> Self:
-        arena = self.arena.arena()
-        if self.platform == "jyro":
-            arena.straight_walls()  # which says where there are none
-        check_start(arena, self.sim.model if self.platform == "sim" else self.tried_on.body)
-        return self
-
-    @model_validator(mode="after")
     def _robot_and_arena_have_what_networks_see(self) -> Self:
         if self.platform == "sim":
             sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise)
+        elif self.coverage is None and self.network_inputs != paper_inputs(self.neat_rules):
+            raise ValueError(
+                f"the networks of task {self.fitness_task.name!r} see {', '.join(self.network_inputs)}, expected "
+                f"{', '.join(paper_inputs(self.neat_rules))} on platform 'jyro', the paper's simulation. Choose "
+                "platform 'sim', or give the task these inputs."
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _robot_fits_at_start(self) -> Self:
+        if self.platform == "jyro":
+            self.arena.arena().straight_walls()  # which says where there are none
+        robot = self.sim.model if self.platform == "sim" else self.tried_on.body
+        for arena in _at_the_ends(self.placed_arena):
+            check_start(arena, robot)
         return self
 
     @model_validator(mode="after")
@@ -217,6 +226,12 @@ class Condition(Settings):
         arena = self.arena.arena()
         changed = self.sim.arena_numbers if self.platform == "sim" else {}
         return arena.with_numbers(changed) if changed else arena
+
+    def arena_of(self, trial: Trajectory) -> Arena:
+        """Its arena with what was drawn for a trial."""
+        drawn = dict(zip(trial.drawn_names, trial.drawn, strict=True))
+        changed = {name: value for name, value in drawn.items() if name.startswith("arena.")}
+        return self.placed_arena.with_numbers(changed) if changed else self.placed_arena
 
     @property
     def records_behavior(self) -> bool:
@@ -286,6 +301,17 @@ class Condition(Settings):
                 f"({' '.join(lines[:3])}{more}). Use the version that ran the study."
             )
         return condition
+
+
+def _at_the_ends(arena: Arena) -> Iterator[Arena]:
+    """The arena with its start at each end of what is drawn of its place; as it is where nothing is."""
+    axes = [arena.vary.get(f"arena.start.{axis}") for axis in "xy"]
+    ends = [
+        (at,) if drawn is None else (drawn.lowest, drawn.highest)
+        for at, drawn in zip(arena.start, axes, strict=False)
+    ]
+    for x, y in itertools.product(*ends):
+        yield replace(arena, start=arena.start._replace(x=x, y=y))
 
 
 def _missing(given: Mapping[str, Any], full: Mapping[str, Any], place: str = "") -> Iterator[str]:

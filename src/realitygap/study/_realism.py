@@ -134,6 +134,8 @@ class RealisticTrials:
         self.counters = np.zeros((N_TRIALS, 3), np.uint32)
         self.counters[:, 0] = np.arange(N_TRIALS) << 8 | 1
         self.cells = np.zeros((N_TRIALS, grid.n_cells), np.uint8)
+        self.no_ends = np.zeros((0, grid.n_cells), np.uint8)
+        self.ended = np.zeros((N_TRIALS, 2))
         self.counts = np.zeros((N_TRIALS, 3), np.int32)
         self.room = make_sim_room(self.shape, self.neat, 0, np.float32)
         self.trace = make_sim_trace(self.shape, 4, -1, 1, np.float32)
@@ -151,6 +153,8 @@ class RealisticTrials:
             self.counters,
             self.room,
             self.cells,
+            self.no_ends,
+            self.ended,
             self.counts,
             self.trace,
         )

@@ -21,8 +21,8 @@ class GoalTask(Settings):
     """How much of the way to the arena's goal was made good at the end: 1 - d / d0, or 1 where it was reached.
 
     d is the straight distance from the goal at the end and d0 that at the start, whatever walls stand between; reached
-    is nearer than the goal's radius at the end of any step. With `selection = "novelty"` and the distance `final` the
-    same trials are rewarded for ending where none did.
+    is nearer than the goal's radius at the start or the end of any step. With `selection = "novelty"` and the distance
+    `final` the same trials are rewarded for ending where none did.
 
     Source: Lehman & Stanley (2011), section 4. Differs: a part of the first distance, and 1 once it was reached.
     """
@@ -59,11 +59,15 @@ class GoalTask(Settings):
                 f"Task 'goal' wants a goal, and arena {arena.name!r} has none. Choose another arena, such as 'goal', "
                 "or put a [goal] into its file."
             )
-        x, y = arena.goal.x - arena.start.x, arena.goal.y - arena.start.y
-        if np.hypot(x, y) <= arena.goal.radius:
+        x, y, radii = (
+            trajectories.number(f"arena.goal.{name}", getattr(arena.goal, name))
+            for name in ("x", "y", "radius")
+        )
+        goals = np.stack([x - arena.start.x, y - arena.start.y], axis=1)
+        if np.hypot(arena.goal.x - arena.start.x, arena.goal.y - arena.start.y) <= arena.goal.radius:
             raise TaskError(
                 f"Trials in arena {arena.name!r} start at its goal, expected one to be reached. Move the start."
             )
         scores = np.empty(len(trajectories))
-        goal_scores(trajectories.arrays.poses, x, y, float(arena.goal.radius), scores)
+        goal_scores(trajectories.arrays.poses, goals, radii, scores)
         return scores

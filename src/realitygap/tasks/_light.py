@@ -46,14 +46,16 @@ class LightTask(Settings):
         Raises:
             TaskError: The arena has no light, or one at the start.
         """
-        places = np.array([(light.x, light.y) for light in arena.lights]).reshape(-1, 2)
-        places -= (arena.start.x, arena.start.y)
-        if not len(places):
+        places = np.empty((len(trajectories), len(arena.lights), 2))
+        for k, light in enumerate(arena.lights):
+            places[:, k, 0] = trajectories.number(f"arena.light.{k}.x", light.x) - arena.start.x
+            places[:, k, 1] = trajectories.number(f"arena.light.{k}.y", light.y) - arena.start.y
+        if not arena.lights:
             raise TaskError(
                 f"Task 'light' wants a light, and arena {arena.name!r} has none. Choose another arena, such as "
                 "'light', or put a [[light]] into its file."
             )
-        if not np.hypot(*places.T).all():
+        if any((light.x, light.y) == (arena.start.x, arena.start.y) for light in arena.lights):
             raise TaskError(
                 f"A light of arena {arena.name!r} is where trials start, expected one to be sought. Move the start or "
                 "the light."

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -46,6 +47,7 @@ class Trajectories:
         network_inputs: (i,) names of what the networks saw.
         coverage_line, coverage_ends: (n,) visited share of the reachable cells, 0..1.
         n_stalls: (n,) blocked steps.
+        drawn: (n,) what was drawn for each trial, by dotted name; `arena` has the centers of these.
     """
 
     arena: Arena
@@ -56,10 +58,15 @@ class Trajectories:
     coverage_line: NDArray[np.float64]
     coverage_ends: NDArray[np.float64]
     n_stalls: NDArray[np.int32]
+    drawn: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """How many trials."""
         return int(self.arrays.stalled.shape[1])
+
+    def number(self, name: str, value: float) -> NDArray[np.float64]:
+        """(n,) a number of each trial: what was drawn for it, or the value where it is not drawn."""
+        return self.drawn[name] if name in self.drawn else np.full(len(self), float(value))
 
     @property
     def n_steps(self) -> int:

@@ -49,8 +49,14 @@ class WallTask(Settings):
         """(n,) [m], below 0 where the robot went the wrong way round.
 
         Raises:
-            TaskError: The arena has neither walls nor obstacles.
+            TaskError: The arena has neither walls nor obstacles, or they are drawn.
         """
+        drawn = [name for name in trajectories.drawn if name.startswith(("arena.wall.", "arena.obstacle."))]
+        if drawn:
+            raise TaskError(
+                f"Task 'wall' wants walls and obstacles at one place in all trials, and {drawn[0]} is drawn. Set it to "
+                "a number."
+            )
         walls = outlines(arena)
         if not len(walls):
             raise TaskError(

@@ -1,6 +1,14 @@
 """One controller on one robot, or a population on a platform."""
 
-from ._batch import NoiseKey, PlatformTrials, Trajectory, TrialBatch, counters_of, poses_of
+from ._batch import (
+    NoiseKey,
+    PlatformTrials,
+    Trajectory,
+    TrialBatch,
+    counters_of,
+    paper_inputs,
+    poses_of,
+)
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
@@ -43,6 +51,7 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "open_trials",
+    "paper_inputs",
     "poses_of",
     "preflight",
     "retry_genomes",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import Networks
-from realitygap.kernels._sim_batch import run_sim_batch
+from realitygap.kernels._sim import run_sim_trials
 from realitygap.kernels._sim_lanes import SimRules, SimTrace, make_sim_room, make_sim_trace
 from realitygap.kernels._sim_shape import SimShape
 from realitygap.robots import SimPlatform
@@ -84,7 +84,7 @@ class SimTrials:
         end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
         ended = np.zeros((n, 2))
         counts = np.zeros((n, 3), np.int32)
-        run_sim_batch(
+        run_sim_trials(
             self.scene.shape,
             self._table_of(drawn),
             self._sim_rules,

@@ -98,11 +98,16 @@ def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise:
             arena = arena.with_numbers(platform.arena_numbers)
         except ValueError as error:
             lines = [line.removeprefix("ArenaFile").lstrip(".: ") for line in str(error).split("\n")]
-            raise ValueError(
-                "sim.set: " + "; ".join(f"{ARENA}{line.rstrip('.')}" for line in lines)
-            ) from None
+            said = [f"{ARENA}{line.rstrip('.')}".replace("mean '", f"mean '{ARENA}") for line in lines]
+            raise ValueError("sim.set: " + "; ".join(said)) from None
     numbers: dict[str, float | Distribution] = {**robot.numbers(), **arena.numbers()}
     if noise > 0:
+        for k in range(len(robot.range)):
+            if highest(numbers[f"range.{k}.noise_uniform"]) > 0:
+                raise ValueError(
+                    f"noise is {noise:g}, and the robot has range.{k}.noise_uniform of its own, the same kind "
+                    "of noise. Leave one of them out."
+                )
         numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}
     shape = make_sim_shape(
         **_body_and_drive(robot, numbers, platform.command_s),
@@ -126,6 +131,12 @@ def highest(value: float | Distribution) -> float:
     return value.highest if isinstance(value, Distribution) else value
 
 
+# A delay is a queue of commands for each robot.
+MOST_DELAY_STEPS = 1000
+
+N_SECTORS = 4
+"""Pie slices around a robot of which it knows whether the goal is in them."""
+
 _DRAWN_IN_STEPS = (
     "delay_jitter",
     "travel_noise_per_m",
@@ -137,6 +148,11 @@ _DRAWN_IN_STEPS = (
 
 def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
     latest = highest(numbers["drive.delay"]) + highest(numbers["drive.delay_jitter"])
+    if latest > MOST_DELAY_STEPS * step_s:
+        raise ValueError(
+            f"drive.delay and drive.delay_jitter come to {latest:g} s, expected at most {MOST_DELAY_STEPS} steps of "
+            f"{step_s:g} s."
+        )
     drive = robot.drive
     return {
         "parts": [len(part.corner) for part in robot.body],
@@ -249,6 +265,8 @@ def _input(name: str, robot: RobotModel, arena: Arena) -> tuple[str, int]:
         raise ValueError(
             f"A network is to see {name}, and robot {robot.name!r} has encoder.0 and .1 or none."
         )
+    if kind == "goal_sector" and int(index) >= N_SECTORS:
+        raise ValueError(f"A network is to see {name}, and there are goal_sector.0 to .{N_SECTORS - 1}.")
     if kind.startswith("goal") and arena.goal is None:
         raise ValueError(f"A network is to see {name}, and arena {arena.name!r} has no goal.")
     if kind == "obstacle" and not robot.range:

@@ -142,6 +142,7 @@ def trajectories_of(trials: PlatformTrials, tried: Tried, network_inputs: tuple[
         batch.coverage_line,
         batch.coverage_ends,
         batch.n_stalls,
+        dict(zip(batch.drawn_names, np.ascontiguousarray(batch.drawn.T), strict=True)),
     )
 
 

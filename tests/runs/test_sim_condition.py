@@ -1,0 +1,49 @@
+"""What a condition on `sim` refuses, and where its figures draw things."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from realitygap.runs import Condition
+from realitygap.trials import Trajectory
+from realitygap.world import Distribution
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"sim": {"set": {"arena.start.x": 0.0}}}, "the robot does not fit at the start"),
+        ({"sim": {"set": {"arena.start.x": {"uniform": [0.0, 0.4]}}}}, "does not fit at the start"),
+        ({"sim": {"set": {"drive.delay": 1e9}}}, "expected at most 1000 steps"),
+        ({"sim": {"set": {"arena.goal.x": 1.0}}}, "Did you mean 'arena."),
+        ({"noise": 0.3, "sim": {"set": {"range.0.noise_uniform": 0.1}}}, "Leave one of them out"),
+        (
+            {"arena": {"preset": "goal"}, "task": {"kind": "goal", "inputs": ["goal_sector.4"]}},
+            "there are goal_sector.0 to .3",
+        ),
+        ({"platform": "jyro", "task": {"kind": "avoid"}}, "Choose platform 'sim'"),
+    ],
+)
+def test_a_mistake_is_said(values: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said.replace(".", r"\.")):
+        Condition.model_validate({"name": "a", "platform": "sim", **values})
+
+
+def test_figures_of_a_trial_show_the_arena_that_was_drawn_for_it() -> None:
+    name = "arena.obstacle.0.x"
+    values: dict[str, Any] = {
+        "name": "a",
+        "platform": "sim",
+        "arena": {"preset": "paper-boxes"},
+    }
+    still = Condition.model_validate(values)
+    x = still.placed_arena.obstacles[0].x
+    near = Distribution(uniform=(x - 0.01, x + 0.03))
+    condition = Condition.model_validate({**values, "sim": {"set": {name: near}}})
+    assert condition.placed_arena.obstacles[0].x == pytest.approx(x + 0.01)
+    nothing: Any = None
+    trial = Trajectory(0.5, *[nothing] * 5, 0.0, 0.0, (), drawn=(x + 0.02,), drawn_names=(name,))
+    assert condition.arena_of(trial).obstacles[0].x == x + 0.02

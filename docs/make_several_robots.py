@@ -1,4 +1,4 @@
-"""The picture of the page “Several robots in one world”, drawn by the page's own code.
+"""The pictures of the page “Several robots in one world”, drawn by the page's own code.
 
 uv run python docs/make_several_robots.py
 """
@@ -13,7 +13,7 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 PAGE = DOCS / "how-to" / "several-robots.md"
 IMAGES = DOCS / "images"
-PICTURES = ("several-robots.svg",)
+PICTURES = ("several-robots.svg", "several-sim-robots.svg")
 
 
 def make() -> dict[str, str]:

@@ -17,6 +17,7 @@ from realitygap.records import column_table, derived_table
 from realitygap.records._derived import DERIVED
 from realitygap.report import audit_distance
 from realitygap.robots import JyroPlatform
+from realitygap.settings import is_hidden
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import CoverageTask
 from realitygap.world import ArenaSettings
@@ -61,6 +62,8 @@ def test_examples_of_a_page_run_and_print_what_it_shows(path):
 def test_every_setting_is_in_the_reference_with_a_description(model):
     page = reference_pages.settings_page()
     for name, info in model.model_fields.items():
+        if is_hidden(info):
+            continue
         assert info.description, name
         assert f"`{name}`\n: " in page
         assert reference_pages.escape(info.description) in page
@@ -332,7 +335,9 @@ def test_what_the_page_of_distances_says_is_what_the_numbers_say():
         assert coverage[name][-1].startswith("not shown"), name
     for name in ("jaccard", "alignment", "final", "random"):
         assert coverage[name][-1] == f"paper above {name}"
-    assert _number(coverage["random"][1]) < min(_number(coverage[name][1]) for name in ("jaccard", "alignment"))
+    assert _number(coverage["random"][1]) < min(
+        _number(coverage[name][1]) for name in ("jaccard", "alignment")
+    )
     _, behaviors = _distance_rows("behaviors")
     novelty = {name: _number(row[6]) for name, row in behaviors.items() if row[6]}
     for name in ("jaccard", "alignment"):

@@ -25,7 +25,13 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("gallery")
 
 
-@pytest.mark.parametrize("name", gallery.names())
+LONG = {"light_seeking", "maze"}
+"""Examples that evolve for tens of thousands of trials."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in gallery.names()]
+)
 def test_an_example_runs_and_draws_the_picture_of_the_page(name, folder, tmp_path):
     picture = tmp_path / gallery.picture_name(name)
     gallery.run(name, picture, folder)

@@ -51,4 +51,4 @@ axes.set_title(
 )
 axes.spines[["top", "right"]].set_visible(False)
 axes.legend(frameon=False)
-figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "noise.svg", metadata={"Date": None})
+figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "noise.png", dpi=130)

@@ -60,7 +60,9 @@ def show(*words):
         ["divergence", "DIR", "--against", "novelty-50", "--repeats", "3"],
         ["arena"],
         ["arena", "paper"],
+        ["arena", "light", "--robot", "khepera"],
         ["robot", "jyro"],
+        ["robot", "scribbler-s2-fluke2-cardboard"],
     ],
     ids=" ".join,
 )
@@ -201,6 +203,8 @@ def test_mistakes_in_python_are_told_too(results, tmp_path):
         (["network", "DIR", "DIR", "-o", "a.svg"], "Only a movie shows several"),
         (["arena", "papr", "-o", "a.svg"], "Did you mean 'paper'?"),
         (["robot", "r2d2", "-o", "a.svg"], "Known: e-puck, jyro, khepera"),
+        (["robot", "jyro", "--robot", "khepera", "-o", "a.svg"], "Of no meaning for robot: --robot"),
+        (["arena", "none.svg", "-o", "a.svg"], "There is no arena file none.svg"),
         (["arena", "--condition", "x", "-o", "a.svg"], "Of no meaning for arena: --condition"),
         (["nowhere", "-o", "a.svg"], "nowhere does not exist"),
         (["DIR", "--replicate", "9" * 20, "-o", "a.svg"], f"has no run {'9' * 20} in"),

@@ -28,9 +28,9 @@ def random_words(rng: np.random.Generator, n: int) -> NDArray[np.uint32]:
     return rng.integers(0, 2**32, (n, LANES), dtype=np.uint32)
 
 
-def unit_of(words: NDArray[np.uint32]) -> NDArray[np.float64]:
-    """The number in (0, 1) that 23 bits of each word are."""
-    return ((words >> np.uint32(9)).astype(np.float64) + 0.5) / 2**23
+def unit_of(words: NDArray[np.uint32], bits: int = 23) -> NDArray[np.float64]:
+    """The number in (0, 1) that the upper bits of each word are."""
+    return ((words >> np.uint32(32 - bits)).astype(np.float64) + 0.5) / 2**bits
 
 
 def poses(x: Any, y: Any, heading: Any, real: Any) -> Poses:

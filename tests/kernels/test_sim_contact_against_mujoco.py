@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from realitygap.evolution import NeatSettings
 from realitygap.kernels._lanes import LANES
 from realitygap.kernels._sim import start_sim, step_sim
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room
 from realitygap.kernels._sim_shape import make_sim_shape, sim_table
-from realitygap.evolution import NeatSettings
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'realitygap[twin]'")
 
-from tests.reference.pushed_body import Push, PushedBody  # noqa: E402
+from tests.reference.pushed_body import Push, PushedBody
 
 CORNERS = [(0.079, -0.05), (0.079, 0.05), (0.06, 0.0695), (-0.06, 0.0695),
            (-0.079, 0.05), (-0.079, -0.05), (-0.06, -0.0695), (0.06, -0.0695)]  # fmt: skip

@@ -49,7 +49,7 @@ def test_each_reading_is_what_its_words_say_with_other_numbers_in_each_lane(real
         outlier = rng.uniform(0, 1, LANES), rng.uniform(0, 0.4, LANES), -rng.uniform(0.01, 0.1, LANES)
         words = random_words(rng, 2)
         answer = mix(readings, near, words, drop, outlier, real)
-        choice, value = unit_of(words)
+        choice, value = unit_of(words[0], 21), unit_of(words[1])
         for lane in range(LANES):
             nothing = reference.logistic(near[lane], *(one[lane] for one in drop))
             anything = reference.logistic(near[lane], *(one[lane] for one in outlier))
@@ -184,3 +184,24 @@ def test_more_dropouts_with_distance_make_a_mean_that_falls_with_it() -> None:
         for near in np.linspace(0, 0.4, 41)
     ]
     assert (np.diff(means) <= 0).all()
+
+
+def test_the_second_word_is_independent_of_the_choice_and_keeps_complements() -> None:
+    """21 bits that the choice does not use: uniform and uncorrelated with it, four standard errors, 1 in 5,000."""
+    rng = np.random.default_rng(7)
+    chosen, seconds = [], []
+    for place in (0, 1, 2):
+        for _ in range(cases(300, 10)):
+            word, spare = random_words(rng, 2)
+            value, opposite = np.zeros((2, LANES), np.uint32)
+            _sim_noise.second_word(word, spare, np.int64(place), value)
+            _sim_noise.second_word(~word, ~spare, np.int64(place), opposite)
+            assert (opposite == ~value).all()
+            assert (value >> 21 == word & 0x7FF).all()
+            assert (value >> 11 & 0x3FF == spare >> 10 * place & 0x3FF).all()
+            chosen.append(unit_of(word, 21))
+            seconds.append(unit_of(value, 21))
+    a, b = np.concatenate(chosen), np.concatenate(seconds)
+    assert b.mean() == pytest.approx(0.5, abs=4 * np.sqrt(1 / 12 / b.size))
+    assert b.var() == pytest.approx(1 / 12, abs=4 * np.sqrt(1 / 180 / b.size))
+    assert np.corrcoef(a, b)[0, 1] == pytest.approx(0, abs=4 / np.sqrt(b.size))

@@ -113,8 +113,12 @@ class Plain:
     def normal(self, purpose: int, block: int, n: int) -> float:
         return float(normal(np.uint32(self.word(purpose, block, n)), 0.0))
 
-    def unit(self, n: int) -> float:
-        return ((self.word(7, 2 * self.step, n) >> 9) + 0.5) / 2**23
+    def mixture_words(self, s: int) -> tuple[int, int]:
+        """Three sensors share four words: 21 bits to choose by, and 21 more."""
+        blocks, place = -(-len(RESPONSES) // 3), s % 3
+        first, spare = (self.word(7, self.step * blocks + s // 3, n) for n in (place, 3))
+        left, more = first & 0x7FF, spare >> 10 * place & 0x3FF
+        return first, left << 21 | more << 11 | left
 
     def range(self, s: int, rays: Any) -> float:
         kind = RESPONSES[s]
@@ -145,8 +149,10 @@ class Plain:
             ]
             reading = reference.pulses(reading, 10, nothing, shared, fates)
         else:
-            reading *= 1 + of["noise_gain"] * self.normal(7, 2 * self.step, 2 * s + 1)
-            reading = reference.mixed(reading, self.unit(2 * s), self.unit(2 * s + 1), nothing, anything)
+            choice, value = self.mixture_words(s)
+            reading *= 1 + of["noise_gain"] * float(normal(np.uint32(value), 0.0))
+            choices = ((choice >> 11) + 0.5) / 2**21, ((value >> 9) + 0.5) / 2**23
+            reading = reference.mixed(reading, *choices, nothing, anything)
         uniform = ((self.word(1, self.step, s) >> 8) * 2 + 1 - 2**24) / 2**24
         return reference.limited(reading + of["noise_uniform"] * uniform)
 

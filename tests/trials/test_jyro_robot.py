@@ -7,7 +7,7 @@ import pytest
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.robots import Command, JyroPlatform, Robot
 from realitygap.trials import JyroRobot, NoiseKey, trace_genome, try_genomes
-from realitygap.world import NAMED_STARTS, Pose, paper_arena
+from realitygap.world import INCH, NAMED_STARTS, Pose, load_arena, paper_arena
 
 KEY = NoiseKey(0x9E3779B97F4A7C15, replicate=3, generation=2, individual=5, repeat=1)
 
@@ -64,3 +64,18 @@ def test_a_trial_begins_anew_with_the_same_random_numbers_or_at_another_pose():
     robot.reset(Pose(0.5, 0.3, 1.0))
     assert robot.pose == pytest.approx((0.5, 0.3, 1.0))
     assert robot.n_blocked == 0
+
+
+def test_boxes_in_the_arena_are_seen_and_stop_the_robot():
+    start = Pose(8 * INCH, 15.5 * INCH, 0.0)  # faces the first box, whose near side is at 14.5 in
+    reached = {}
+    for name in ("paper", "paper-boxes"):
+        with JyroRobot(arena=load_arena(name)) as robot:
+            robot.reset(start)
+            gap = 14.5 * INCH - start.x - 0.09
+            seen = pytest.approx([gap] * 3, abs=1e-6) if name == "paper-boxes" else [0.2] * 3
+            assert list(robot.observe().raw) == seen
+            for _ in range(5):
+                robot.drive(Command(1.0, 0.0))
+            reached[name] = robot.observe().stalled
+    assert reached == {"paper": False, "paper-boxes": True}

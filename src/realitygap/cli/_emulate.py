@@ -26,7 +26,7 @@ def emulate(
         str | None, typer.Option(help="none, 1 or 2: the board with the camera. [default: that of the model]")
     ] = None,
     arena: Annotated[
-        str, typer.Option(metavar="FILE", help="Where it stands: paper, or a TOML file.")
+        str, typer.Option(metavar="NAME", help="Where it stands: an arena by name, or a TOML or SVG file.")
     ] = "paper",
     link: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Also make a link to the pseudo-terminal here.")

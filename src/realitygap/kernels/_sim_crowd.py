@@ -10,11 +10,9 @@ from ._lanes import LANES
 from ._sim import _list, arrive, sense
 from ._sim_contact import settle
 from ._sim_drive import drive, take_commands
-from ._sim_lanes import NEAR, start_block
-from ._sim_near import gather
+from ._sim_lanes import start_block
 from ._sim_outline import place_obstacle
 from ._sim_senses import feel_motion
-from ._sim_touch import touch
 
 
 @kernel
@@ -54,14 +52,3 @@ def move_sim(shape, rules, key, room, cells, step, commands):
 def look_sim(shape, rules, key, room, step):
     """What its sensors answer before a step, into `room.lanes.readings`; after a step the second part of `step_sim`."""
     sense(shape, rules, key, room.lanes, step)
-
-
-@kernel
-def gap_sim(shape, room):
-    """How far the body is from the nearest wall or obstacle where it stands [m]; negative where it is in one."""
-    near = room.near
-    for k in range(NEAR):
-        near.lane[k] = k
-    gather(shape, room.lanes, near, True)
-    touch(shape, near)
-    return near.gap[0]

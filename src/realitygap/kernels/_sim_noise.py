@@ -10,10 +10,41 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import stage
+from ._bits import shift_left
+from ._compile import inlined, stage
 from ._lanes import LANES
 from ._math import exp2, normal
 from ._sim_range import unit_of
+
+PER_BLOCK = 3  # sensors that share the four words of a block
+
+
+@stage
+def second_word(word, spare, place, value):
+    """A second random word of 21 bits for a sensor: 11 that its first one leaves, 10 of a spare one.
+
+    Its lowest 11 bits repeat the highest, so that complements stay complements.
+
+    Args:
+        word: (LANES,) of the sensor, of which the upper 21 bits are for a choice.
+        spare: The last word of the block.
+        place: 0, 1 or 2: which 10 bits of it.
+        value: Written.
+    """
+    shift = np.uint32(10 * place)
+    for lane in range(LANES):
+        left = np.uint32(word[lane] & np.uint32(0x7FF))
+        more = np.uint32(np.uint32(spare[lane] >> shift) & np.uint32(0x3FF))
+        value[lane] = np.uint32(
+            shift_left(left, np.uint32(21)) | np.uint32(shift_left(more, np.uint32(11)) | left)
+        )
+
+
+@inlined
+def _choice_of(word, like):
+    """A number in (0, 1) from the upper 21 bits of a word, centered, exact in the precision of `like`."""
+    real = type(like)
+    return (real(np.int32(word >> np.uint32(11))) + real(0.5)) * real(1.0 / (1 << 21))
 
 
 @stage
@@ -33,7 +64,7 @@ def mixture(near, choice, value, drop, drop_rate, outlier, outlier_rate, reading
 
     Args:
         near: (LANES,) d, distance to what is nearest [m].
-        choice, value: Random words; 23 bits of the first choose, 23 bits of the second are the outlier.
+        choice, value: Random words; the upper 21 bits of the first choose, the second is the outlier.
         drop, outlier: (2, LANES) most and at [m].
         drop_rate, outlier_rate: log2(e) / width [1/m].
         reading: Changed.
@@ -43,7 +74,7 @@ def mixture(near, choice, value, drop, drop_rate, outlier, outlier_rate, reading
     outlier_most, outlier_at = outlier[0], outlier[1]
     for lane in range(LANES):
         d = near[lane]
-        u = unit_of(choice[lane], d)
+        u = _choice_of(choice[lane], d)
         # u < most / (1 + e), without a division
         dropped = u * (real(1.0) + exp2((drop_at[lane] - d) * drop_rate[lane])) < drop_most[lane]
         out = (real(1.0) - u) * (

@@ -83,6 +83,15 @@ def _add_return(distance, reach, rate, weight, reading):
 
 
 @stage
+def _one_return(distance, reach, amplitude, rate, reading):
+    real = reading.dtype.type
+    for lane in range(LANES):
+        d = distance[lane]
+        back = amplitude[lane] * exp2(-d * rate[lane])
+        reading[lane] = back if d < reach[lane] else real(0.0)
+
+
+@stage
 def ir_response(distances, reach, amplitude, rate, reading):
     """A * e^(-d / L), the mean over the rays by their weights; a ray that meets nothing within reach adds 0.
 
@@ -95,6 +104,9 @@ def ir_response(distances, reach, amplitude, rate, reading):
     """
     real = reading.dtype.type
     rays = distances.shape[0]
+    if rays == 1:  # the same, in one go
+        _one_return(distances[0], reach, amplitude, rate, reading)
+        return
     fill(reading, real(0.0))
     whole = 0.0
     for ray in range(rays):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import kernel, stage
+from ._compile import inlined, kernel, stage
 from ._lanes import LANES, Rows, Words, fill
 from ._philox import (
     PURPOSE_ENCODER,
@@ -20,7 +20,7 @@ from ._philox import (
 from ._sim_encoders import read_encoder, reckon
 from ._sim_floor import answer_line, lay_tape, place_point, sample_image
 from ._sim_light import add_light, answer_light, look_to, prepare_light
-from ._sim_noise import gain_noise, mixture, uniform_noise
+from ._sim_noise import PER_BLOCK, gain_noise, mixture, second_word, uniform_noise
 from ._sim_pulses import count_pulses, pulse_words
 from ._sim_range import (
     ir_response,
@@ -63,6 +63,7 @@ class Senses(NamedTuple):
     near: Rows  # (s,) distance to what is nearest [m]
     lobes: Rows  # (4 * l,) of `prepare_light`
     words: Words
+    value: NDArray[np.uint32]  # (LANES,) room
     spare: Rows  # (6,) room
     was: Rows  # (4,) pose at the last step, of `idler_stall`
     idled: Rows  # (3,) averages of `idler_stall`, and what a step leaves of them
@@ -73,12 +74,19 @@ class Senses(NamedTuple):
     reckoned: Rows  # (3,) the pose from the encoders, from the start: x, y [m], heading [turns]
 
 
+@inlined
+def mixture_words(sensors):
+    """Random words of the mixture of so many range sensors."""
+    return 4 * ((sensors + PER_BLOCK - 1) // PER_BLOCK)
+
+
 def make_senses(shape, dtype):
     """Room for the senses of a block of trials in a precision."""
     s = shape.row_range.size
     pulses = int(shape.range_pulses.max(initial=0))
     words = max(
-        4 * blocks_of(n) for n in (2 * s, shape.row_light.size, shape.row_line.size, 2, pulse_words(pulses))
+        4 * blocks_of(n)
+        for n in (mixture_words(s), shape.row_light.size, shape.row_line.size, 2, pulse_words(pulses))
     )
 
     def rows(n):
@@ -90,6 +98,7 @@ def make_senses(shape, dtype):
         near=rows(s),
         lobes=rows(4 * shape.row_light.size),
         words=np.zeros((words, LANES), np.uint32),
+        value=np.zeros(LANES, np.uint32),
         spare=rows(6),
         was=rows(4),
         idled=rows(3),
@@ -174,17 +183,19 @@ def _respond(shape, lanes, senses):
 
 @stage
 def _mix(shape, key, lanes, senses, step):
-    """Gain noise, dropouts and outliers. Sensor k takes words 2k and 2k + 1 of the step."""
-    p, words, n = lanes.p, senses.words, shape.row_range.size
-    draw_words_of(PURPOSE_RANGE, step, 2 * n, lanes.counters, key, words)
+    """Gain noise, dropouts and outliers. Three sensors share a block of four words."""
+    p, words, value, n = lanes.p, senses.words, senses.value, shape.row_range.size
+    draw_words_of(PURPOSE_RANGE, step, mixture_words(n), lanes.counters, key, words)
     for s in range(n):
         row, reading = shape.row_range[s], lanes.readings[s]
         if shape.range_response[s] != PULSES:
+            block, place = 4 * (s // PER_BLOCK), s % PER_BLOCK
+            second_word(words[block + place], words[block + 3], place, value)
             if senses.noisy[1] > 0:
-                gain_noise(words[2 * s + 1], p[row + GAIN], reading)
+                gain_noise(value, p[row + GAIN], reading)
             if senses.noisy[2] > 0:
                 mixture(
-                    senses.near[s], words[2 * s], words[2 * s + 1], p[row + DROP : row + DROP + 2],
+                    senses.near[s], words[block + place], value, p[row + DROP : row + DROP + 2],
                     senses.range_rates[3 * s + 1], p[row + OUTLIER : row + OUTLIER + 2],
                     senses.range_rates[3 * s + 2], reading,
                 )  # fmt: skip

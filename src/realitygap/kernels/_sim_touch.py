@@ -1,10 +1,10 @@
 """Where bodies meet walls and obstacles most deeply, in lanes.
 
 A body is convex polygons grown by a radius each, in the frame of its axle; obstacles and open walls are likewise,
-in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are nearest at
-the face of either of them that has the other one farthest in front of it: either there or, where the way to the
-other leads past an end of the face, at that end (a face of the Minkowski difference that is farthest from the origin
-has the point nearest to it).
+in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are
+nearest at the face of either of them that has the other one farthest in front of it: either there or, where the way
+to the other leads past an end of the face, at that end (a face of the Minkowski difference that is farthest from the
+origin has the point nearest to it).
 """
 
 from __future__ import annotations

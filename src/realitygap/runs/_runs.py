@@ -168,9 +168,9 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
 
 
 def _least(condition: Condition) -> Condition:
-    """The condition with a population of two that live for one step."""
+    """The condition with a population of two that live for one step, and have children."""
     short = condition.simulated_on.model_copy(update={"steps": 1})
-    neat = condition.neat.model_copy(update={"population": 2, "generations": 1})
+    neat = condition.neat.model_copy(update={"population": 2, "generations": 2})
     return condition.model_copy(update={condition.platform: short, "neat": neat})
 
 

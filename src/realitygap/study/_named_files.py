@@ -46,4 +46,4 @@ def _find(table: Any, key: str, folder: Path, prefix: str = "") -> None:
 
 
 def _beside(file: str, folder: Path) -> str:
-    return str(folder / file) if file and (folder / file).is_file() else file
+    return str(folder / file) if Path(file).suffix and (folder / file).is_file() else file

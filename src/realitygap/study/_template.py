@@ -24,7 +24,6 @@ _EXAMPLES = {
     "published_source": "Table 2",
     "baseline": "coverage-10",
     "change": "trials begin in the center",
-    "file": "arena.toml",
 }
 
 
@@ -111,7 +110,7 @@ def _section(
             lines.append(f"{key} = {_toml(written[key])}")
         else:
             default = info.get_default(call_default_factory=True, validated_data={})
-            default = (defaults or {}).get(key, _EXAMPLES.get(key) if default is None else default)
+            default = (defaults or {}).get(key, default)
             lines.append(f"# {key} = {_toml(default)}")
     return "\n".join(lines)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from realitygap.errors import RobotError
 from realitygap.evolution import NeatSettings
 from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim import start_sim, step_sim
+from realitygap.kernels._sim_crowd import begin_sim, look_sim, move_sim
 from realitygap.kernels._sim_lanes import make_sim_room
 from realitygap.robots import Command, Label, Observation, SimPlatform, check_command
 from realitygap.world import Arena, Pose, paper_arena
@@ -84,7 +84,8 @@ class SimRobot:
         self.drawn = dict(zip(draws.names, values.tolist(), strict=True))
         self._key = np.uint64(self.noise_key.key)
         table = self._scene.table({**self._scene.fixed, **self.drawn})
-        start_sim(self._scene.shape, table, self._rules, self._key, counters, 1, self._room, self._cells)
+        begin_sim(self._scene.shape, table, self._rules, counters, self._room, self._cells)
+        look_sim(self._scene.shape, self._rules, self._key, self._room, 0)
         self.n_steps = 0
 
     def reset(self, pose: Pose | None = None) -> None:
@@ -106,17 +107,10 @@ class SimRobot:
         """Carry out one command for `step_s` of the simulation."""
         self._check_open()
         self._commands[:, 0] = check_command(command)
-        step_sim(
-            self._scene.shape,
-            self._rules,
-            self._key,
-            1,
-            self._room,
-            self._cells,
-            self.n_steps,
-            self._commands,
-        )
+        shape, rules, room = self._scene.shape, self._rules, self._room
+        move_sim(shape, rules, self._key, room, self._cells, self.n_steps, self._commands)
         self.n_steps += 1
+        look_sim(shape, rules, self._key, room, self.n_steps)
 
     def stop(self) -> None:
         """Nothing to do: it moves only while a command lasts."""

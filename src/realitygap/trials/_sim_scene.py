@@ -18,6 +18,7 @@ from realitygap.kernels._sim_shape import (
     make_sim_shape,
     sim_rows,
     sim_table,
+    substeps_for,
 )
 from realitygap.robots import ARENA, SimPlatform
 from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
@@ -125,6 +126,15 @@ def highest(value: float | Distribution) -> float:
     return value.highest if isinstance(value, Distribution) else value
 
 
+_DRAWN_IN_STEPS = (
+    "delay_jitter",
+    "travel_noise_per_m",
+    "travel_noise_per_s",
+    "heading_noise_per_m",
+    "heading_noise_per_s",
+)
+
+
 def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
     latest = highest(numbers["drive.delay"]) + highest(numbers["drive.delay_jitter"])
     drive = robot.drive
@@ -136,6 +146,16 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
         "levels": drive.levels,
         "lowest_level": drive.lowest_level,
         "delay_steps": math.ceil(latest / step_s),
+        "late": latest > 0,
+        "noisy": any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
+        "substeps": max(
+            substeps_for(
+                highest(numbers["drive.speed"]) * step_s,
+                [(corner.x, corner.y) for corner in part.corner],
+                part.radius,
+            )
+            for part in robot.body
+        ),
     }
 
 

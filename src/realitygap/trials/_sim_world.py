@@ -14,6 +14,7 @@ from realitygap.world import Arena, Pose, RobotModel, arena_picture, paper_arena
 
 from ._batch import NoiseKey, counters_of
 from ._draws import Draws
+from ._sim_overlap import as_obstacles, overlaps
 from ._sim_world_robot import SimWorldRobot
 
 PENS = ("royalblue3", "darkorange3", "seagreen4", "orchid3", "goldenrod3", "firebrick3")
@@ -101,7 +102,7 @@ class SimWorld:
             raise RobotError(
                 "The world has begun: add all robots before the first step, or call reset first."
             )
-        platform = robot if isinstance(robot, SimPlatform) else SimPlatform(robot=robot, precision="double")
+        platform = robot if isinstance(robot, SimPlatform) else SimPlatform(robot=robot)
         k = len(self.robots)
         color = color or PENS[k % len(PENS)]
         hex_of(color)
@@ -173,21 +174,25 @@ class SimWorld:
     def _prepare(self) -> None:
         if self._is_ready:
             return
-        for robot in reversed(self.robots):  # the one added last is the one to name
-            parts = [part for other in self._others(robot) for part in other._parts()]
-            if any(part.distance(*robot.start[:2]) < 0 for part in (*self.arena.obstacles, *parts)):
-                raise _in_the_way(robot)
+        standing = as_obstacles(self.arena)
+        for robot in self.robots:
+            parts = robot._parts()
+            if any(overlaps(part, other) for part in parts for other in standing):
+                raise RobotError(
+                    f"{robot.name} stands in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
+                    f"{robot.start.y:.3f}). Start it elsewhere."
+                )
+            standing += parts
+        for robot in self.robots:
             robot._begin(self.arena, self._others(robot))
-        for robot in reversed(self.robots):
-            if robot._gap() < 0:
-                raise _in_the_way(robot)
         self._is_ready = True
 
     def picture(self) -> Picture:
         """The arena from above with all robots, their trails and what their range sensors see."""
         self._prepare()
         ground = arena_picture(self.arena)
-        shapes: list[Shape] = [shape for robot in self.robots for shape in _robot_shapes(robot)]
+        layers = (_trail, _rays, _body)
+        shapes = [shape for layer in layers for robot in self.robots for shape in layer(robot)]
         return Picture(
             "World",
             f"Arena {self.arena.name} with {len(self.robots)} robots after {self.n_steps} steps, {self.time:.4g} s.",
@@ -202,13 +207,6 @@ class SimWorld:
         return self.picture().to_svg()
 
 
-def _in_the_way(robot: SimWorldRobot) -> RobotError:
-    return RobotError(
-        f"{robot.name} stands in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
-        f"{robot.start.y:.3f}). Start it elsewhere."
-    )
-
-
 def _drawn_arena(arena: Arena, key: NoiseKey) -> Arena:
     """The arena with what is drawn for a trial in place of distributions."""
     draws = Draws(arena.numbers())
@@ -218,28 +216,32 @@ def _drawn_arena(arena: Arena, key: NoiseKey) -> Arena:
     return arena.with_numbers(dict(zip(draws.names, drawn, strict=True)))
 
 
-def _robot_shapes(robot: SimWorldRobot) -> list[Shape]:
-    color = hex_of(robot.color)
-    x, y, heading = robot.pose
-    sine, cosine = math.sin(heading), math.cos(heading)
+def _trail(robot: SimWorldRobot) -> list[Shape]:
+    if len(robot.trail) < 2:
+        return []
+    return [Line(tuple((pose.x, pose.y) for pose in robot.trail), hex_of(robot.color), 1.2)]
 
-    def at(ahead: float, left: float) -> tuple[float, float]:
-        return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
 
+def _rays(robot: SimWorldRobot) -> list[Shape]:
+    """The rays of the range sensors, as far as they see."""
     shapes: list[Shape] = []
-    if len(robot.trail) > 1:
-        shapes.append(Line(tuple((pose.x, pose.y) for pose in robot.trail), color, 1.2))
-    rays = iter(robot.distances.tolist())
+    lengths = iter(robot.distances.tolist())
     for sensor in robot.model.range:
+        start = robot.point(sensor.x, sensor.y)
         for k in range(sensor.rays):
             share = 2 * k / (sensor.rays - 1) - 1 if sensor.rays > 1 else 0.0
-            angle, far = sensor.direction + share * sensor.cone, min(next(rays), sensor.reach)
-            end = at(sensor.x + far * math.cos(angle), sensor.y + far * math.sin(angle))
-            shapes.append(Line((at(sensor.x, sensor.y), end), color, 0.6, (2.0, 1.5)))
-    for part in robot.model.body:
-        outline = tuple(at(*point) for point in part.outline())
-        shapes.append(Line(outline, color, 1.4, closed=True, fill="#ffffff"))
-    size = robot.model.radius
-    nose = (at(0.0, 0.15 * size), at(0.5 * size, 0.0), at(0.0, -0.15 * size))
-    shapes.append(Line(nose, None, closed=True, fill=color))
+            angle, far = sensor.direction + share * sensor.cone, min(next(lengths), sensor.reach)
+            end = robot.point(sensor.x + far * math.cos(angle), sensor.y + far * math.sin(angle))
+            shapes.append(Line((start, end), hex_of(robot.color), 0.6, (2.0, 1.5)))
     return shapes
+
+
+def _body(robot: SimWorldRobot) -> list[Shape]:
+    """The outline, and an arrow ahead."""
+    color, size = hex_of(robot.color), robot.model.radius
+    shapes: list[Shape] = [
+        Line(tuple(robot.point(*point) for point in part.outline()), color, 1.4, closed=True, fill="#ffffff")
+        for part in robot.model.body
+    ]
+    nose = (robot.point(0.0, 0.15 * size), robot.point(0.5 * size, 0.0), robot.point(0.0, -0.15 * size))
+    return [*shapes, Line(nose, None, closed=True, fill=color)]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.drawing import Point
 from realitygap.errors import RobotError
 from realitygap.kernels import _sim_crowd as crowd
 from realitygap.kernels._lanes import LANES
@@ -87,6 +88,12 @@ class SimWorldRobot:
         """Where it is; the heading lies in -pi..pi."""
         self.world._prepare()
         return self._pose
+
+    def point(self, ahead: float, left: float) -> Point:
+        """Where a point of the robot is in the arena [m]."""
+        x, y, heading = self.pose
+        sine, cosine = math.sin(heading), math.cos(heading)
+        return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
 
     @property
     def stalled(self) -> bool:
@@ -204,9 +211,6 @@ class SimWorldRobot:
         self.trail = [self._pose]
         self.command = Command(0.0, 0.0)
 
-    def _gap(self) -> float:
-        return float(crowd.gap_sim(self._shape, self._room))
-
     def _meet(self, others: list[SimWorldRobot]) -> None:
         """See the others where they are now."""
         rows = [
@@ -216,19 +220,17 @@ class SimWorldRobot:
         ]
         if rows:
             poses = np.array(rows, self._commands.dtype)
-            crowd.put_others(self._shape, self._room, np.int64(self._first_other), poses)
+            crowd.put_others(self._shape, self._room, self._first_other, poses)
 
     def _move(self, step: int) -> None:
         self._commands[0], self._commands[1] = self.command
-        crowd.move_sim(
-            self._shape, self._rules, self._key, self._room, self._cells, np.int64(step), self._commands
-        )
+        crowd.move_sim(self._shape, self._rules, self._key, self._room, self._cells, step, self._commands)
         self._take_pose()
         if self.keep_trail:
             self.trail.append(self._pose)
 
     def _look(self, step: int) -> None:
-        crowd.look_sim(self._shape, self._rules, self._key, self._room, np.int64(step))
+        crowd.look_sim(self._shape, self._rules, self._key, self._room, step)
 
     def _take_pose(self) -> None:
         at = self._room.lanes.pose

@@ -41,9 +41,10 @@ class ArenaSettings(Settings):
         json_schema_extra={"hidden": True},
         repr=False,
     )
-    file: str | None = Field(
-        None,
-        description="In place of a name: a file of your own, TOML or SVG. The results hold the arena itself.",
+    file: str = Field(
+        "",
+        description="In place of a name: a file of your own, TOML or SVG, beside the study file. The results hold the "
+        "arena itself.",
     )
     start: StartName | Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
         "corner",
@@ -61,16 +62,16 @@ class ArenaSettings(Settings):
         if not isinstance(values, Mapping):
             return values
         values = dict(values)
-        file, preset = values.get("file"), values.get("preset", "paper")
-        if isinstance(file, str) and values.get("read") is None:
+        file, preset = values.get("file", ""), values.get("preset", "paper")
+        if isinstance(file, str) and file and values.get("read") is None:
             arena = _read(file)
             if arena is not None:
                 values |= {"file": Path(file).name, "read": arena.to_dict()}
-        elif isinstance(file, str):
+        elif values.get("read") is not None:
             arena = Arena.from_dict(values["read"])
         else:
             arena = load_arena(preset) if preset in arena_names() else None
-        if arena is not None and "start" not in values and (file is not None or preset != "paper"):
+        if arena is not None and "start" not in values and (file or preset != "paper"):
             values["start"] = list(arena.start)
         return values
 
@@ -83,13 +84,13 @@ class ArenaSettings(Settings):
 
     @field_validator("file")
     @classmethod
-    def _was_read(cls, file: str | None, info: ValidationInfo) -> str | None:
-        if file is not None and info.data.get("read") is None:
+    def _was_read(cls, file: str, info: ValidationInfo) -> str:
+        if file and info.data.get("read") is None:
             try:
                 load_arena(_as_path(file))
             except DescriptionError as error:
                 raise ValueError(str(error).rstrip(".")) from None
-        if file is not None and info.data.get("preset") != "paper":
+        if file and info.data.get("preset") != "paper":
             raise ValueError("expected preset or file and not both")
         return file
 
@@ -119,9 +120,7 @@ class ArenaSettings(Settings):
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Of an arena by name there is no file: conditions keep the hash that they had before files."""
         values: dict[str, Any] = handler(self)
-        return {
-            key: value for key, value in values.items() if value is not None or key not in ("file", "read")
-        }
+        return {key: value for key, value in values.items() if value or key not in ("file", "read")}
 
     def pose(self) -> Pose:
         """Where trials begin."""
@@ -133,7 +132,7 @@ class ArenaSettings(Settings):
 
     def arena(self) -> Arena:
         """The arena."""
-        if self.file is None and self.preset == "paper":
+        if not self.file and self.preset == "paper":
             return paper_arena(self.pose())
         arena = _arena_of(self.preset, self.read)
         if arena.start == self.pose():

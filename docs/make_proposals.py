@@ -1,0 +1,78 @@
+"""The studies that the paper proposes: the tables and figures of the page "What the paper proposes".
+
+    uv run python docs/make_proposals.py [NAME ...]      # all: some two minutes
+
+Carries out each study in a temporary folder and writes docs/data/proposals/NAME.csv, in which every condition is
+compared with the one that its study names as baseline, and docs/images/proposals/NAME.svg.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import tempfile
+from pathlib import Path
+
+from realitygap import ResultsFolder, run_study
+from realitygap.report import Interval, compare_choices, compare_conditions, draw_choices
+
+HERE = Path(__file__).parent
+TABLES = HERE / "data" / "proposals"
+FIGURES = HERE / "images" / "proposals"
+STUDIES = ("bodies", "contact", "noise", "drift", "turn", "steps", "complexity")
+HEAD = ["Condition", "change", "n", "median", "95 % interval", "mean less baseline’s", "95 % interval", "A12"]
+
+
+def table(folder: ResultsFolder) -> str:
+    """One row for each condition: its best coverage of a run, and that less its baseline's."""
+    compared = {(each.one, each.other): each for each in compare_conditions(folder)}
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([*HEAD, "95 % interval"])
+    for group in compare_choices(folder):
+        for choice in group:
+            row = [
+                choice.condition,
+                choice.change,
+                choice.n,
+                f"{choice.median:.3f}",
+                _span(choice.interval, ".3f"),
+            ]
+            each = compared.get((choice.condition, choice.baseline))
+            if each is not None:
+                row += [_signed(each.difference), _span(each.difference_interval, "+.3f")]
+                row += [f"{each.a12:.3f}", _span(each.a12_interval, ".3f")]
+            writer.writerow([*row, *[""] * (9 - len(row))])
+    return file.getvalue()
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.3f}".replace("-", "−")
+
+
+def _span(interval: Interval | None, form: str) -> str:
+    if interval is None:
+        return ""
+    return f"{interval.low:{form}} to {interval.high:{form}}".replace("-", "−")
+
+
+def main() -> None:
+    """Run the studies and write their tables and figures."""
+    parser = argparse.ArgumentParser(description="Tables and figures of the studies that the paper proposes.")
+    parser.add_argument("studies", nargs="*", default=STUDIES, metavar="NAME", help=", ".join(STUDIES))
+    TABLES.mkdir(parents=True, exist_ok=True)
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    for name in parser.parse_args().studies:
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = run_study(name, Path(temporary) / name).folder
+            for path, text in (
+                (TABLES / f"{name}.csv", table(folder)),
+                (FIGURES / f"{name}.svg", draw_choices(folder).svg + "\n"),
+            ):
+                path.write_text(text, "utf-8")
+                print(f"Written: {path}")
+
+
+if __name__ == "__main__":
+    main()

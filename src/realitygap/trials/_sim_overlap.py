@@ -1,0 +1,31 @@
+"""Whether robots that are put into an arena stand in something."""
+
+from __future__ import annotations
+
+from realitygap.world import Arena, Obstacle
+
+
+def overlaps(part: Obstacle, other: Obstacle) -> bool:
+    """Whether two rounded convex outlines have an area in common, or more than a point where one is a line."""
+    if not (_is_beside(part, other) or _is_beside(other, part)):
+        return True
+    gaps = [other.distance(x, y) - part.radius for x, y in part.placed]
+    gaps += [part.distance(x, y) - other.radius for x, y in other.placed]
+    return min(gaps) < 0
+
+
+def as_obstacles(arena: Arena) -> list[Obstacle]:
+    """All that stands in an arena: its obstacles, and its walls without a width."""
+    walls = [Obstacle(0.0, 0.0, 0.0, ((x1, y1), (x2, y2))) for x1, y1, x2, y2 in arena.walls]
+    return [*arena.obstacles, *walls]
+
+
+def _is_beside(part: Obstacle, other: Obstacle) -> bool:
+    """Whether all corners of another are in front of one side, before rounding; always so beside a single corner."""
+    corners, others = part.placed, other.placed
+    if len(corners) == 1:
+        return len(others) == 1
+    return any(
+        all((y2 - y1) * (x - x1) - (x2 - x1) * (y - y1) >= 0 for x, y in others)
+        for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True)
+    )

@@ -65,7 +65,7 @@ def as_restructured(app, what, name, obj, options, lines):
     """Our docstrings' code by indentation as reStructuredText's literal blocks; their tables as they are."""
     out, previous, in_code, in_table = [], "", False, False
     if what == "property":  # napoleon would take what stands before a colon for a type
-        lines[:] = [line.replace(": ", " – ") for line in lines]
+        lines[:] = [line if line.startswith(" ") else line.replace(": ", " – ") for line in lines]
     for line in lines:
         text = line.strip()
         indented = line.startswith("    ") and not in_section(out)

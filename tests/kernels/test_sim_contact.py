@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -113,7 +114,7 @@ def test_steps_among_obstacles_equal_the_reference(model: str) -> None:
         "arena.wall.4.y2": 0.35,
     }
     ends = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, DEPTH), (0.0, DEPTH), (0.0, 0.0)]
-    polygons += [reference.Polygon([a, b]) for a, b in zip(ends, ends[1:], strict=False)]
+    polygons += [reference.Polygon([a, b]) for a, b in itertools.pairwise(ends)]
     polygons.append(reference.Polygon([(0.4, 0.6), (0.5, 0.35)]))
     like, world = body(model), reference.World([], polygons)
     inside = reference.World(planes(), polygons)

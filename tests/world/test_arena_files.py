@@ -106,6 +106,12 @@ tape_width = 2
     assert arena.floor.brightness(0.5, 0.52) == 1.0
 
 
+def test_a_heading_is_in_radians_whatever_the_unit_of_a_start(write):
+    """It was scaled like a length: 0.5 rad became 0.0127 rad."""
+    arena = load_arena(write("wall_in = [[0, 0, 10, 0]]\nstart_in = [1, 2, 0.5]"))
+    assert arena.start == pytest.approx((0.0254, 0.0508, 0.5))
+
+
 def test_numbers_have_dotted_names_and_may_be_drawn(write):
     arena = load_arena(
         write(ROOM + "[[obstacle]]\nx = 1\ny = 0.5\nradius = 0.1\n[[light]]\nx = 1\ny = 0.9\n")
@@ -131,6 +137,10 @@ def test_numbers_have_dotted_names_and_may_be_drawn(write):
         ("wall = [[0, 0, 1]]\nstart = [0, 0, 0]", "wall.0: expected [x1, y1, x2, y2], came [0, 0, 1]."),
         ("wall = [[0, 0, 1, nan]]\nstart = [0, 0, 0]", "wall.0.y2: expected a finite number"),
         ("start = [0, 0]", "start: expected [x, y, heading], came [0, 0]."),
+        ("wall = [[1, 1, 1, 1]]\nstart = [0, 0, 0]", "wall.0: it begins where it ends."),
+        ("wall = [[0, 0, 1e308, 0]]\nstart = [0, 0, 0]", "wall.0.x2: expected at most 10000 m, came 1e+308"),
+        (ROOM + "[[light]]\nx_deg = 1\ny = 2", "light.0.x_deg: x is no angle"),
+        (ROOM + "[[obstacle]]\nradius = 0.1\nheading_mm = 90", "obstacle.0.heading_mm: heading is an angle"),
         ("wall = []", "start: missing"),
         ("start = 'corner'\nwall = 3", "wall: expected a list, came 3."),
         (ROOM + "unit = 'ft'", "unit: expected 'm', 'cm', 'mm', 'in' or a length in meters, came 'ft'"),

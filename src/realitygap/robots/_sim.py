@@ -60,6 +60,8 @@ def _as_numbers(values: Any) -> Any:
                 f"{name}: expected a number, or how it is drawn, such as {{ uniform = [0.1, 0.2] }}, came {value!r}"
             )
         elif not isinstance(value, Distribution):
+            if not math.isfinite(value):
+                problems.append(f"{name}: expected a finite number, came {value!r}")
             value = float(value)
         found[name] = value
     if problems:

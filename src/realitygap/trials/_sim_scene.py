@@ -154,6 +154,14 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
             f"{step_s:g} s."
         )
     drive = robot.drive
+    way = _farthest(numbers, step_s)
+    substeps = max(
+        substeps_for(way, [(corner.x, corner.y) for corner in part.corner], part.radius)
+        for part in robot.body
+    )
+    if robot.contact.model == "freeze":
+        # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
+        substeps = math.ceil(substeps / 3)
     return {
         "parts": [len(part.corner) for part in robot.body],
         "contact": robot.contact.model,
@@ -164,15 +172,22 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
         "delay_steps": math.ceil(latest / step_s),
         "late": latest > 0,
         "noisy": any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
-        "substeps": max(
-            substeps_for(
-                highest(numbers["drive.speed"]) * step_s,
-                [(corner.x, corner.y) for corner in part.corner],
-                part.radius,
-            )
-            for part in robot.body
-        ),
+        "substeps": substeps,
+        "late_substeps": max(1, math.ceil(substeps * min(latest / step_s, 1.0))),
     }
+
+
+def _farthest(numbers: Numbers, step_s: float) -> float:
+    """What a wheel drives in a step at most [m]: at any gain and bias, and with noise of six standard deviations."""
+
+    def most(name: str) -> float:
+        value = numbers[f"drive.{name}"]
+        return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
+
+    gain, bias = (max(most(f"{name}_left"), most(f"{name}_right")) for name in ("gain", "bias"))
+    way = (most("speed") * gain + bias) * step_s
+    variance = most("travel_noise_per_m") ** 2 * way + most("travel_noise_per_s") ** 2 * step_s
+    return way + 6.0 * math.sqrt(variance)
 
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:

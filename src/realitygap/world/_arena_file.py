@@ -21,6 +21,7 @@ from ._units import INCH
 
 MOST_CELLS = 256
 MOST_WALLS = 2048
+FARTHEST = 10_000.0  # from the origin [m]: beyond, 32 bit do not tell millimeters apart
 PREFIX = "arena."
 FROM_FILE: dict[str, Any] = {"json_schema_extra": {"hidden": True}}
 
@@ -93,6 +94,12 @@ class WallEntry(Row):
     y1: Number
     x2: Number = Field(description="Where it ends [m].")
     y2: Number
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if (self.x1, self.y1) == (self.x2, self.y2):
+            raise ValueError("it begins where it ends. Leave it out, or move an end")
+        return self
 
 
 class ObstacleEntry(Settings):
@@ -218,6 +225,14 @@ class ArenaFile(Described):
     )
     start: StartEntry
     goal: GoalEntry | None = None
+
+    @model_validator(mode="after")
+    def _is_of_a_sensible_size(self) -> Self:
+        for name, number in self.numbers().items():
+            ends = (number.lowest, number.highest) if isinstance(number, Distribution) else (number,)
+            if not name.endswith(NO_LENGTHS) and max(map(abs, ends)) > FARTHEST:
+                raise ValueError(f"{name}: expected at most {FARTHEST:g} m, came {max(ends, key=abs):g}")
+        return self
 
     @model_validator(mode="after")
     def _begins_beside_obstacles(self) -> Self:

@@ -24,6 +24,17 @@ UNITS = {
 }
 """What the end of a key in a file says of its numbers; without one they are in meters or radians."""
 
+ANGLES = (
+    "heading",
+    "direction",
+    "cone",
+    "turn_rate",
+    "drift_per_m",
+    "heading_noise_per_m",
+    "heading_noise_per_s",
+)
+"""What is an angle; `width` is one of a light sensor and a length of an image."""
+
 ROWS = {
     "corner": ("x", "y"),
     "table": ("distance", "reading"),
@@ -216,7 +227,7 @@ def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
     """Values of a file with the units that keys end in taken away: track_mm = 153 becomes track = 0.153.
 
     Raises:
-        ValueError: A number is given twice, in two units.
+        ValueError: A number is given twice, in two units, or an angle in a unit of lengths, or the other way round.
     """
 
     def plain(value: Any, place: str) -> Any:
@@ -225,9 +236,15 @@ def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
             for key, part in value.items():
                 unit = next((unit for unit in UNITS if isinstance(key, str) and key.endswith(unit)), "")
                 name = key.removesuffix(unit) if unit else key
+                if unit and name != "width" and (unit == "_deg") != (name in ANGLES):
+                    kind = "an angle: keep it in radians, or end it in _deg" if name in ANGLES else "no angle"
+                    raise ValueError(f"{place}{key}: {name} is {kind}")
                 if name in found:
                     raise ValueError(f"{place}{name}: given twice, also as {key}. Keep one")
-                found[name] = plain(_converted(part, unit), f"{place}{name}.")
+                converted = _converted(part, unit)
+                if name == "start" and isinstance(part, list | tuple):
+                    converted = [*converted[:2], *part[2:]]  # the third number is a heading
+                found[name] = plain(converted, f"{place}{name}.")
             return found
         if isinstance(value, list | tuple):
             return [plain(part, f"{place}{k}.") for k, part in enumerate(value)]

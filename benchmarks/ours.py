@@ -116,6 +116,13 @@ def _steps_on_all_cores() -> dict[str, Any]:
     return time_steps(threads=usable_processors())
 
 
+def time_realism(case: str) -> dict[str, Any]:
+    """Robot-steps a second on one core with outline, contact, and noise of sensors and motors."""
+    from realitygap.study import measure_realism
+
+    return spread([measure_realism(SECONDS)[case] for _ in range(ENGINE_REPEATS)])
+
+
 def time_runs() -> dict[str, Any]:
     """Microseconds a run, one thread."""
     from our_loops import KEY, trivial_runs
@@ -226,6 +233,8 @@ if __name__ == "__main__":
         {
             "steps_core": time_steps,
             "steps_all": _steps_on_all_cores,
+            "realism_avoiding": lambda: time_realism("avoiding"),
+            "realism_pressed": lambda: time_realism("pressed"),
             "run_us": time_runs,
             "xor_ms": time_xor,
             "large_ms": time_large,

@@ -14,6 +14,8 @@ import io
 import tempfile
 from pathlib import Path
 
+import polars as pl
+
 from realitygap import ResultsFolder, run_study
 from realitygap.report import Interval, compare_choices, compare_conditions, draw_choices
 
@@ -22,29 +24,32 @@ TABLES = HERE / "data" / "proposals"
 FIGURES = HERE / "images" / "proposals"
 STUDIES = ("bodies", "contact", "noise", "drift", "turn", "steps", "complexity")
 HEAD = ["Condition", "change", "n", "median", "95 % interval", "mean less baseline’s", "95 % interval", "A12"]
+HEAD += ["95 % interval", "nodes of the best"]
 
 
 def table(folder: ResultsFolder) -> str:
-    """One row for each condition: its best coverage of a run, and that less its baseline's."""
+    """One row for each condition: its best coverage of a run, that less its baseline's, and the networks' size."""
     compared = {(each.one, each.other): each for each in compare_conditions(folder)}
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*HEAD, "95 % interval"])
+    writer.writerow(HEAD)
     for group in compare_choices(folder):
         for choice in group:
-            row = [
-                choice.condition,
-                choice.change,
-                choice.n,
-                f"{choice.median:.3f}",
-                _span(choice.interval, ".3f"),
-            ]
+            row = [choice.condition, "" if choice.condition == choice.baseline else choice.change, choice.n]
+            row += [f"{choice.median:.3f}", _span(choice.interval, ".3f")]
             each = compared.get((choice.condition, choice.baseline))
             if each is not None:
                 row += [_signed(each.difference), _span(each.difference_interval, "+.3f")]
                 row += [f"{each.a12:.3f}", _span(each.a12_interval, ".3f")]
-            writer.writerow([*row, *[""] * (9 - len(row))])
+            writer.writerow([*row, *[""] * (9 - len(row)), f"{_nodes(folder, choice.condition):.2f}"])
     return file.getvalue()
+
+
+def _nodes(folder: ResultsFolder, condition: str) -> float:
+    """Nodes of the network that covered most in a run, the first one of equals, averaged over runs."""
+    rows = folder.read(condition, columns=["replicate", "generation", "individual", "coverage_line", "nodes"])
+    best = rows.sort("coverage_line", "generation", "individual", descending=[True, False, False])
+    return float(best.group_by("replicate").agg(pl.col("nodes").first())["nodes"].mean())
 
 
 def _signed(value: float) -> str:

@@ -21,6 +21,8 @@ BENCHMARK = HERE.parent / "benchmarks" / "peers.py"
 TITLES = {
     "ours": "realitygap",
     "jyro": "Jyro",
+    "enki": "Enki",
+    "irsim": "IR-SIM",
     "kheperax": "Kheperax",
     "neat_python": "neat-python",
     "multineat": "MultiNEAT",
@@ -29,6 +31,11 @@ TITLES = {
 FIGURES = {
     "steps_core": ("robot-steps a second, one core", "/s"),
     "steps_all": ("robot-steps a second, all cores", "/s"),
+    "realism_avoiding": (
+        "robot-steps a second with outline, contact and noise: avoiding walls, one core",
+        "/s",
+    ),
+    "realism_pressed": ("the same, pressed into walls", "/s"),
     "run_us": ("a NEAT run: 8 individuals, 5 generations, trivial fitness", "µs"),
     "xor_ms": ("XOR: a generation of 150, with evaluation", "ms"),
     "large_ms": ("reproduction and speciation of 10,000", "ms"),

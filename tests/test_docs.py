@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from realitygap import run_study
@@ -20,7 +21,7 @@ from realitygap.robots import JyroPlatform
 from realitygap.settings import is_hidden
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import CoverageTask
-from realitygap.world import ArenaSettings
+from realitygap.world import ArenaSettings, load_robot
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -361,3 +362,23 @@ def test_what_the_page_of_distances_says_is_what_the_numbers_say():
 def _number(cell):
     """The first number of a cell."""
     return float(cell.replace("−", "-").split()[0])
+
+
+def test_the_page_of_sensors_has_the_numbers_of_the_robot_files():
+    make_sensors = _load("make_sensors")
+    lines = make_sensors.page_parts()["parts/sensors.md"].splitlines()
+    heads = [line for line in lines if line.startswith("| number")]
+    assert heads[0].endswith("| " + " | ".join(f"`{name}`" for name in make_sensors.ROBOTS) + " |")
+    robots = [load_robot(name).range[0] for name in make_sensors.ROBOTS]
+    decay = next(line for line in lines if line.startswith("| `decay` |"))
+    assert decay.endswith(" | ".join(f"{robot.decay:.4g}" for robot in robots) + " |")
+
+
+def test_the_figure_of_sensors_is_drawn_from_readings_of_the_kernels():
+    make_sensors = _load("make_sensors")
+    distances = np.linspace(0.0, 0.3, 70)
+    jyro = make_sensors.read(make_sensors.without_noise(load_robot("jyro")), distances, 1)[0]
+    assert jyro == pytest.approx(np.maximum(1 - distances / 0.2, 0))
+    noisy = make_sensors.read(load_robot("scribbler-s2-fluke1"), distances, 20)
+    assert (noisy == 0).any()
+    assert ((noisy >= 0) & (noisy <= 1)).all()

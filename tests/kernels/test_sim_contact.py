@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -113,7 +114,7 @@ def test_steps_among_obstacles_equal_the_reference(model: str) -> None:
         "arena.wall.4.y2": 0.35,
     }
     ends = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, DEPTH), (0.0, DEPTH), (0.0, 0.0)]
-    polygons += [reference.Polygon([a, b]) for a, b in zip(ends, ends[1:], strict=False)]
+    polygons += [reference.Polygon([a, b]) for a, b in itertools.pairwise(ends)]
     polygons.append(reference.Polygon([(0.4, 0.6), (0.5, 0.35)]))
     like, world = body(model), reference.World([], polygons)
     inside = reference.World(planes(), polygons)
@@ -137,7 +138,10 @@ NOSE = (0.08, 0.05)
 def test_a_nose_aligns_with_a_wall_or_stalls_as_the_oracle_says(
     angle: float, friction: float, side: int
 ) -> None:
-    """It aligns when a + atan(mu) < atan(c_x / |c_y|); a: between heading and wall, c: point of contact from the axle."""
+    """It aligns when a + atan(mu) < atan(c_x / |c_y|).
+
+    a: between heading and wall; c: the point of contact from the axle.
+    """
     border = math.atan2(NOSE[0], NOSE[1]) - angle - math.atan(friction)
     if abs(border) < 0.05:
         return
@@ -190,7 +194,8 @@ def test_no_robot_passes_through_a_thin_wall_at_any_speed() -> None:
     heading = np.linspace(-0.5, 0.5, n)
     numbers = {
         **SCRIBBLER, **outline(OUTLINE), "arena.start.x": -0.3, "arena.start.y": 0.0, "arena.start.heading": heading,
-        "drive.speed": speeds, "arena.wall.0.x1": 0.0, "arena.wall.0.y1": -50.0, "arena.wall.0.x2": 0.0, "arena.wall.0.y2": 50.0,
+        "drive.speed": speeds, "arena.wall.0.x1": 0.0, "arena.wall.0.y1": -50.0,
+        "arena.wall.0.x2": 0.0, "arena.wall.0.y2": 50.0,
     }  # fmt: skip
     for model in MODELS:
         driven = drive_robots(
@@ -249,7 +254,10 @@ def test_a_robot_goes_the_same_way_in_any_lane_and_company() -> None:
 
 
 def test_finer_steps_lead_to_one_path() -> None:
-    """The same motion in steps of 0.5 s down to 1/32 of it: the error falls about in proportion, to below 1 mm."""
+    """The same motion in steps of 0.5 s down to 1/32 of it: the error falls about in proportion, to below 1 mm.
+
+    Stated: within 5 mm and 0.04 rad after 0.7 m along a wall in steps of 0.5 s.
+    """
     heading = np.radians([15.0, 30, 45, 60])
     numbers = {
         **SCRIBBLER, **outline(OUTLINE), "arena.start.x": 0.2, "arena.start.y": 0.45, "arena.start.heading": heading,
@@ -260,12 +268,12 @@ def test_finer_steps_lead_to_one_path() -> None:
         commands = np.tile([0.8, 0.05], (12 * parts, 1))
         return drive_robots(numbers, commands, step_s=0.5 / parts).poses[-1]
 
-    finest = end(64)
-    errors = [np.abs(end(parts) - finest)[:, :2].max() for parts in (1, 2, 4, 8)]
-    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-    assert errors[0] < 0.01
-    assert errors[-1] < 0.001
-    assert np.mean(orders) > 0.8, (errors, orders)
+    finest = end(128)
+    errors = np.array([np.abs(end(parts) - finest).max(0) for parts in (1, 4, 16, 32)])
+    assert (errors[0] < [0.005, 0.005, 0.04]).all()
+    assert (errors[-1] < [0.001, 0.001, 0.004]).all()
+    order = np.log2(errors[0] / errors[-1]) / 5
+    assert order[1:].min() > 0.7, (errors, order)
 
 
 def test_a_disc_turns_against_a_wall_and_a_box_with_stop_does_not_turn_into_it() -> None:

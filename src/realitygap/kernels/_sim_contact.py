@@ -340,9 +340,11 @@ def _resolve(shape, near):
                 continue
             parts = shape.late_substeps
         sizes_asked(near.moved[2 * phase], near.moved[2 * phase + 1], reach, length, turn)
-        for _ in range(parts):
+        for part in range(parts):
             copy_poses(near.pose, near.before)
             _go_part(shape, near.moved[2 * phase], near.moved[2 * phase + 1], 1.0 / parts, near.pose)
+            if shape.contact == FREEZE and shape.mixing != WHEELS and phase == 0 and part == parts - 1:
+                continue  # Jyro looks where a step ends, and not before it turns there
             _contact_part(shape, near)
             if shape.contact != FREEZE:
                 _note_done(

@@ -445,3 +445,23 @@ def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:
     normals *= np.sign(at_start)[:, None]
     gaps = normals @ walls.reshape(-1, 2).T - (normals * walls[:, :2]).sum(1)[:, None]
     return bool((at_start != 0).all() and gaps.min() >= -1e-9)
+
+
+def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: float) -> int:
+    """Parts of a step in which contact must be looked for, so that nothing thin is passed through.
+
+    In each part the body moves less than half of its half width: what it meets is always pushed back out to the
+    side where it came from. There are at least two, for the sake of exactness.
+
+    Args:
+        travel: The farthest that a wheel drives in a step [m].
+        corners, radius: Of a part of the body, the smallest [m].
+    """
+    points = np.array(corners, np.float64).reshape(-1, 2)
+    along = np.roll(points, -1, axis=0) - points
+    size = np.hypot(*along.T)
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)[size > 0] / size[size > 0, None]
+    heights = normals @ points.T
+    widths = heights.max(1) - heights.min(1) if len(normals) else np.zeros(1)
+    half = float(widths.min()) / 2 + radius
+    return max(2, math.ceil(2 * abs(travel) / half)) if half > 0 else 64

@@ -1,10 +1,10 @@
 """Where bodies meet walls and obstacles most deeply, in lanes.
 
 A body is convex polygons grown by a radius each, in the frame of its axle; obstacles and open walls are likewise,
-in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are nearest at
-the face of either of them that has the other one farthest in front of it: either there or, where the way to the
-other leads past an end of the face, at that end (a face of the Minkowski difference that is farthest from the origin
-has the point nearest to it).
+in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are
+nearest at the face of either of them that has the other one farthest in front of it: either there or, where the way
+to the other leads past an end of the face, at that end (a face of the Minkowski difference that is farthest from the
+origin has the point nearest to it).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FAR = 1e9  # farther than any wall [m]
 
 # Of parallel faces each is met at corners that follow from the other's: their normals are turned by so much
 # [rad] for the search, so that none of the corners is met by chance.
-TILT = 1e-4
+TILT = 1e-5
 # A face that is passed at its end gives way to one that is not and is nearly as far in front.
 OVERHANG = 1e-3
 
@@ -243,6 +243,7 @@ def _deeper_in_shape(
     apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y,
     body_radius, radius, near_gap, facing, beside, point_x, point_y,
 ):  # fmt: skip
+    """Keep the deeper contact; of two as deep, the one more to the left, so that no order of shapes decides."""
     real = near_gap.dtype.type
     for k in range(NEAR):
         d_x = way_x[k]
@@ -260,7 +261,7 @@ def _deeper_in_shape(
         g = beside[k]
         p_x = point_x[k]
         p_y = point_y[k]
-        deeper = gap < least
+        deeper = (gap < least) | ((gap == least) & (c_y + b > p_y + g))
         near_gap[k] = gap if deeper else least
         facing[k] = a if deeper else f
         beside[k] = b if deeper else g

@@ -15,7 +15,7 @@ from realitygap.evolution import NeatSettings
 from realitygap.kernels._network import Networks, make_networks
 from realitygap.kernels._sim import run_sim_trials
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
-from realitygap.kernels._sim_shape import make_sim_shape, sim_table
+from realitygap.kernels._sim_shape import make_sim_shape, sim_table, substeps_for
 from realitygap.world import load_robot, paper_arena
 
 from ._bench import MOST_SECONDS
@@ -23,6 +23,7 @@ from ._run import machine_facts
 
 N_TRIALS = 1_280
 N_STEPS = 100
+STEP_S = 0.5
 SPREAD = 0.03  # by which every number differs from trial to trial, up or down, as a part of it
 
 # Three infrared range sensors with the mixture of a Fluke's faults, ahead and to both sides.
@@ -108,10 +109,12 @@ class RealisticTrials:
     def __init__(self, weights: tuple[tuple[float, ...], ...], *, boxes: bool) -> None:
         arena = paper_arena()
         numbers = _numbers(boxes=boxes)
-        parts = [sum(name.startswith("body.0.corner.") and name.endswith(".x") for name in numbers)]
         self.shape = make_sim_shape(
-            parts=parts,
+            parts=[len(_outline(numbers))],
             contact="slide",
+            substeps=substeps_for(
+                numbers["drive.speed"] * STEP_S, _outline(numbers), numbers["body.0.radius"]
+            ),
             range_response=["ir"] * len(SENSORS),
             n_walls=4,
             enclosed=True,
@@ -124,7 +127,7 @@ class RealisticTrials:
         self.table = sim_table(self.shape, _spread(numbers), np.float32, (start.x, start.y))
         grid = arena.grid
         place = [(start.x - grid.x) / grid.cell, (start.y - grid.y) / grid.cell]
-        self.rules = SimRules(N_STEPS, 0.5, True, 1.0, np.array([*place, 1 / grid.cell, 1e-5], np.float32))
+        self.rules = SimRules(N_STEPS, STEP_S, True, 1.0, np.array([*place, 1 / grid.cell, 1e-5], np.float32))
         self.neat = NeatSettings.named("rosenzweig-remy").rules(4, 2, bias_input=3)
         self.networks = _networks(self.neat, weights)
         self.which = np.zeros(N_TRIALS, np.int32)
@@ -180,6 +183,11 @@ def _numbers(*, boxes: bool) -> dict[str, float]:
             numbers[f"arena.obstacle.{k}.corner.{j}.x"] = left * HALF_SIDE
             numbers[f"arena.obstacle.{k}.corner.{j}.y"] = up * HALF_SIDE
     return numbers
+
+
+def _outline(numbers: dict[str, float]) -> list[tuple[float, float]]:
+    xs = [name for name in numbers if name.startswith("body.0.corner.") and name.endswith(".x")]
+    return [(numbers[name], numbers[f"{name[:-1]}y"]) for name in xs]
 
 
 def _spread(numbers: dict[str, float]) -> dict[str, NDArray[np.float64]]:

@@ -18,6 +18,7 @@ from realitygap.kernels._sim_shape import (
     make_sim_shape,
     sim_rows,
     sim_table,
+    substeps_for,
 )
 from realitygap.robots import ARENA, SimPlatform
 from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
@@ -125,9 +126,26 @@ def highest(value: float | Distribution) -> float:
     return value.highest if isinstance(value, Distribution) else value
 
 
+_DRAWN_IN_STEPS = (
+    "delay_jitter",
+    "travel_noise_per_m",
+    "travel_noise_per_s",
+    "heading_noise_per_m",
+    "heading_noise_per_s",
+)
+
+
 def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
     latest = highest(numbers["drive.delay"]) + highest(numbers["drive.delay_jitter"])
     drive = robot.drive
+    way = _farthest(numbers, step_s)
+    substeps = max(
+        substeps_for(way, [(corner.x, corner.y) for corner in part.corner], part.radius)
+        for part in robot.body
+    )
+    if robot.contact.model == "freeze":
+        # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
+        substeps = math.ceil(substeps / 3)
     return {
         "parts": [len(part.corner) for part in robot.body],
         "contact": robot.contact.model,
@@ -136,7 +154,24 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
         "levels": drive.levels,
         "lowest_level": drive.lowest_level,
         "delay_steps": math.ceil(latest / step_s),
+        "late": latest > 0,
+        "noisy": any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
+        "substeps": substeps,
+        "late_substeps": max(1, math.ceil(substeps * min(latest / step_s, 1.0))),
     }
+
+
+def _farthest(numbers: Numbers, step_s: float) -> float:
+    """What a wheel drives in a step at most [m]: at any gain and bias, and with noise of six standard deviations."""
+
+    def most(name: str) -> float:
+        value = numbers[f"drive.{name}"]
+        return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
+
+    gain, bias = (max(most(f"{name}_left"), most(f"{name}_right")) for name in ("gain", "bias"))
+    way = (most("speed") * gain + bias) * step_s
+    variance = most("travel_noise_per_m") ** 2 * way + most("travel_noise_per_s") ** 2 * step_s
+    return way + 6.0 * math.sqrt(variance)
 
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:

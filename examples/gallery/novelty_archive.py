@@ -35,7 +35,7 @@ def visits_of(selection: str) -> tuple[np.ndarray, int]:
 figure = Figure(figsize=(9.6, 2.75))
 for k, selection in enumerate(("novelty", "coverage")):
     visits, n_kept = visits_of(selection)
-    axes = figure.add_axes((0.01 + 0.5 * k, 0.01, 0.48, 0.88))
+    axes = figure.add_axes((0.01 + 0.485 * k, 0.01, 0.465, 0.88))
     shown = axes.imshow(visits, origin="lower", cmap="Blues", vmin=0, vmax=8 * GENERATIONS)
     for row, column in np.ndindex(visits.shape):
         color = "white" if visits[row, column] > 4 * GENERATIONS else "#1c1f24"
@@ -50,6 +50,6 @@ for k, selection in enumerate(("novelty", "coverage")):
         f"selected by {selection}: {seen}, {n_kept} behaviors in the archive", fontsize=9, loc="left"
     )
 figure.text(
-    0.955, 0.45, f"SIM, one run of {8 * GENERATIONS} networks each", rotation=90, va="center", fontsize=8
+    0.968, 0.45, f"SIM, one run of {8 * GENERATIONS} networks each", rotation=90, va="center", fontsize=8
 )
 figure.savefig(sys.argv[1] if len(sys.argv) > 1 else "archive.png", dpi=150)

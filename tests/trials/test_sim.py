@@ -204,6 +204,10 @@ def test_a_platform_without_noise_is_the_same_in_every_repeat():
         ({"set": {"drive.trak": 0.1}}, "drive.trak: no number of this name. Did you mean 'drive.track'?"),
         ({"set": {"drive.track": -0.1}}, "drive.track: expected more than 0"),
         ({"set": {"drive.track": "wide"}}, "drive.track: expected a number, or how it is drawn"),
+        (
+            {"set": {"drive.track": float("nan"), "drive.lag": 0.1}},
+            "drive.track: expected a finite number, came nan",
+        ),
         ({"set": {"drive.track": {"normal": [0.1]}}}, "drive.track.normal"),
         ({"set": {"drive.track": {"uniform": [-1.0, 2.0]}}}, "drive.track: expected numbers more than 0"),
         ({"contact": "bounce"}, "expected 'robot', 'freeze', 'stop' or 'slide', came 'bounce'"),

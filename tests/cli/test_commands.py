@@ -41,6 +41,7 @@ COMMANDS = sorted(typer.main.get_command(app).commands)
 
 def test_all_commands_are_known():
     assert COMMANDS == [
+        "audit-distance",
         "audit-results",
         "bench",
         "digest",

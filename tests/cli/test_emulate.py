@@ -136,7 +136,7 @@ def test_in_a_terminal_there_is_a_live_view():
         (["robbie"], "Unknown robot 'robbie'"),
         (["scribbler", "--model", "s9"], "s1 or s2"),
         (["scribbler", "--fluke", "3"], "none, 1, 2"),
-        (["scribbler", "--arena", "nowhere.toml"], "No arena"),
+        (["scribbler", "--arena", "nowhere.toml"], "There is no arena file nowhere.toml."),
         (["scribbler", "--faults", "drip=1"], "Did you mean 'drop'"),
         (["scribbler", "--timing", "fast"], "on or off"),
         (["scribbler", "--tcp", "0", "--link", "x"], "Give one of them"),

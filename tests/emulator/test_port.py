@@ -152,7 +152,7 @@ def test_a_hang_up_is_a_serial_exception_until_the_port_is_opened_again():
         ("emulator://s2?speed=fast", "speed=fast"),
         ("emulator://s2?seed=-1", "seed=-1"),
         ("emulator://s2?timing=maybe", "on or off"),
-        ("emulator://s2?arena=nowhere", "No arena"),
+        ("emulator://s2?arena=nowhere", "Unknown arena 'nowhere'"),
         ("emulator://s2?faults=drop=7", "drop"),
     ],
 )

@@ -84,7 +84,7 @@ def test_without_an_argument_the_port_is_asked_for(monkeypatch):
         ([], "expected text"),
         ("sim?seeed=1", r"the option is 'seeed', expected .* Did you mean 'seed'"),
         ("sim?speed=fast", r"the speed is 'fast', expected a number"),
-        ("sim?arena=moon", "No arena 'moon'"),
+        ("sim?arena=moon", "Unknown arena 'moon'"),
         ("sim?start=1", "the start is"),
         ("sim?start=9,9,0", "not inside the arena"),
     ],

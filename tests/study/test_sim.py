@@ -8,6 +8,7 @@ from typing import Any
 import polars as pl
 import pytest
 
+import realitygap
 from realitygap.errors import RecordError, StudyError
 from realitygap.records import ResultsFolder
 from realitygap.report import save_view, write_report
@@ -256,3 +257,14 @@ def test_another_task_than_coverage_needs_what_jyro_has(tmp_path):
     condition = with_task(tmp_path, PYTHON_TASK, platform="jyro", sim={})
     with pytest.raises(StudyError, match=r"far of task\.py failed: line 6: ValueError: These trials"):
         run_replicates(condition, 0, 1)
+
+
+def test_the_line_that_reads_rows_with_several_columns_reads_them(tmp_path):
+    """polars refuses to scan files of which some lack a column."""
+    from realitygap.cli._study import _reading
+
+    text = '[study]\nname = "mix"\nreplicates = 1\n[[condition]]\nname = "a"\nplatform = "sim"\nnoise = 0\n'
+    text += '[condition.sim]\nsteps = 3\n[[condition]]\nname = "b"\n'
+    folder = run_study(parse_study(text, "mix"), tmp_path / "mix").folder
+    rows = eval(_reading(folder), {"realitygap": realitygap}).collect()
+    assert set(rows["condition"]) == {"a", "b"}

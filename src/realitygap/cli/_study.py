@@ -17,6 +17,7 @@ from ._operator import Answers, choose_operator
 from ._results import written_report
 
 if TYPE_CHECKING:
+    from realitygap.records import ResultsFolder
     from realitygap.study import Progress, StudyResult
 
 
@@ -287,8 +288,18 @@ def _print_result(result: StudyResult, *, as_json: bool) -> None:
     elif result.n_runs:
         typer.echo(f"All {result.n_runs} runs were there already.")
     _print_physical(result)
-    typer.echo(f"Results: {path}   in Python: polars.scan_parquet({f'{path}/trials/*.parquet'!r})")
+    typer.echo(f"Results: {path}   in Python: {_reading(result.folder)}")
     typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")
+
+
+def _reading(folder: ResultsFolder) -> str:
+    """The line of Python that reads all rows."""
+    import polars as pl
+
+    chunks = [chunks[0].path for name in folder.conditions if (chunks := folder.chunks(name))]
+    if len({frozenset(pl.read_parquet_schema(path)) for path in chunks}) > 1:
+        return f"realitygap.ResultsFolder.open({str(folder.path)!r}).scan()"
+    return f"polars.scan_parquet({f'{folder.path}/trials/*.parquet'!r})"
 
 
 def _physical_json(result: StudyResult) -> dict[str, Any]:

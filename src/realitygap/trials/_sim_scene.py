@@ -137,6 +137,9 @@ MOST_DELAY_STEPS = 1000
 N_SECTORS = 4
 """Pie slices around a robot of which it knows whether the goal is in them."""
 
+MOST_PARTS = 1_000
+"""Of a step, in which contact is looked for: a body that goes hundreds of its own sizes in a step is a mistake."""
+
 _DRAWN_IN_STEPS = (
     "delay_jitter",
     "travel_noise_per_m",
@@ -162,6 +165,11 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
     if robot.contact.model == "freeze":
         # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
         substeps = math.ceil(substeps / 3)
+    if substeps > MOST_PARTS:
+        raise ValueError(
+            f"the robot drives up to {way:,.4g} m in a step, which takes {substeps:,} parts to look for contact in; "
+            f"expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
+        )
     return {
         "parts": [len(part.corner) for part in robot.body],
         "contact": robot.contact.model,

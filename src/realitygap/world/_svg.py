@@ -18,7 +18,8 @@ from realitygap.settings import shown
 
 Point = tuple[float, float]
 
-SVG = "{http://www.w3.org/2000/svg}"
+NAMESPACE = "http://www.w3.org/2000/svg"
+SVG = f"{{{NAMESPACE}}}"
 UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "pt": 0.0254 / 72, "pc": 0.0254 / 6}  # [m]
 KINDS = ("start", "goal", "light", "tape", "wall", "obstacle", "ignore")
 SILENT = ("defs", "metadata", "title", "desc", "style", "script", "namedview")  # draw nothing by themselves

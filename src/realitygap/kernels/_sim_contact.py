@@ -20,8 +20,10 @@ from ._sim_drive import arc_step
 from ._sim_lanes import NEAR
 from ._sim_near import (
     TOUCHES,
+    beyond_box,
     beyond_ends,
     beyond_face,
+    box_from_corner,
     copy_poses,
     flag_near,
     flag_near_disc,
@@ -30,6 +32,7 @@ from ._sim_near import (
     look_ahead,
     scatter,
     sizes_asked,
+    swept,
 )
 from ._sim_outline import PER_CORNER
 from ._sim_rays import see_plane
@@ -100,7 +103,11 @@ def _flag_near_shapes(shape, lanes, flag):
     """Flag robots that some obstacle or open wall is near enough to be met by in the step."""
     real = lanes.low.dtype.type
     p, spare = lanes.p, lanes.spare
-    x, y, far, most = spare[1], spare[2], spare[3], spare[4]
+    x, y, far, most, apart, box, sides = (
+        spare[1], spare[2], spare[3], spare[4], spare[5], spare[6:10], spare[10:14],
+    )  # fmt: skip
+    moved, bounds = lanes.moved, p[shape.row_bounds : shape.row_bounds + 4]
+    swept(moved[0], moved[1], moved[2], moved[3], p[shape.row_reach], bounds, box)
     look_ahead(
         lanes.moved[0], lanes.moved[2], p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far
     )
@@ -111,12 +118,19 @@ def _flag_near_shapes(shape, lanes, flag):
             flag_near_disc(p[first], p[first + 1], p[radius], x, y, far, flag)
         else:
             fill(most, real(-FAR))
+            fill(apart, real(-FAR))
+            for side in range(4):
+                fill(sides[side], real(-FAR if side & 1 else FAR))
             for corner in range(n):
                 row = first + PER_CORNER * corner
                 beyond_face(p[row], p[row + 1], p[row + 2], p[row + 3], x, y, most)
+                box_from_corner(
+                    p[row], p[row + 1], p[row + 2], p[row + 3], x, y, lanes.pose, box, sides, apart
+                )
             if n == 2:
                 beyond_ends(p[first], p[first + 1], p[first + 2], p[first + 3], p[first + 4], x, y, most)
-            flag_near(most, p[radius], far, flag)
+            beyond_box(box, sides, apart)
+            flag_near(most, apart, p[radius], far, flag)
 
 
 @stage
@@ -288,43 +302,43 @@ def _clear(row, value):
 
 
 @kernel
-def _contact_part(shape, near):
-    """Contact after one part of a step was gone."""
+def _answer_part(shape, near, sweep):
+    """Give way after a part of a step, `sweep` times before; returns whether what touches then is of interest."""
     p, row = near.p, shape.row_contact
-    n = touch(shape, near)
-    _note_touch(near.gap, near.low)
-    if n == 0 or shape.contact == FREEZE:
-        return
+    if sweep == 0:
+        _note_touch(near.gap, near.low)
+    if shape.contact == FREEZE:
+        return False
     if shape.contact == SLIDE:
-        for sweep in range(shape.sweeps):
-            if sweep > 0 and touch(shape, near) == 0:
-                break
-            _push(
-                near.gap, near.facing, near.beside, near.point_x, near.point_y,
-                p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, near.before,
-            )  # fmt: skip
-        return
+        _push(
+            near.gap, near.facing, near.beside, near.point_x, near.point_y,
+            p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, near.before,
+        )  # fmt: skip
+        return sweep + 1 < shape.sweeps
     _put_back_places(near.gap, near.before, near.pose)
-    touch(shape, near)
-    _put_back_places(near.gap, near.before, near.pose)
-    _put_back_turns(near.gap, near.before, near.pose)
+    if sweep == 1:
+        _put_back_turns(near.gap, near.before, near.pose)
+    return sweep == 0
 
 
 @kernel
-def _leave_free(shape, near):
+def _leave_free(near, sweep):
     """Push what still touches something straight out, and where that fails go back to the beginning of the step."""
-    for _ in range(N_RESCUES):
-        if touch(shape, near) == 0:
-            return
+    if sweep < N_RESCUES:
         _push_straight(near.gap, near.facing, near.beside, near.pose)
-    touch(shape, near)
+        return True
     _put_back_places(near.gap, near.start, near.pose)
     _put_back_turns(near.gap, near.start, near.pose)
+    return False
 
 
 @kernel
 def _resolve(shape, near):
-    """Carry out a step of robots that may touch something."""
+    """Carry out a step of robots that may touch something.
+
+    In parts; in each of them, and once more at the end, the bodies give way until nothing touches, or long enough.
+    All is one loop for the sake of a single place that asks what touches: that is most of the code.
+    """
     length, turn = near.spare[20], near.spare[21]
     went, turned = near.done[0], near.done[1]
     reach = near.p[shape.row_reach]
@@ -333,29 +347,39 @@ def _resolve(shape, near):
     _clear(went, 0.0)
     _clear(turned, 0.0)
     copy_poses(near.pose, near.start)
-    for phase in range(2):
-        parts = shape.substeps
-        if phase == 0 and shape.mixing == WHEELS:
-            if not shape.late:
-                continue
-            parts = shape.late_substeps
-        sizes_asked(near.moved[2 * phase], near.moved[2 * phase + 1], reach, length, turn)
-        for part in range(parts):
+    early = shape.substeps
+    if shape.mixing == WHEELS:
+        early = shape.late_substeps if shape.late else 0
+    last = early + shape.substeps
+    part, sweep, n_touching = 0, 0, 0
+    while True:
+        row = 2 if part >= early else 0
+        asked, around = near.moved[row], near.moved[row + 1]
+        if sweep == 0 and part < last:
+            if part == 0 or part == early:
+                sizes_asked(asked, around, reach, length, turn)
             copy_poses(near.pose, near.before)
-            _go_part(shape, near.moved[2 * phase], near.moved[2 * phase + 1], 1.0 / parts, near.pose)
-            if shape.contact == FREEZE and shape.mixing != WHEELS and phase == 0 and part == parts - 1:
-                continue  # Jyro looks where a step ends, and not before it turns there
-            _contact_part(shape, near)
-            if shape.contact != FREEZE:
-                _note_done(
-                    near.moved[2 * phase], near.moved[2 * phase + 1], near.before, near.pose, went, turned
-                )
+            _go_part(shape, asked, around, 1.0 / (early if part < early else shape.substeps), near.pose)
+        if shape.contact == FREEZE and shape.mixing != WHEELS and part == early - 1:
+            part += 1  # Jyro looks where a step ends, and not before it turns there
+            continue
+        n_touching = touch(shape, near)
+        again = False
+        if n_touching > 0:
+            again = _answer_part(shape, near, sweep) if part < last else _leave_free(near, sweep)
+        if again:
+            sweep += 1
+            continue
+        if part < last and shape.contact != FREEZE:
+            _note_done(asked, around, near.before, near.pose, went, turned)
+        part, sweep = part + 1, 0
+        if part > last or (part == last and (shape.contact == FREEZE or n_touching == 0)):
+            break
     if shape.contact == FREEZE:
         _put_back_places(near.low, near.start, near.pose)
         _put_back_turns(near.low, near.start, near.pose)
         _stall_of_touch(near.low, near.gap)
         return
-    _leave_free(shape, near)
     _judge(reach, length, turn, went, turned, near.low, near.gap)
 
 

@@ -11,7 +11,7 @@ from ._compile import kernel, stage
 from ._lanes import LANES, Line, Poses, Row, Rows, Words, fill
 from ._math import sin_cos_of_turns
 from ._philox import PURPOSE_DRIVE
-from ._sim_outline import outline_of, place_obstacle, reach_of
+from ._sim_outline import bounds_of, outline_of, place_obstacle, reach_of
 from ._sim_senses import Senses, make_senses, start_senses
 from ._wiring import Wiring, make_wiring
 
@@ -257,6 +257,9 @@ def _derive(shape, lanes):
     p = lanes.p
     start = shape.row_start
     fill(p[shape.row_reach], lanes.low.dtype.type(0.0))
+    bounds = shape.row_bounds
+    for k in range(4):
+        fill(p[bounds + k], lanes.low.dtype.type(-1e9 if k & 1 else 1e9))
     for part in range(shape.part_corners.size):
         n = shape.part_corners[part]
         first, outline = shape.row_part[part], shape.row_outline[part]
@@ -264,6 +267,9 @@ def _derive(shape, lanes):
         for corner in range(n):
             row = outline + 5 * corner
             reach_of(p[row], p[row + 1], p[first + 2 * n], p[shape.row_drive + 2], p[shape.row_reach])
+            bounds_of(
+                p[row], p[row + 1], p[first + 2 * n], p[bounds], p[bounds + 1], p[bounds + 2], p[bounds + 3]
+            )
     if shape.enclosed:
         for w in range(shape.n_walls):
             wall = shape.row_wall + 4 * w

@@ -145,13 +145,106 @@ def beyond_ends(x, y, normal_x, normal_y, length, from_x, from_y, most):
 
 
 @stage
-def flag_near(most, radius, far, flag):
-    """Flag where `most` is below `far`."""
+def flag_near(most, apart, radius, far, flag):
+    """Flag where `most` is below `far` and the boxes around both, of `swept`, are not apart."""
     real = flag.dtype.type
     for lane in range(LANES):
         before = flag[lane]
-        near = (before < real(IS_NEAR)) & (most[lane] - radius[lane] <= far[lane])
+        r = radius[lane]
+        near = (before < real(IS_NEAR)) & (most[lane] - r <= far[lane]) & (apart[lane] <= r)
         flag[lane] = real(IS_NEAR) if near else before
+
+
+@stage
+def swept(asked, around, then_asked, then_around, reach, bounds, box):
+    """The box, in the frame that the axle has before it, within which a body stays during a step.
+
+    A point of the body turns by at most its distance from the axle times the angle; the axle leaves the straight line
+    by at most half its way times the angle, and by what the first part of the step turned the second one.
+
+    Args:
+        asked, around, then_asked, then_around: Length [m] and turn [turns] of both parts of the step.
+        reach: Of the body from its axle [m].
+        bounds: (4, LANES) of the body.
+        box: (4, LANES) written: middle and half the size, along and across [m].
+    """
+    real = reach.dtype.type
+    least_x, most_x, least_y, most_y = bounds[0], bounds[1], bounds[2], bounds[3]
+    mid_x, half_x, mid_y, half_y = box[0], box[1], box[2], box[3]
+    for lane in range(LANES):
+        one = asked[lane]
+        two = then_asked[lane]
+        first = abs(around[lane]) * real(TWO_PI)
+        second = abs(then_around[lane]) * real(TWO_PI)
+        spread = reach[lane] * (first + second) + real(1e-4)
+        spread = spread + abs(one) * (real(0.5) * first) + abs(two) * (first + real(0.5) * second)
+        low = least_x[lane] + (
+            (one if one < real(0.0) else real(0.0)) + (two if two < real(0.0) else real(0.0))
+        )
+        high = most_x[lane] + (
+            (one if one > real(0.0) else real(0.0)) + (two if two > real(0.0) else real(0.0))
+        )
+        right = least_y[lane]
+        left = most_y[lane]
+        mid_x[lane] = real(0.5) * (low + high)
+        half_x[lane] = real(0.5) * (high - low) + spread
+        mid_y[lane] = real(0.5) * (right + left)
+        half_y[lane] = real(0.5) * (left - right) + spread
+
+
+@stage
+def box_from_corner(x, y, normal_x, normal_y, from_x, from_y, pose, box, sides, apart):
+    """Raise `apart` to how far a body's box is beyond a face, and widen `sides` by the corner the face begins at.
+
+    Args:
+        x, y, normal_x, normal_y: Corner and face.
+        from_x, from_y, pose: The axle and its heading.
+        box: Of `swept`.
+        sides: (4, LANES) least and most of the corners' distances from the middle of the box, along and across.
+        apart: (LANES,) [m].
+    """
+    sine, cosine = pose.sine, pose.cosine
+    mid_x, half_x, mid_y, half_y = box[0], box[1], box[2], box[3]
+    least_x, most_x, least_y, most_y = sides[0], sides[1], sides[2], sides[3]
+    for lane in range(LANES):
+        d_x = x[lane] - from_x[lane]
+        d_y = y[lane] - from_y[lane]
+        n_x = normal_x[lane]
+        n_y = normal_y[lane]
+        s = sine[lane]
+        c = cosine[lane]
+        u = d_x * c + d_y * s - mid_x[lane]
+        v = d_y * c - d_x * s - mid_y[lane]
+        a = n_x * c + n_y * s
+        b = n_y * c - n_x * s
+        gap = -(a * u + b * v) - abs(a) * half_x[lane] - abs(b) * half_y[lane]
+        so_far = apart[lane]
+        apart[lane] = gap if gap > so_far else so_far
+        low = least_x[lane]
+        high = most_x[lane]
+        right = least_y[lane]
+        left = most_y[lane]
+        least_x[lane] = u if u < low else low
+        most_x[lane] = u if u > high else high
+        least_y[lane] = v if v < right else right
+        most_y[lane] = v if v > left else left
+
+
+@stage
+def beyond_box(box, sides, apart):
+    """Raise `apart` to how far all corners are beyond a side of a body's box."""
+    half_x, half_y = box[1], box[3]
+    least_x, most_x, least_y, most_y = sides[0], sides[1], sides[2], sides[3]
+    for lane in range(LANES):
+        ahead = least_x[lane]
+        behind = -most_x[lane]
+        left = least_y[lane]
+        right = -most_y[lane]
+        along = (ahead if ahead > behind else behind) - half_x[lane]
+        across = (left if left > right else right) - half_y[lane]
+        gap = along if along > across else across
+        so_far = apart[lane]
+        apart[lane] = gap if gap > so_far else so_far
 
 
 @stage

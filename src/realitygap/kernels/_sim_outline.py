@@ -91,6 +91,23 @@ def reach_of(x, y, radius, axle, reach):
 
 
 @stage
+def bounds_of(x, y, radius, least_x, most_x, least_y, most_y):
+    """Widen the bounds of a body, in the frame of its axle, by a corner."""
+    for lane in range(LANES):
+        c_x = x[lane]
+        c_y = y[lane]
+        r = radius[lane]
+        lowest = least_x[lane]
+        highest = most_x[lane]
+        rightmost = least_y[lane]
+        leftmost = most_y[lane]
+        least_x[lane] = c_x - r if c_x - r < lowest else lowest
+        most_x[lane] = c_x + r if c_x + r > highest else highest
+        least_y[lane] = c_y - r if c_y - r < rightmost else rightmost
+        most_y[lane] = c_y + r if c_y + r > leftmost else leftmost
+
+
+@stage
 def _set_down(middle_x, middle_y, heading, x, y, normal_x, normal_y):
     for lane in range(LANES):
         sine, cosine = sin_cos_of_turns(heading[lane])

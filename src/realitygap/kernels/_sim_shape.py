@@ -170,6 +170,7 @@ class SimShape(NamedTuple):
     row_outline: NDArray[np.int32]  # (k,) for each corner of a part, counter-clockwise: x from the axle, y,
     # normal x, y and length of the edge that begins there
     row_reach: int  # the farthest that the body reaches from its axle [m]
+    row_bounds: int  # least x, most x, least y and most y of the body, from its axle [m]
     row_plane: int  # normal x, y and offset of each wall
     row_ray: int  # cosine and sine of each ray
     shape_corners: NDArray[np.int32]  # (q,) corners of all that is met as a polygon: obstacles, open walls
@@ -296,6 +297,7 @@ def make_sim_shape(
     end = len(names)
     row_outline, end = _stack([5 * corners for corners in parts], end)
     row_reach, end = end, end + 1
+    row_bounds, end = end, end + 4
     row_plane, end = end, end + (3 * n_walls if enclosed else 0)
     row_ray, end = end, end + 2 * int(first_ray[-1])
     row_shape, end = _stack([5 * corners + 1 for corners in polygons], end)
@@ -350,6 +352,7 @@ def make_sim_shape(
         tapes=np.array(tapes, np.float64).reshape(-1, 6),
         row_outline=row_outline,
         row_reach=row_reach,
+        row_bounds=row_bounds,
         row_plane=row_plane,
         row_ray=row_ray,
         shape_corners=np.array(polygons, np.int32),

@@ -20,6 +20,7 @@ FAR = 1e9  # farther than any wall [m]
 # Of parallel faces each is met at corners that follow from the other's: their normals are turned by so much
 # [rad] for the search, so that none of the corners is met by chance.
 TILT = 1e-5
+SURELY = 1e-5  # [m] by which boxes must be apart for what is in them to be so: more than rounding does
 # A face that is passed at its end gives way to one that is not and is nearly as far in front.
 OVERHANG = 1e-3
 
@@ -124,20 +125,74 @@ def _deeper_in_wall(low, center, radius, along, across, x, y, near_gap, facing, 
 
 
 @stage
+def _height(along, across, x, y, low):
+    """How low the lowest corner lies along a normal."""
+    for k in range(NEAR):
+        height = along[k] * x[k] + across[k] * y[k]
+        least = low[k]
+        low[k] = height if height < least else least
+
+
+@stage
+def _height_of_two(along, across, x, y, other_x, other_y, low):
+    for k in range(NEAR):
+        a = along[k]
+        b = across[k]
+        one = a * x[k] + b * y[k]
+        two = a * other_x[k] + b * other_y[k]
+        least = low[k]
+        height = two if two < one else one
+        low[k] = height if height < least else least
+
+
+@stage
+def _low_height(p, outline, n, along, across, low):
+    _first(FAR, low)
+    for pair in range(n >> 1):
+        row = outline + 2 * PER_CORNER * pair
+        _height_of_two(along, across, p[row], p[row + 1], p[row + PER_CORNER], p[row + PER_CORNER + 1], low)
+    if n & 1:
+        row = outline + PER_CORNER * (n - 1)
+        _height(along, across, p[row], p[row + 1], low)
+
+
+@stage
+def _nearer_wall(low, center, along, across, best, best_center, best_along, best_across):
+    for k in range(NEAR):
+        c = center[k]
+        a = along[k]
+        b = across[k]
+        gap = low[k] + c
+        least = best[k]
+        b_c = best_center[k]
+        b_a = best_along[k]
+        b_b = best_across[k]
+        deeper = gap < least
+        best[k] = gap if deeper else least
+        best_center[k] = c if deeper else b_c
+        best_along[k] = a if deeper else b_a
+        best_across[k] = b if deeper else b_b
+
+
+@stage
 def touch_walls(shape, near):
-    """Deepen the touch by the walls of an enclosed room."""
+    """Deepen the touch by the walls of an enclosed room: where, is asked of the nearest wall only."""
     p, spare = near.p, near.spare
     center, along, across, low, x, y = spare[0], spare[1], spare[2], spare[3], spare[4], spare[5]
-    for w in range(shape.n_walls):
-        plane = shape.row_plane + 3 * w
-        _see(p[plane], p[plane + 1], p[plane + 2], near.pose, center, along, across)
-        for part in range(shape.part_corners.size):
-            n = shape.part_corners[part]
-            _lowest(p, shape.row_outline[part], n, along, across, low, x, y)
-            _deeper_in_wall(
-                low, center, p[shape.row_part[part] + 2 * n], along, across, x, y,
-                near.gap, near.facing, near.beside, near.point_x, near.point_y,
-            )  # fmt: skip
+    best, best_center, best_along, best_across = spare[8], spare[9], spare[10], spare[11]
+    for part in range(shape.part_corners.size):
+        n, outline = shape.part_corners[part], shape.row_outline[part]
+        _first(FAR, best)
+        for w in range(shape.n_walls):
+            plane = shape.row_plane + 3 * w
+            _see(p[plane], p[plane + 1], p[plane + 2], near.pose, center, along, across)
+            _low_height(p, outline, n, along, across, low)
+            _nearer_wall(low, center, along, across, best, best_center, best_along, best_across)
+        _lowest(p, outline, n, best_along, best_across, low, x, y)
+        _deeper_in_wall(
+            low, best_center, p[shape.row_part[part] + 2 * n], best_along, best_across, x, y,
+            near.gap, near.facing, near.beside, near.point_x, near.point_y,
+        )  # fmt: skip
 
 
 @stage
@@ -180,23 +235,31 @@ def _consider_face(
     for k in range(NEAR):
         a = normal_x[k]
         b = normal_y[k]
-        off_x = q_x[k] - x[k]
-        off_y = q_y[k] - y[k]
+        low_x = q_x[k]
+        low_y = q_y[k]
+        from_x = x[k]
+        from_y = y[k]
+        to_x = end_x[k]
+        to_y = end_y[k]
+        off_x = low_x - from_x
+        off_y = low_y - from_y
         gap = a * off_x + b * off_y
         along = a * off_y - b * off_x
         past = along - length[k]
         beyond = past > real(0.0)
         over = past if past > -along else -along
         over = over if over > real(0.0) else real(0.0)
-        v_x = end_x[k] if beyond else x[k]
-        v_y = end_y[k] if beyond else y[k]
+        v_x = to_x if beyond else from_x
+        v_y = to_y if beyond else from_y
         worth = gap - real(OVERHANG) * over
-        foot_x = v_x if over > real(0.0) else q_x[k] - gap * a
-        foot_y = v_y if over > real(0.0) else q_y[k] - gap * b
-        b_x = q_x[k] if sign > 0 else foot_x
-        b_y = q_y[k] if sign > 0 else foot_y
-        d_x = q_x[k] - v_x
-        d_y = q_y[k] - v_y
+        foot_x = low_x - gap * a
+        foot_y = low_y - gap * b
+        foot_x = v_x if over > real(0.0) else foot_x
+        foot_y = v_y if over > real(0.0) else foot_y
+        b_x = low_x if sign > 0 else foot_x
+        b_y = low_y if sign > 0 else foot_y
+        d_x = low_x - v_x
+        d_y = low_y - v_y
         d_x = d_x if sign > 0 else -d_x
         d_y = d_y if sign > 0 else -d_y
         a = a if sign > 0 else -a
@@ -249,11 +312,14 @@ def _deeper_in_shape(
         d_x = way_x[k]
         d_y = way_y[k]
         size = np.sqrt(d_x * d_x + d_y * d_y)
-        corner = (at_end[k] > real(0.0)) & (apart[k] > real(0.0)) & (size > real(0.0))
+        gap = apart[k]
+        face_x = n_x[k]
+        face_y = n_y[k]
+        corner = (at_end[k] > real(0.0)) & (gap > real(0.0)) & (size > real(0.0))
         scale = real(1.0) / (size if corner else real(1.0))
-        a = d_x * scale if corner else n_x[k]
-        b = d_y * scale if corner else n_y[k]
-        gap = (size if corner else apart[k]) - (body_radius[k] + radius[k])
+        a = d_x * scale if corner else face_x
+        b = d_y * scale if corner else face_y
+        gap = (size if corner else gap) - (body_radius[k] + radius[k])
         c_x = on_x[k] - body_radius[k] * a
         c_y = on_y[k] - body_radius[k] * b
         least = near_gap[k]
@@ -269,6 +335,66 @@ def _deeper_in_shape(
         point_y[k] = c_y if deeper else p_y
 
 
+@stage
+def _apart_by_corner(x, y, normal_x, normal_y, bounds, sides, apart):
+    """Raise `apart` to how far a body is beyond a face at least, and widen `sides` by the corner it begins at."""
+    real = x.dtype.type
+    least_x, most_x, least_y, most_y = bounds[0], bounds[1], bounds[2], bounds[3]
+    low_x, high_x, low_y, high_y = sides[0], sides[1], sides[2], sides[3]
+    for k in range(NEAR):
+        u = x[k]
+        v = y[k]
+        a = normal_x[k]
+        b = normal_y[k]
+        x_0 = least_x[k]
+        x_1 = most_x[k]
+        y_0 = least_y[k]
+        y_1 = most_y[k]
+        gap = a * ((x_0 if a > real(0.0) else x_1) - u) + b * ((y_0 if b > real(0.0) else y_1) - v)
+        so_far = apart[k]
+        apart[k] = gap if gap > so_far else so_far
+        behind = low_x[k]
+        ahead = high_x[k]
+        right = low_y[k]
+        left = high_y[k]
+        low_x[k] = u if u < behind else behind
+        high_x[k] = u if u > ahead else ahead
+        low_y[k] = v if v < right else right
+        high_y[k] = v if v > left else left
+
+
+@stage
+def _apart_by_sides(bounds, sides, radius, apart):
+    real = apart.dtype.type
+    least_x, most_x, least_y, most_y = bounds[0], bounds[1], bounds[2], bounds[3]
+    low_x, high_x, low_y, high_y = sides[0], sides[1], sides[2], sides[3]
+    for k in range(NEAR):
+        ahead = low_x[k] - most_x[k]
+        behind = least_x[k] - high_x[k]
+        left = low_y[k] - most_y[k]
+        right = least_y[k] - high_y[k]
+        along = ahead if ahead > behind else behind
+        across = left if left > right else right
+        gap = along if along > across else across
+        so_far = apart[k]
+        apart[k] = (gap if gap > so_far else so_far) - (radius[k] + real(SURELY))
+
+
+@stage
+def _count_not_apart(shape, near, m, radius):
+    """In how many lanes the box around the body is not apart from the obstacle whose m corners are in `seen`."""
+    seen, spare = near.seen, near.spare
+    bounds, sides, apart = near.p[shape.row_bounds : shape.row_bounds + 4], spare[8:12], spare[12]
+    _first(-FAR, apart)
+    for side in range(4):
+        _first(-FAR if side & 1 else FAR, sides[side])
+    for corner in range(m):
+        to = PER_CORNER * corner
+        _apart_by_corner(seen[to], seen[to + 1], seen[to + 2], seen[to + 3], bounds, sides, apart)
+    _apart_by_sides(bounds, sides, radius, apart)
+    return count_touching(apart)
+
+
 @kernel
 def touch_shape(shape, near, q):
     """Deepen the touch by one obstacle or open wall."""
@@ -280,6 +406,8 @@ def touch_shape(shape, near, q):
         _corner_to_body(
             p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, seen[to], seen[to + 1], seen[to + 2], seen[to + 3]
         )  # fmt: skip
+    if _count_not_apart(shape, near, m, p[first + PER_CORNER * m]) == 0:
+        return
     for part in range(shape.part_corners.size):
         n, outline = shape.part_corners[part], shape.row_outline[part]
         _begin_pair(
@@ -367,5 +495,5 @@ def count_touching(gap):
     real = gap.dtype.type
     n = np.int32(0)
     for k in range(NEAR):
-        n += np.int32(1) if gap[k] <= real(0.0) else np.int32(0)
+        n = np.int32(n + np.int32(gap[k] <= real(0.0)))
     return n

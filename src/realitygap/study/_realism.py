@@ -16,7 +16,7 @@ from realitygap.kernels._network import Networks, make_networks
 from realitygap.kernels._sim import run_sim_trials
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
 from realitygap.kernels._sim_shape import make_sim_shape, sim_table, substeps_for
-from realitygap.world import load_robot, paper_arena
+from realitygap.world import Arena, load_arena, load_robot, paper_arena
 
 from ._bench import MOST_SECONDS
 from ._run import machine_facts
@@ -52,10 +52,6 @@ DRIVE = {
     "drift_per_m": 0.1,
     "battery_sag": 0.0005,
 }
-# Two boxes: where their middles are, and half their sides [m].
-BOXES = ((0.55, 0.2), (0.75, 0.42))
-HALF_SIDE = 0.05
-
 # Weights of the inputs (left, ahead, right, constant) for move and turn.
 AVOIDING = ((-0.2, -1.6, -0.2, 0.9), (-3.0, -1.2, 3.0, 0.1))
 PRESSED = ((0.0, 0.0, 0.0, 2.5), (0.2, 0.0, -0.1, 0.03))
@@ -73,9 +69,9 @@ def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
         seconds: How long each figure is measured, after everything is compiled.
 
     Returns:
-        `avoiding`: of networks that turn away from walls; `pressed`: of such as push into them; `boxes`:
-        that avoid, among two boxes. `stalled`: the share of their steps in which they stall, and `visited`: how
-        many cells they visit. `machine` and `versions`.
+        `avoiding`: of networks that turn away from walls; `pressed`: of such as push into them; `boxes`: that
+        avoid, among the two boxes of the arena `paper-boxes`. `stalled`: the share of their steps in which they
+        stall, and `visited`: how many cells they visit. `machine` and `versions`.
 
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
@@ -103,12 +99,12 @@ class RealisticTrials:
 
     Args:
         weights: Of the network, for move and turn.
-        boxes: Whether two boxes stand in the arena.
+        boxes: Whether the two boxes of `paper-boxes` stand in the arena.
     """
 
     def __init__(self, weights: tuple[tuple[float, ...], ...], *, boxes: bool) -> None:
-        arena = paper_arena()
-        numbers = _numbers(boxes=boxes)
+        arena = load_arena("paper-boxes") if boxes else paper_arena()
+        numbers = _numbers(arena)
         self.shape = make_sim_shape(
             parts=[len(_outline(numbers))],
             contact="slide",
@@ -118,7 +114,7 @@ class RealisticTrials:
             range_response=["ir"] * len(SENSORS),
             n_walls=4,
             enclosed=True,
-            obstacles=[4] * (len(BOXES) if boxes else 0),
+            obstacles=[len(box.corners) for box in arena.obstacles],
             columns=arena.grid.columns,
             rows=arena.grid.rows,
             inputs=[("range", 0), ("range", 1), ("range", 2), ("bias", 0)],
@@ -171,21 +167,16 @@ class RealisticTrials:
         return float(N_TRIALS * N_STEPS / fastest)
 
 
-def _numbers(*, boxes: bool) -> dict[str, float]:
-    robot, arena = load_robot("scribbler-s2-fluke2").numbers(), paper_arena().numbers()
+def _numbers(arena: Arena) -> dict[str, float]:
+    robot = load_robot("scribbler-s2-fluke2").numbers()
     numbers: dict[str, float] = {}
-    for name, value in {**robot, **arena}.items():
+    for name, value in {**robot, **arena.numbers()}.items():
         if name.split(".")[0] in ("body", "contact", "drive", "arena"):
             numbers[name] = value if isinstance(value, (int, float)) else value.center
     numbers |= {f"drive.{name}": value for name, value in DRIVE.items()}
     for k, (x, y, direction) in enumerate(SENSORS):
         numbers |= {f"range.{k}.x": x, f"range.{k}.y": y, f"range.{k}.direction": direction}
         numbers |= {f"range.{k}.{name}": value for name, value in RANGE.items()}
-    for k, (x, y) in enumerate(BOXES if boxes else ()):
-        numbers |= {f"arena.obstacle.{k}.x": x, f"arena.obstacle.{k}.y": y}
-        for j, (left, up) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
-            numbers[f"arena.obstacle.{k}.corner.{j}.x"] = left * HALF_SIDE
-            numbers[f"arena.obstacle.{k}.corner.{j}.y"] = up * HALF_SIDE
     return numbers
 
 

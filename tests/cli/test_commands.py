@@ -353,6 +353,7 @@ def test_bench_of_a_task_prints_its_figures_beside_the_published_ones():
         ("bench xor --change crossover=0 --change crossover=1", ["--change gives crossover twice: 0 and 1"]),
         ("bench xor --change crossover=2", ["crossover: expected at most 1.0, came 2"]),
         ("bench xor --seconds 1", ["--seconds goes with the measurement of speed"]),
+        ("bench realism --seeds 3", ["--seeds goes with a task"]),
         ("bench --seeds 3", ["--seeds goes with a task"]),
         ("bench --seed 0", ["--seed goes with a task"]),
         ("run papr", ["Unknown study 'papr'", "Did you mean 'paper'?"]),

@@ -76,18 +76,16 @@ def bench(
 
     In Python: realitygap.study.measure_maze("maze-medium", seeds=10)
     """
-    if task is None:
+    if task is None or task == "realism":
         given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change or None}
         for option, value in given.items():
             if value is not None:
                 raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
-        _bench_speed(2.0 if seconds is None else seconds, as_json=as_json)
-        return
-    if task == "realism":
-        _bench_realism(2.0 if seconds is None else seconds, as_json=as_json)
+        measured_speed = _bench_speed if task is None else _bench_realism
+        measured_speed(2.0 if seconds is None else seconds, as_json=as_json)
         return
     if seconds is not None:
-        raise StudyError("--seconds goes with the measurement of speed, which has no task.")
+        raise StudyError("--seconds goes with the measurement of speed, which has no task, and with realism.")
     measured = _bench_maze if task.startswith("maze") else _bench_task
     measured(
         task,

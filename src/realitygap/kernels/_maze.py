@@ -20,7 +20,6 @@ from ._math import sin_cos_of_turns
 from ._network import IDENTITY, TANH
 from ._wiring import make_wiring, think, wire
 
-N_SLICES = 4  # of a quarter each: ahead, left, behind, right
 NEVER = np.int32(-1)
 
 

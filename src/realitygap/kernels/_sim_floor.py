@@ -13,8 +13,6 @@ from ._compile import stage
 from ._lanes import LANES
 from ._math import normal
 
-TAPE_NUMBERS = ("x1", "y1", "x2", "y2", "width", "brightness")
-
 
 @stage
 def place_point(mount_x, mount_y, pose, to_x, to_y):

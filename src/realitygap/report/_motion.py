@@ -161,11 +161,6 @@ def _several(
     return title, [_moving(tally, trial, f"{each} {trial.row[each]}") for trial in trials]
 
 
-def moving_trial(tally: Tally, trial: ChosenTrial) -> MovingTrial:
-    """A chosen trial made ready to be shown."""
-    return _moving(tally, trial, trial.title)
-
-
 def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     if trial.condition.is_physical:
         return _driven(tally, trial, title)

@@ -21,7 +21,6 @@ from realitygap.report._comparisons import paired_values, same_but_for
 from realitygap.report._effects import (
     Interval,
     bca_intervals,
-    mean_interval,
     ratio_of_robust_spreads,
     ratio_of_spreads,
     robust_spread,
@@ -366,11 +365,3 @@ def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
             equal = chance_of_best([together] * len(samples), n_runs)
             found.append(Chance(names, n_runs, chance_of_best(samples, n_runs), float(equal[0])))
     return found
-
-
-# --- means --------------------------------------------------------------------------------------------------
-
-
-def mean_with_interval(values: Values) -> tuple[float, Interval | None]:
-    """Mean and its BCa interval."""
-    return (float(values.mean()) if len(values) else math.nan), mean_interval(values)

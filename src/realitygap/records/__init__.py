@@ -36,10 +36,11 @@ from realitygap.records._ledger_kinds import (
 )
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
+from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
-__all__ = [  # noqa: RUF022 - grouped by subject
+__all__ = [
     # the folder and what is in it
     "ResultsFolder",
     "Chunk",
@@ -75,6 +76,10 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "LEDGER_NAME",
     "LEDGER_FORMAT",
     "ledger_tables",
+    # what an observer sees of trials one by one
+    "ObservedTrial",
+    "Observe",
+    "OBSERVATIONS",
     # other files, written whole
     "write_checkpoint",
     "read_checkpoint",

@@ -21,6 +21,7 @@ from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
+from ._target import Target, TrialPlan
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -40,9 +41,11 @@ __all__ = [
     "SimTrials",
     "SimWorld",
     "SimWorldRobot",
+    "Target",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",
+    "TrialPlan",
     "Verdict",
     "WitnessOperator",
     "cell_at",

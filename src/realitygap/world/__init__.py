@@ -8,6 +8,7 @@ from ._arena import (
     paper_arena,
 )
 from ._arena_file import ArenaFile
+from ._calibration import Calibration, Fitted
 from ._case import Case
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor, FloorImage
@@ -31,8 +32,10 @@ __all__ = [
     "ArenaFile",
     "ArenaSettings",
     "Body",
+    "Calibration",
     "Case",
     "Distribution",
+    "Fitted",
     "Floor",
     "FloorImage",
     "Goal",

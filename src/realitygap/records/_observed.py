@@ -1,0 +1,58 @@
+"""What an observer has of a trial on any platform, and the file that keeps such trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Observe = Literal["cells", "encoders", "track"]
+"""How much is seen of a robot: commands, readings, stall and crossed cells; its encoders, too; its poses, too."""
+
+OBSERVATIONS: tuple[Observe, ...] = ("cells", "encoders", "track")
+"""From the least to the most: each has all that those before it have."""
+
+
+@dataclass(frozen=True)
+class ObservedTrial:
+    """A trial of t commands as it was observed; row k of what is sensed is from before command k.
+
+    Attributes:
+        start: (3,) where the robot was put: x [m], y [m], heading [rad].
+        step_s: How long a command lasts [s].
+        commands: (t, 2) move and turn, -1..1.
+        readings: (t, s) of each range sensor, 0..1.
+        stalled: (t,) bool.
+        cells: Crossed cells of the arena's grid, ascending: of a pen's line the order is not known.
+        wheels: (t + 1, 2) way of the left and the right wheel since the start, by encoders [m]; no rows where
+            encoders are not observed.
+        poses: (t + 1, 3) x [m], y [m], heading [rad]; no rows where no camera looks.
+        genome: The controller as JSON text; empty where commands were given one by one.
+        number: Of the trial on its platform: with which noise it ran.
+        purpose: What it was driven for, such as controller, path, sensors, motion, contact.
+        battery_v: At its start [V]; nan where it is not known.
+        end: Why it ended, as `EndReason` has it.
+    """
+
+    start: tuple[float, float, float]
+    step_s: float
+    commands: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    stalled: NDArray[np.bool_]
+    cells: tuple[int, ...]
+    wheels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    genome: str = ""
+    number: int = 0
+    purpose: str = "controller"
+    battery_v: float = float("nan")
+    end: str = "step limit"
+
+    @property
+    def observe(self) -> Observe:
+        """How much is seen of it."""
+        if len(self.poses):
+            return "track"
+        return "encoders" if len(self.wheels) else "cells"

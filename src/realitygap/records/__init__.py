@@ -40,7 +40,7 @@ from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
-__all__ = [
+__all__ = [  # noqa: RUF022 - grouped by subject
     # the folder and what is in it
     "ResultsFolder",
     "Chunk",

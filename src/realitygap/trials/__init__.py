@@ -11,6 +11,7 @@ from ._batch import (
 )
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
+from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
@@ -39,6 +40,7 @@ __all__ = [
     "SimRobot",
     "SimScene",
     "SimTrials",
+    "SimTwin",
     "SimWorld",
     "SimWorldRobot",
     "Target",
@@ -54,6 +56,7 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "open_trials",
+    "open_twin",
     "paper_inputs",
     "poses_of",
     "preflight",

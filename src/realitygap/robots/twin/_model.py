@@ -68,7 +68,7 @@ class TwinWheels(Settings):
         0.153, description="Between their points of contact with the floor [m]."
     )
     axle: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(0.0, description="Ahead of the pen [m].")
-    friction: Annotated[float, Field(ge=0.05, le=3)] = Field(0.8, description="Between wheel and floor: mu.")
+    friction: Annotated[float, Field(ge=0.05, le=3)] = Field(0.6, description="Between wheel and floor: mu.")
     mass: Annotated[float, Field(ge=0.005, le=0.5)] = Field(0.03, description="Of one wheel [kg].")
     caster: Offset = Field(
         0.0758, description="Where the third support touches the floor, ahead of the pen [m]."
@@ -110,11 +110,11 @@ class TwinMotors(Settings):
         0.0, description="Share of full speed below which the left wheel stands still."
     )
     dead_band_right: Share = Field(0.0, description="Of the right wheel.")
-    torque: Annotated[float, Field(ge=0.005, le=2)] = Field(
-        0.12, description="The most that a motor gives, on a full battery [N m]."
+    torque: Annotated[float, Field(ge=0.005, le=1)] = Field(
+        0.25, description="The most that a motor gives, on a full battery [N m]."
     )
     stiffness: Annotated[float, Field(ge=0.002, le=0.5)] = Field(
-        0.05,
+        0.1,
         description="Torque against each rad/s by which a wheel is off [N m s]: little lets loads slow it.",
     )
     delay: Annotated[float, Field(ge=0, le=2)] = Field(

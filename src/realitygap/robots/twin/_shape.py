@@ -26,6 +26,7 @@ SHELL_ABOVE = 0.035  # of the floor, where the shell meets walls [m]
 SUPPORT = 0.006  # radius of what touches the floor besides the wheels [m]
 TIPS = 0.0005  # by which the skid is above the floor [m]
 GRAVITY = 9.81
+LEAST_INERTIA = 2e-4  # of a motor behind its gears, about the wheel; chosen [kg m2]
 
 
 def mjcf_of(model: TwinModel, arena: Arena) -> str:
@@ -88,12 +89,17 @@ def _wheels(model: TwinModel) -> Iterator[str]:
     for side, sign in (("left", 1), ("right", -1)):
         yield (
             f'<body name="{side}" pos="{_row(wheels.axle, sign * wheels.track / 2, 0)}">'
-            f'<joint name="{side}" type="hinge" axis="0 1 0" armature="1e-4"/>'
+            f'<joint name="{side}" type="hinge" axis="0 1 0" armature="{_geared_inertia(model)}"/>'
             f'<geom type="sphere" size="{wheels.diameter / 2}" mass="{wheels.mass}" group="{ROBOT}" conaffinity="1" '
             f'priority="2" friction="{wheels.friction} .001 .0001" rgba="0 0 0 0"/>'
             f'<geom type="cylinder" size="{_row(wheels.diameter / 2, 0.005)}" euler="90 0 0" mass="0" '
             f'group="{DRAWN}" rgba=".15 .15 .15 1"/></body>'
         )
+
+
+def _geared_inertia(model: TwinModel) -> float:
+    """Of a motor behind its gears, about the wheel [kg m2]: so much that no step of full torque overshoots."""
+    return max(LEAST_INERTIA, 1.2 * model.motors.stiffness * STEP_S)
 
 
 def _motor(model: TwinModel, side: str) -> str:

@@ -19,6 +19,7 @@ from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
 from ._trials import trials
+from ._twin import twin
 
 app = typer.Typer(
     name="realitygap",
@@ -60,4 +61,5 @@ app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
+app.add_typer(twin, name="twin")
 app.command("trials")(trials)

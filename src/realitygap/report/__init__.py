@@ -56,7 +56,7 @@ from realitygap.report._permutation import (
     smallest_p,
 )
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
-from realitygap.report._show import save_arena, save_robot, save_view
+from realitygap.report._show import save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
 from realitygap.report._statistics import (
     IntervalRanks,
@@ -124,6 +124,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "save_view",
     "save_arena",
     "save_robot",
+    "save_twin",
     # two platforms
     "compare_trials",
     "Side",

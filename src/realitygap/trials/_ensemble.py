@@ -375,9 +375,9 @@ def _in_columns(values: Values, k: int) -> dict[str, NDArray[np.float64]]:
     given = {name: value[:, None] if value.ndim == 1 else value for name, value in given.items()}
     m = len(next(iter(given.values()), ()))
     for name, value in given.items():
-        if value.ndim != 2 or len(value) != m or m == 0 or value.shape[1] not in (1, k):
+        if value.ndim != 2 or len(value) != m or value.shape[1] not in (1, k):
             raise ValueError(
-                f"{name} has shape {value.shape}, expected ({m or 'm'},) or ({m or 'm'}, {k}): a number for each set, "
+                f"{name} has shape {np.shape(values[name])}, expected ({m},) or ({m}, {k}): a number for each set, "
                 "or for each trial of each."
             )
     return given

@@ -9,8 +9,10 @@ from ._batch import (
     paper_inputs,
     poses_of,
 )
+from ._carry_out import Onlooker, TrialStopped, carry_out_on_robot
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
+from ._onlooker import RobotOnlooker
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
@@ -22,6 +24,7 @@ from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
 from ._target import Target, TrialPlan
+from ._target_sim import SimTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -32,12 +35,15 @@ __all__ = [
     "JyroRobot",
     "JyroTrials",
     "NoiseKey",
+    "Onlooker",
     "Operator",
     "PlatformTrials",
     "Preflight",
+    "RobotOnlooker",
     "SceneTrack",
     "SimRobot",
     "SimScene",
+    "SimTarget",
     "SimTrials",
     "SimWorld",
     "SimWorldRobot",
@@ -46,8 +52,10 @@ __all__ = [
     "TrialBatch",
     "TrialInterrupted",
     "TrialPlan",
+    "TrialStopped",
     "Verdict",
     "WitnessOperator",
+    "carry_out_on_robot",
     "cell_at",
     "counters_of",
     "drive_trial",

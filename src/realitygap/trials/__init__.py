@@ -10,6 +10,7 @@ from ._batch import (
     poses_of,
 )
 from ._carry_out import Onlooker, TrialStopped, carry_out_on_robot
+from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
@@ -38,9 +39,12 @@ __all__ = [
     "Onlooker",
     "Operator",
     "PlatformTrials",
+    "Play",
     "Preflight",
+    "Rehearsal",
     "RobotOnlooker",
     "SceneTrack",
+    "SimEnsemble",
     "SimRobot",
     "SimScene",
     "SimTarget",

@@ -11,22 +11,33 @@ from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._transfer import STRATEGIES, TransferPlan, strategy_names, transfer
+from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
+from ._transfer_target import KeptTarget
 
 __all__ = [
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "SECTIONS",
+    "STRATEGIES",
     "ConditionNotes",
+    "Estimate",
+    "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "Strategist",
     "Study",
     "StudyResult",
     "StudySection",
+    "TransferPlan",
+    "TransferResult",
+    "Transferred",
     "TrialsSection",
     "connect_robot",
     "drive_study",
+    "estimate_mean",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -37,7 +48,9 @@ __all__ = [
     "parse_study",
     "refuse_port_without_robot",
     "run_study",
+    "strategy_names",
     "study_template",
     "task_settings",
+    "transfer",
     "usable_processors",
 ]

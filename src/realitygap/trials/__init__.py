@@ -9,6 +9,7 @@ from ._batch import (
     paper_inputs,
     poses_of,
 )
+from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
@@ -34,8 +35,11 @@ __all__ = [
     "NoiseKey",
     "Operator",
     "PlatformTrials",
+    "Play",
     "Preflight",
+    "Rehearsal",
     "SceneTrack",
+    "SimEnsemble",
     "SimRobot",
     "SimScene",
     "SimTrials",

@@ -9,6 +9,7 @@ from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
+from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
 from ._transfer import STRATEGIES, TransferPlan, strategy_names, transfer
@@ -45,6 +46,8 @@ __all__ = [
     "measure_speed",
     "measure_task",
     "named_studies",
+    "observations_head",
+    "open_target",
     "parse_study",
     "refuse_port_without_robot",
     "run_study",

@@ -52,5 +52,7 @@ def _equivalence(found: Estimate) -> str:
     margin = found.more.get("margin")
     if margin is None or found.more.get("equivalent") is None:
         return ""
-    shown = "are equivalent in level" if found.more["equivalent"] else "are not shown to be equivalent in level"
+    shown = (
+        "are equivalent in level" if found.more["equivalent"] else "are not shown to be equivalent in level"
+    )
     return f"they {shown} at a margin of {margin:g}"

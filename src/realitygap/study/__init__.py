@@ -12,7 +12,7 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
-from ._transfer import STRATEGIES, TransferPlan, strategy_names, transfer
+from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
 
@@ -36,6 +36,7 @@ __all__ = [
     "TransferResult",
     "Transferred",
     "TrialsSection",
+    "choose_condition",
     "connect_robot",
     "drive_study",
     "estimate_mean",

@@ -17,6 +17,7 @@ from realitygap.trials import Target
 from ._file import load_study
 from ._study import Study
 from ._transfer_attempt import Attempt, Simulation, plans_of
+from ._transfer_calibrated import Calibrating, calibrated, posterior
 from ._transfer_direct import direct
 from ._transfer_noise import noise, randomized
 from ._transfer_result import Transferred, TransferResult, summarize_transfer
@@ -31,6 +32,8 @@ STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "halving": halving,
     "noise": noise,
     "randomized": randomized,
+    "calibrated": calibrated,
+    "posterior": posterior,
     "transferability": transferability,
     "direct": direct,
 }
@@ -217,30 +220,36 @@ class _Work:
         name = f"{strategy}-{budget if spends else 0}-{replicate}"
         self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
         first = replicate * NUMBERS
-        kept = KeptTarget(self.target, self.folder / "trials" / f"{name}.jsonl", budget, first)
-        attempt = Attempt(
-            condition=self.condition,
-            target=kept,
-            budget=budget,
-            replicate=replicate,
-            simulation=self.simulation,
-            folder=self.folder,
-            observe=self.plan.observe,
-            calibration=Path(self.plan.calibration) if self.plan.calibration else None,
-            tell=self.tell,
-        )
-        champion = STRATEGIES[strategy](attempt)
+        path = self.folder / "trials" / f"{name}.jsonl"
+        with KeptTarget(self.target, path, budget, first) as kept:
+            attempt = Attempt(
+                condition=self.condition,
+                target=kept,
+                budget=budget,
+                replicate=replicate,
+                simulation=self.simulation,
+                calibration=self._calibration(replicate),
+            )
+            champion = STRATEGIES[strategy](attempt)
         champion.genome.save(self.folder / "champions" / f"{name}.json")
         coverage = self._fresh(champion.genome, name, first + NUMBERS // 2)
         simulated = None if champion.simulated != champion.simulated else champion.simulated
         genome = champion.genome.to_json()
         return Transferred(strategy, budget, kept.spent, replicate, genome, simulated, coverage)
 
+    def _calibration(self, replicate: int) -> Calibrating:
+        """How the replicate's calibrations come about."""
+        file = Path(self.plan.calibration) if self.plan.calibration else None
+        first, observe = replicate * NUMBERS, self.plan.observe
+        return Calibrating(
+            self.target, self.folder / "calibrations", first, replicate, observe, file, self.tell
+        )
+
     def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
         """The share of cells that a champion visits in fresh trials."""
         n = self.plan.fresh_trials
-        fresh = KeptTarget(self.target, self.folder / "fresh" / f"{name}.jsonl", n, first)
-        trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), "cells")
+        with KeptTarget(self.target, self.folder / "fresh" / f"{name}.jsonl", n, first) as fresh:
+            trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), "cells")
         return tuple(coverage_of(trial, self.target) for trial in trials)
 
 
@@ -260,7 +269,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
                 f"{folder} belongs to another transfer ({shown or 'the condition has other settings'}); nothing was "
                 "tried and nothing is lost. Name another folder with -o."
             )
-    for part in ("trials", "fresh", "champions"):
+    for part in ("trials", "fresh", "champions", "calibrations"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     write_whole(path, json.dumps(asdict(plan), indent=2).encode())
 

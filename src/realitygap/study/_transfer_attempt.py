@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 from realitygap.evolution import Genome
-from realitygap.records import Observe
 from realitygap.runs import Condition
 from realitygap.trials import TrialPlan
+from realitygap.world import Calibration
 
 from ._transfer_simulated import Champion, evolve_champions
 from ._transfer_target import KeptTarget
@@ -53,6 +53,14 @@ class Simulation:
         return self._known[key]
 
 
+class Calibrates(Protocol):
+    """How calibrations come about that strategies share."""
+
+    def __call__(self, condition: Condition, left: int) -> Calibration:
+        """The calibration of a robot where so many trials are left; its `trials` are what it spends of them."""
+        ...
+
+
 @dataclass(frozen=True)
 class Attempt:
     """What a strategy has at hand.
@@ -63,10 +71,7 @@ class Attempt:
         budget: Trials on the target.
         replicate: Of the transfer, from 0 on.
         simulation: That evolves.
-        folder: For what a strategy keeps beside the trials.
-        observe: How much calibrating sees of a trial.
-        calibration: File of a calibration that was made before; None to calibrate on the budget.
-        tell: Told what is going on, in words.
+        calibration: Makes or reads a calibration.
     """
 
     condition: Condition
@@ -74,10 +79,7 @@ class Attempt:
     budget: int
     replicate: int
     simulation: Simulation
-    folder: Path
-    observe: Observe = "cells"
-    calibration: Path | None = None
-    tell: Callable[[str], None] = field(default=lambda _: None)
+    calibration: Calibrates
 
     @property
     def left(self) -> int:

@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Self
 
 from realitygap.errors import RecordError
-from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan
 
-from ._transfer_file import TrialsFile
+from ._targets import observations_head
 
 
 class KeptTarget:
@@ -26,17 +26,20 @@ class KeptTarget:
         path: The file; its folder is there.
         budget: How many trials it allows.
         first_number: Added to the number of each plan, so that parts of a study draw other random numbers.
+        observe: The most that is looked at.
     """
 
-    def __init__(self, target: Target, path: Path, budget: int, first_number: int = 0) -> None:
+    def __init__(
+        self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
+    ) -> None:
         self.name, self.label, self.arena = target.name, target.label, target.arena
         self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
         self.budget = budget
         self.spent = 0
         self._target = target
         self._first_number = first_number
-        self._file = TrialsFile(path)
-        self._kept = {trial.number: trial for trial in self._file.read()}
+        self._file = ObservationsFile(path, observations_head(target, observe))
+        self._kept = {trial.number: trial for trial in self._file.trials}
 
     def carry_out(
         self,
@@ -81,7 +84,8 @@ class KeptTarget:
         return trial
 
     def close(self) -> None:
-        """Nothing to do: whoever opened the target closes it."""
+        """Let go of the file; whoever opened the target closes that."""
+        self._file.close()
 
     def __enter__(self) -> Self:
         return self

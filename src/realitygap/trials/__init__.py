@@ -14,6 +14,7 @@ from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
+from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
@@ -49,6 +50,7 @@ __all__ = [
     "SimScene",
     "SimTarget",
     "SimTrials",
+    "SimTwin",
     "SimWorld",
     "SimWorldRobot",
     "Target",
@@ -66,6 +68,7 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "open_trials",
+    "open_twin",
     "paper_inputs",
     "poses_of",
     "preflight",

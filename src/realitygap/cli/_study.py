@@ -39,6 +39,14 @@ def run(
         Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="In place of the study's.")] = None,
+    randomize: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="posterior draws each trial's robot from the calibration of sim:FILE; no does not. "
+            "[default: as the study says]",
+        ),
+    ] = None,
     threads: Annotated[
         int | None, typer.Option(min=1, help="Kernels at once. [default: all processors]")
     ] = None,
@@ -124,7 +132,7 @@ def run(
             "--witness, --in-flight, --score, --no-wait, --despite-preflight and --who go with --port: they are about "
             "the robot there."
         )
-    resolved = load_study(study, seed=seed, replicates=replicates)
+    resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     if port is not None:
         refuse_port_without_robot(resolved)
     try:

@@ -36,6 +36,16 @@ from realitygap.records._ledger_kinds import (
 )
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
+from realitygap.records._observations_file import (
+    OBSERVATIONS_FORMAT,
+    Observations,
+    ObservationsFile,
+    ObservationsHead,
+    read_observations,
+    trial_from_dict,
+    trial_to_dict,
+    write_observations,
+)
 from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
@@ -80,6 +90,14 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "ObservedTrial",
     "Observe",
     "OBSERVATIONS",
+    "OBSERVATIONS_FORMAT",
+    "Observations",
+    "ObservationsFile",
+    "ObservationsHead",
+    "read_observations",
+    "write_observations",
+    "trial_from_dict",
+    "trial_to_dict",
     # other files, written whole
     "write_checkpoint",
     "read_checkpoint",

@@ -5,13 +5,30 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, field_serializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_serializer,
+    model_serializer,
+    model_validator,
+)
 
 from realitygap.drawing import Picture
 from realitygap.settings import Settings
-from realitygap.world import Body, Distribution, RangeSensors, RobotModel, load_robot, robot_picture
+from realitygap.world import (
+    Body,
+    Calibration,
+    Distribution,
+    RangeSensors,
+    RobotModel,
+    load_robot,
+    read_calibration,
+    robot_picture,
+)
 
 DEFAULT_ROBOT = "scribbler-s2-fluke2"
 
@@ -24,15 +41,29 @@ NOISE = (
 ARENA = "arena."
 """What the names of an arena's numbers begin with."""
 
+POSTERIOR = "posterior"
+"""The word by which numbers drawn from a calibration are drawn together."""
+
 
 @functools.cache
 def _named_robot(name: str) -> RobotModel:
     return load_robot(name)
 
 
+def _read_draws(robot: Any) -> Calibration | None:
+    """The calibration in a file; None where there is none, or one with mistakes, of which its robot tells."""
+    try:
+        return read_calibration(robot) if isinstance(robot, str | Path) else None
+    except ValueError:
+        return None
+
+
 def _as_robot(value: Any) -> Any:
-    """A robot by name or from a file, or as results describe it."""
-    if isinstance(value, str):
+    """A robot by name or from a file, of a calibration, or as results describe it."""
+    if isinstance(value, Calibration):
+        return load_robot(value.robot).with_numbers(value.numbers)
+    if isinstance(value, str | Path):
+        value = str(value)
         try:
             return _named_robot(value) if "." not in value and "/" not in value else load_robot(value)
         except ValueError as error:
@@ -79,8 +110,8 @@ class SimPlatform(Settings):
 
     robot: Annotated[RobotModel, BeforeValidator(_as_robot)] = Field(
         default_factory=lambda: _named_robot(DEFAULT_ROBOT),
-        description=f"A robot by name (`realitygap show robot`), or the file of one; {DEFAULT_ROBOT} when not given. "
-        "Results keep all that is in it.",
+        description=f"A robot by name (`realitygap show robot`), the file of one, or a calibration, the robot with the "
+        f"numbers that were fitted; {DEFAULT_ROBOT} when not given. Results keep all that is in it.",
     )
     steps: int = Field(
         100, ge=1, le=100_000, description="Steps of a trial: commands (section 2.2, the paper's robot: 100)."
@@ -112,6 +143,38 @@ class SimPlatform(Settings):
     precision: Literal["single", "double"] = Field(
         "single", description="Of the arithmetic of trials: 32 or 64 bits."
     )
+    randomize: Literal["no", "posterior"] = Field(
+        "no",
+        description="Whether robots differ as far as a calibration leaves open: posterior draws all fitted numbers "
+        "together from its draws. `set` goes before what is drawn.",
+    )
+    randomize_per: Literal["trial", "run", "study"] = Field(
+        "trial", description="What each draw from a calibration holds for."
+    )
+    draws: dict[str, tuple[float, ...]] = Field(
+        default_factory=dict,
+        description="The draws of the calibration, by dotted name, so that results need no file.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _robot_may_be_a_calibration(cls, values: Any) -> Any:
+        """Keep the draws of a calibration beside its robot."""
+        if not isinstance(values, Mapping) or "draws" in values:
+            return values
+        robot = values.get("robot")
+        calibration = robot if isinstance(robot, Calibration) else _read_draws(robot)
+        if calibration is None or not calibration.draws:
+            return values
+        return {**values, "draws": dict(calibration.draws)}
+
+    @model_validator(mode="after")
+    def _draws_are_as_many(self) -> Self:
+        if len({len(values) for values in self.draws.values()}) > 1:
+            raise ValueError("draws: expected as many of each number")
+        return self
 
     @model_validator(mode="after")
     def _numbers_are_the_robots(self) -> Self:
@@ -121,6 +184,13 @@ class SimPlatform(Settings):
             lines = [line.removeprefix("RobotModel").lstrip(".: ") for line in str(error).split("\n")]
             raise ValueError("set: " + "; ".join(line.rstrip(".") for line in lines)) from None
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_drawn(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Where nothing is drawn from a calibration, draws do not count: conditions keep their hashes."""
+        values: dict[str, Any] = handler(self)
+        unused = () if self.randomize == "posterior" else ("randomize", "randomize_per", "draws")
+        return {key: value for key, value in values.items() if key not in unused}
 
     @field_serializer("robot")
     def _robot_as_resolved(self, robot: RobotModel) -> dict[str, Any]:
@@ -141,6 +211,11 @@ class SimPlatform(Settings):
             contact = robot.contact.model_copy(update={"model": self.contact})
             robot = robot.model_copy(update={"contact": contact})
         changed: dict[str, float | Distribution] = {}
+        if self.randomize == "posterior":
+            changed |= {
+                name: Distribution(choice=values, per=self.randomize_per, together=POSTERIOR)
+                for name, values in self.draws.items()
+            }
         if not self.noise:
             changed |= {name: 0.0 for name in robot.numbers() if name.rpartition(".")[2] in NOISE}
         changed |= {name: value for name, value in self.set.items() if not name.startswith(ARENA)}

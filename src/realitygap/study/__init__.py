@@ -9,24 +9,37 @@ from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
+from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
+from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
+from ._transfer_target import KeptTarget
 
 __all__ = [
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "SECTIONS",
+    "STRATEGIES",
     "ConditionNotes",
+    "Estimate",
+    "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "Strategist",
     "Study",
     "StudyResult",
     "StudySection",
+    "TransferPlan",
+    "TransferResult",
+    "Transferred",
     "TrialsSection",
+    "choose_condition",
     "connect_robot",
     "drive_study",
+    "estimate_mean",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -34,10 +47,14 @@ __all__ = [
     "measure_speed",
     "measure_task",
     "named_studies",
+    "observations_head",
+    "open_target",
     "parse_study",
     "refuse_port_without_robot",
     "run_study",
+    "strategy_names",
     "study_template",
     "task_settings",
+    "transfer",
     "usable_processors",
 ]

@@ -46,18 +46,30 @@ def named_studies() -> list[str]:
     )
 
 
-def load_study(study: str | Path, *, seed: int | None = None, replicates: int | None = None) -> Study:
+def load_study(
+    study: str | Path,
+    *,
+    seed: int | None = None,
+    replicates: int | None = None,
+    randomize: str | None = None,
+) -> Study:
     """Read a study by name or from a file, and resolve every setting.
 
     Args:
         study: A name of `named_studies`, or a path of a TOML file.
         seed: In place of the file's.
         replicates: In place of the file's.
+        randomize: posterior, or no: whether the robots of calibrations are drawn; as the file says when None.
 
     Raises:
         StudyError: No such study, a file that cannot be read, or mistakes in it: all of them, each with its
-            place.
+            place; or no condition has a robot that could be drawn.
     """
+    resolved = _load_study(study, seed, replicates)
+    return resolved if randomize is None else _randomized(resolved, randomize)
+
+
+def _load_study(study: str | Path, seed: int | None, replicates: int | None) -> Study:
     if not isinstance(study, str | Path):
         raise TypeError(f"study is {study!r}, expected the name of one, or the path of a study file.")
     name = str(study)
@@ -109,6 +121,31 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyError("\n  ".join([head, *problems.lines]))
     return study
+
+
+def _randomized(study: Study, randomize: str) -> Study:
+    """The study with robots of calibrations drawn, or not."""
+    if randomize not in ("no", "posterior"):
+        raise StudyError(f"randomize is {randomize!r}, expected no or posterior.")
+
+    def changed(condition: Condition) -> Condition:
+        sim = condition.sim
+        if condition.platform != "sim" or not sim.draws:
+            return condition
+        values = {name: getattr(sim, name) for name in SimPlatform.model_fields}
+        return condition.model_copy(update={"sim": SimPlatform(**{**values, "randomize": randomize})})
+
+    conditions = tuple(changed(condition) for condition in study.conditions)
+    if randomize == "posterior" and conditions == study.conditions and not any(map(_is_drawn, conditions)):
+        raise StudyError(
+            "--randomize posterior draws robots from a calibration, and no condition of this study has one with "
+            'draws. Expected platform = "sim:FILE" with a file that `realitygap calibrate` wrote.'
+        )
+    return study.model_copy(update={"conditions": conditions})
+
+
+def _is_drawn(condition: Condition) -> bool:
+    return condition.platform == "sim" and condition.sim.randomize == "posterior"
 
 
 def _plain(number: Any) -> Any:

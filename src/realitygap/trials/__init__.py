@@ -9,8 +9,11 @@ from ._batch import (
     paper_inputs,
     poses_of,
 )
+from ._carry_out import Onlooker, TrialStopped, carry_out_on_robot
+from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
+from ._onlooker import RobotOnlooker
 from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
@@ -23,6 +26,8 @@ from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
 from ._target import Target, TrialPlan
+from ._target_sim import SimTarget
+from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -33,12 +38,18 @@ __all__ = [
     "JyroRobot",
     "JyroTrials",
     "NoiseKey",
+    "Onlooker",
     "Operator",
     "PlatformTrials",
+    "Play",
     "Preflight",
+    "Rehearsal",
+    "RobotOnlooker",
     "SceneTrack",
+    "SimEnsemble",
     "SimRobot",
     "SimScene",
+    "SimTarget",
     "SimTrials",
     "SimTwin",
     "SimWorld",
@@ -48,8 +59,11 @@ __all__ = [
     "TrialBatch",
     "TrialInterrupted",
     "TrialPlan",
+    "TrialStopped",
+    "TwinTarget",
     "Verdict",
     "WitnessOperator",
+    "carry_out_on_robot",
     "cell_at",
     "counters_of",
     "drive_trial",

@@ -140,6 +140,13 @@ class NoiseKey:
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 0, limit - 1))
 
 
+def counters_of_individuals(key: NoiseKey, individuals: Sequence[int]) -> NDArray[np.uint32]:
+    """(n, 3) the same for individuals in any order, those of the key's run and generation."""
+    counters = counters_of(key, len(individuals))
+    counters[:, 0] = np.array(individuals, np.uint32) << 8 | PURPOSE_NOISE
+    return counters
+
+
 def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
     """(n, 3) the fixed words of the random numbers of n individuals from that of the key on."""
     counters = np.empty((n, 3), np.uint32)
@@ -220,7 +227,7 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> No
     """
     if not genomes:
         raise ValueError("No genome to try, expected at least one.")
-    first = _kind(genomes[0])
+    first = kind_of(genomes[0])
     names = ["largest reading", "stall", "time"]
     if inputs is not None:
         names = [name for name in inputs if name != "bias"]
@@ -236,7 +243,7 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> No
                 f"({', '.join(names)}; a constant one is extra) and 2 outputs (move, turn)."
             )
     for k in sorted(kinds.values()):
-        for name, value in _kind(genomes[k]).items():
+        for name, value in kind_of(genomes[k]).items():
             if value != first[name]:
                 raise ValueError(
                     f"Genome {k} has {name} {value}, genome 0 has {first[name]}: expected genomes of one kind. Try "
@@ -244,7 +251,7 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> No
                 )
 
 
-def _kind(genome: Genome) -> dict[str, float]:
+def kind_of(genome: Genome) -> dict[str, float]:
     """What all genomes of a call share: the kernels read it once."""
     names = ("n_inputs", "bias_input", "activation", "activation_slope", "recurrent", "node_bias")
     return {name: getattr(genome.rules, name) for name in names} | {"bias_value": genome.bias_value}

@@ -16,7 +16,8 @@ from realitygap.world import Distribution
 class Draws:
     """The numbers that are drawn, each a function of the key, of its name and of the trial, the run or the study.
 
-    A number does not depend on which others are drawn, so that conditions of one study draw the same where both do.
+    A number does not depend on which others are drawn, so that conditions of one study draw the same where both do;
+    those that are drawn `together` share one random number.
 
     Args:
         numbers: By dotted name; those that are no distributions are left aside.
@@ -42,7 +43,9 @@ class Draws:
         drawn = np.empty((len(counters), len(self.names)))
         units = np.empty(len(counters))
         for k, (name, distribution) in enumerate(self._drawn.items()):
-            draw_units(_block_of(name), np.uint64(key), words[distribution.per], units)
+            draw_units(
+                _block_of(distribution.together or name), np.uint64(key), words[distribution.per], units
+            )
             drawn[:, k] = distribution.of(units)
         return drawn
 

@@ -91,14 +91,10 @@ def drive_trial(
 
     Source: Rosenzweig & Remy, sections 2.1 to 2.3.
     """
-    if (network.n_inputs, network.n_outputs) != (3, 2):
-        raise ValueError(
-            f"The network has {network.n_inputs} inputs and {network.n_outputs} outputs, expected 3 (largest reading, "
-            "stall, time) and 2 (move, turn)."
-        )
+    check_network(network)
     steps: list[Step] = []
     clock = clock or getattr(robot, "clock", None) or SystemClock()
-    _warm_up(network)
+    warm_up(network)
     try:
         return _drive(robot, network, n_steps, watch, clock, steps)
     except RobotError as error:
@@ -120,7 +116,7 @@ def _drive(
         seen = robot.observe()
         time = clock.now() - began
         outputs = network.activate([max(seen.readings), float(seen.stalled), number / n_steps])
-        command = Command(_limited(float(outputs[0])), _limited(float(outputs[1])))
+        command = Command(limited(float(outputs[0])), limited(float(outputs[1])))
         if watch is not None and watch(number, seen, command):
             return DrivenTrial(
                 EndReason.ABORTED, tuple(steps), f"aborted by the operator before step {number + 1}"
@@ -131,12 +127,25 @@ def _drive(
     return DrivenTrial(EndReason.STEP_LIMIT, tuple(steps))
 
 
-def _warm_up(network: Network) -> None:
+def check_network(network: Network) -> None:
+    """Refuse a network that cannot drive a robot.
+
+    Raises:
+        ValueError: It has other inputs or outputs than the paper's.
+    """
+    if (network.n_inputs, network.n_outputs) != (3, 2):
+        raise ValueError(
+            f"The network has {network.n_inputs} inputs and {network.n_outputs} outputs, expected 3 (largest reading, "
+            "stall, time) and 2 (move, turn)."
+        )
+
+
+def warm_up(network: Network) -> None:
     """Compile or load what a network needs before the robot moves: a watchdog would take that for silence."""
     network.activate([0.0, 0.0, 0.0])
     network.reset()
 
 
-def _limited(output: float) -> float:
+def limited(output: float) -> float:
     """A network's output as a part of a command: within -1..1; what is no number is 0."""
     return min(1.0, max(-1.0, output)) if output == output else 0.0

@@ -94,8 +94,7 @@ class SimRobot:
         if pose is None:
             self._begin(self.platform, self.arena)
             return
-        platform = self.platform.model_copy(update={"set": _without_start(self.platform.set)})
-        self._begin(platform, replace(self.arena, start=pose, vary=_without_start(self.arena.vary)))
+        self._begin(*placed(self.platform, self.arena, pose))
 
     def observe(self) -> Observation:
         """Read the range sensors; the same until the next command."""
@@ -203,6 +202,12 @@ class SimRobot:
     def n_blocked(self) -> int:
         """Blocked steps so far."""
         return int(self._room.lanes.n_stalls[0])
+
+
+def placed(platform: SimPlatform, arena: Arena, pose: Pose) -> tuple[SimPlatform, Arena]:
+    """Platform and arena with trials that begin at a pose, and nothing that would move it."""
+    fixed = platform.model_copy(update={"set": _without_start(platform.set)})
+    return fixed, replace(arena, start=pose, vary=_without_start(arena.vary))
 
 
 def _without_start(numbers: Mapping[str, T]) -> dict[str, T]:

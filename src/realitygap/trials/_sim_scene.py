@@ -86,8 +86,13 @@ def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise:
 
     Raises:
         ValueError: An input that the robot or arena does not have, noise that is not a finite number from 0 on, a
-            number that the arena does not have, or more than 256 cells.
+            number that the arena does not have, more than 256 cells, or a robot to be drawn from no calibration.
     """
+    if platform.randomize == "posterior" and not platform.draws:
+        raise ValueError(
+            f"randomize is 'posterior', and robot {platform.robot.name!r} comes from no calibration with draws. "
+            "Expected sim:FILE with a file that `realitygap calibrate` wrote."
+        )
     if not (math.isfinite(noise) and noise >= 0):
         raise ValueError(f"noise is {noise}, expected a finite number, 0 or more.")
     if arena.grid.n_cells > 256:

@@ -10,8 +10,9 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.robots import Label
 from realitygap.world import Arena, Pose
 
@@ -84,3 +85,36 @@ class Target(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
+
+
+def check_plans(plans: Sequence[TrialPlan], observe: Observe, target: Target, most_number: int) -> None:
+    """Refuse plans that a target cannot carry out.
+
+    Args:
+        plans: To be carried out.
+        observe: How much of them is to be seen.
+        target: By whom.
+        most_number: The greatest number of a trial.
+
+    Raises:
+        ValueError: One of them cannot be, or so much of it cannot be seen.
+    """
+    if observe not in OBSERVATIONS:
+        raise ValueError(f"observe is {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
+    if OBSERVATIONS.index(observe) > OBSERVATIONS.index(target.observes):
+        raise ValueError(
+            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
+            "or name a witness that sees more."
+        )
+    for k, plan in enumerate(plans):
+        shape = np.shape(plan.commands)
+        if len(shape) != 2 or shape[1] != 2:
+            raise ValueError(f"The commands of plan {k} have shape {shape}, expected (t, 2): move and turn.")
+        if (plan.genome is None) == (len(plan.commands) == 0):
+            raise ValueError(f"Plan {k} has to have a genome or commands, and not both.")
+        if plan.genome is None and not np.all(
+            np.abs(plan.commands) <= 1
+        ):  # so that no number is refused, too
+            raise ValueError(f"The commands of plan {k} are not all numbers from -1 to 1.")
+        whole_number(f"number of plan {k}", plan.number, 0, most_number)
+        whole_number(f"steps of plan {k}", plan.steps, 1, 100_000)

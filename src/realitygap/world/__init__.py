@@ -12,7 +12,7 @@ from ._calibration import Calibration, Fitted
 from ._case import Case
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor, FloorImage
-from ._library import arena_names, load_arena, load_robot, robot_names
+from ._library import arena_names, load_arena, load_calibration, load_robot, read_calibration, robot_names
 from ._obstacle import Goal, Light, Obstacle
 from ._part import Part
 from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
@@ -54,10 +54,12 @@ __all__ = [
     "is_inside",
     "light_shapes",
     "load_arena",
+    "load_calibration",
     "load_robot",
     "model_picture",
     "obstacle_shapes",
     "paper_arena",
+    "read_calibration",
     "robot_names",
     "robot_picture",
 ]

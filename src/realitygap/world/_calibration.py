@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from realitygap.settings import Settings
+
+from ._toml import toml_table
+
+MOST_DRAWS = 10_000
+
+_HEAD = """\
+# What was measured of a robot, with intervals of 90 %. `sim:FILE` simulates it with [numbers];
+# `--randomize posterior` draws a column of [draws] for each trial. In meters, radians and seconds.
+"""
 
 
 class Fitted(Settings):
@@ -25,6 +35,15 @@ class Fitted(Settings):
     identified: bool = Field(description="Whether the observations tell it from its prior.")
     unit: str = Field("", description="Such as m/s.")
     advice: str = Field("", description="Where it is not identified: what to record to identify it.")
+
+    @model_validator(mode="after")
+    def _has_its_ends_in_order(self) -> Self:
+        for low, high in (("low", "high"), ("prior_low", "prior_high")):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(
+                    f"{low} is {getattr(self, low):g}, expected at most {high}, {getattr(self, high):g}"
+                )
+        return self
 
 
 class Calibration(Settings):
@@ -48,3 +67,32 @@ class Calibration(Settings):
     misspecification_p: float = Field(1.0, description="Of the posterior predictive check.")
     notes: tuple[str, ...] = Field((), description="What else there is to say.")
     evidence: dict[str, Any] = Field({}, description="What figures are drawn from.")
+
+    @model_validator(mode="after")
+    def _draws_go_together(self) -> Self:
+        lengths = {len(values) for values in self.draws.values()}
+        if len(lengths) > 1:
+            raise ValueError(
+                f"draws: expected as many of each number, came {min(lengths)} to {max(lengths)}: a draw is one of each"
+            )
+        if lengths and not 1 <= max(lengths) <= MOST_DRAWS:
+            raise ValueError(f"draws: expected 1 to {MOST_DRAWS:,} of each number, came {max(lengths):,}")
+        return self
+
+    @property
+    def n_draws(self) -> int:
+        """Draws from the posterior; 0 where there is only the estimate."""
+        return max((len(values) for values in self.draws.values()), default=0)
+
+    def to_toml(self) -> str:
+        """The file that keeps it; `load_calibration` reads it."""
+        values = self.model_dump()
+        tables = [(name, values.pop(name)) for name in ("numbers", "draws", "evidence")]
+        parts = [_HEAD + toml_table(values)]
+        parts += [f"[{name}]\n{toml_table(table)}" for name, table in tables if table]
+        return "\n\n".join(parts) + "\n"
+
+
+def is_calibration(values: Mapping[str, Any]) -> bool:
+    """Whether the values of a file are those of a calibration, of this version or another."""
+    return str(values.get("format", "")).startswith("realitygap calibration")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Literal, Self
 
@@ -39,6 +40,12 @@ class Distribution(Settings):
     )
     least: float | None = Field(None, description="What is drawn below it becomes it.")
     most: float | None = Field(None, description="What is drawn above it becomes it.")
+    together: str = Field(
+        "",
+        max_length=80,
+        description="Numbers with the same word here are drawn by the same random number: choices of one length row by "
+        "row.",
+    )
 
     @model_validator(mode="after")
     def _makes_sense(self) -> Self:
@@ -98,10 +105,14 @@ class Distribution(Settings):
             ratio = logarithm(np.float64(high)) - logarithm(np.float64(low))
             drawn = np.clip(low * exponential(u * ratio), low, high)
         else:
-            values = np.array(self.choice, dtype=np.float64)
+            values = self._choices
             drawn = values[np.minimum((u * len(values)).astype(np.int64), len(values) - 1)]
         least, most = self.least, self.most
         return np.asarray(drawn if least is None and most is None else np.clip(drawn, least, most))
+
+    @functools.cached_property
+    def _choices(self) -> NDArray[np.float64]:
+        return np.array(self.choice, dtype=np.float64)
 
     def _ends(self) -> Pair:
         if self.normal is not None:

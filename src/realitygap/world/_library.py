@@ -17,6 +17,7 @@ from realitygap.errors import DescriptionError, did_you_mean
 
 from ._arena import NAMED_STARTS, Arena, paper_arena
 from ._arena_file import ArenaFile, in_meters
+from ._calibration import Calibration, is_calibration
 from ._floor import MOST_PIXELS, FloorImage
 from ._numbers import in_si
 from ._robot_model import RobotModel
@@ -61,14 +62,62 @@ def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], 
         values |= {"name": str(robot), "base": below}
     else:
         file, origin = _find("robot", robot_names(), robot)
-        values = _values_of(file, origin)
-        values.setdefault("name", Path(origin).stem)
+        values = read_toml(file, origin)
+        if not is_calibration(values):
+            values = _values_of(file, origin)
+            values.setdefault("name", Path(origin).stem)
     if str(file) in chain or len(chain) >= MOST_BASES:
         raise DescriptionError(
             f"{origin}: `base` leads back to it, or through more than {MOST_BASES} robots. Expected a robot that "
             "stands by itself in the end."
         )
+    if is_calibration(values):
+        return _calibrated(_as_calibration(values, origin), origin, [*chain, str(file)]), origin
     return _with_base(values, origin, [*chain, str(file)]), origin
+
+
+def load_calibration(path: str | Path) -> Calibration:
+    """What `realitygap calibrate` wrote.
+
+    Raises:
+        DescriptionError: There is no such file, or it is no calibration: every mistake with its place.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise DescriptionError(f"There is no calibration {file}. `realitygap calibrate` writes one.")
+    values = read_toml(file, str(file))
+    if not is_calibration(values):
+        raise DescriptionError(
+            f"{file} is no calibration: it does not say format = {Calibration.model_fields['format'].default!r}. "
+            "Expected a file that `realitygap calibrate` wrote."
+        )
+    return _as_calibration(values, str(file))
+
+
+def read_calibration(robot: str | Path) -> Calibration | None:
+    """The calibration in a file; None where it is the name or the file of a robot, or of nothing.
+
+    Raises:
+        DescriptionError: It is a calibration with mistakes.
+    """
+    path = Path(robot)
+    if str(robot) in robot_names() or not str(robot) or not path.is_file():
+        return None
+    values = read_toml(path, str(path))
+    return _as_calibration(values, str(path)) if is_calibration(values) else None
+
+
+def _as_calibration(values: Mapping[str, Any], origin: str) -> Calibration:
+    return _checked(origin, lambda: Calibration(**values))
+
+
+def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict[str, Any]:
+    """The values of the robot that a calibration builds on, with its numbers."""
+    below, _ = _robot_values(_beside(calibration.robot, origin), chain)
+    model = _checked(origin, lambda: RobotModel(**below).with_numbers(calibration.numbers))
+    said = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
+    texts = {"sources": [*_texts(below.get("sources")), said]}
+    return model.to_dict() | {"name": Path(origin).stem[:80], "description": model.description} | texts
 
 
 def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[str, Any]:
@@ -80,12 +129,16 @@ def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[st
         raise DescriptionError(f"{origin}: base is {base!r}, expected the name of a robot or its file.")
     if not isinstance(turned, bool):
         raise DescriptionError(f"{origin}: turned is {turned!r}, expected true or false.")
-    beside = Path(origin).parent / base
-    is_beside = Path(origin).is_file() and beside.is_file()
-    below, _ = _robot_values(beside if is_beside else base, chain)
+    below, _ = _robot_values(_beside(base, origin), chain)
     sources = [*_texts(below.get("sources")), *_texts(values.get("sources"))]
     merged = _laid_over(_turned(below, origin) if turned else below, values)
     return merged | ({"sources": sources} if sources else {})
+
+
+def _beside(robot: str, origin: str) -> str | Path:
+    """The file of a robot, looked for beside the file that names it first, or the robot's name."""
+    beside = Path(origin).parent / robot
+    return beside if Path(origin).is_file() and beside.is_file() else robot
 
 
 def _taken_apart(name: str) -> tuple[str, str]:
@@ -289,6 +342,10 @@ def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, s
     )
 
 
+_OURS = ("RobotModel.", "ArenaFile.", "Calibration.")
+_WHOLE = ("RobotModel: ", "ArenaFile: ", "Calibration: ")
+
+
 def _checked(origin: str, make: Callable[[], T]) -> T:
     """What is made, or every mistake that was found in doing so, said of a file."""
     try:
@@ -296,8 +353,8 @@ def _checked(origin: str, make: Callable[[], T]) -> T:
     except DescriptionError:
         raise
     except ValueError as error:
-        lines = [line.split(".", 1)[-1] if line.startswith(("RobotModel.", "ArenaFile.")) else
-                 line.removeprefix("RobotModel: ").removeprefix("ArenaFile: ")
+        lines = [line.split(".", 1)[-1] if line.startswith(_OURS) else line.split(": ", 1)[-1]
+                 if line.startswith(_WHOLE) else line
                  for line in str(error).split("\n")]  # fmt: skip
         count = len(lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}."

@@ -1,0 +1,65 @@
+"""What one platform shows of controllers that were tried on it again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GapSide:
+    """c controllers, each tried r times on one platform.
+
+    Attributes:
+        name: Of the platform, as the user named it.
+        label: SIM, TWIN, EMULATED or REAL.
+        values: (c, r) quality of each trial, such as coverage 0..1.
+        cells: (c, r, n_cells) bool, the cells that each trial crossed; no rows where they are not known.
+        ends: (c, r, 2) where each trial ended [m]; no rows where nobody saw it.
+    """
+
+    name: str
+    label: str
+    values: Values
+    cells: NDArray[np.bool_] = field(default_factory=lambda: np.empty((0, 0, 0), np.bool_))
+    ends: Values = field(default_factory=lambda: np.empty((0, 0, 2)))
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != 2 or 0 in self.values.shape:
+            raise ValueError(
+                f"values of {self.name} has shape {self.values.shape}, expected (controllers, trials), at least one of "
+                "each."
+            )
+        if not np.isfinite(self.values).all():
+            raise ValueError(f"values of {self.name} holds a number that is not finite.")
+        for name, array in (("cells", self.cells), ("ends", self.ends)):
+            if len(array) and array.shape[:2] != self.values.shape:
+                raise ValueError(
+                    f"{name} of {self.name} has shape {array.shape}, expected {(*self.values.shape, array.shape[-1])}."
+                )
+
+    @property
+    def n(self) -> int:
+        """Controllers."""
+        return len(self.values)
+
+    @property
+    def trials(self) -> int:
+        """Trials of each."""
+        return int(self.values.shape[1])
+
+    @property
+    def means(self) -> Values:
+        """(c,) mean quality of each controller."""
+        return np.asarray(self.values.mean(axis=1))
+
+    @property
+    def noise(self) -> Values:
+        """(c,) variance of each of these means that the noise of trials makes; 0 where there is one trial."""
+        if self.trials < 2:
+            return np.zeros(self.n)
+        return np.asarray(self.values.var(axis=1, ddof=1) / self.trials)

@@ -1,0 +1,310 @@
+"""Observed trials in a file: a line of JSON each, kept as they end.
+
+The first line says of what, where and how much was observed. A trial is on the disk when `append` returns; a crash in
+the midst of a line costs that trial and no other.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap._version import __version__
+from realitygap.errors import RecordError
+
+from ._files import reading
+from ._observed import OBSERVATIONS, Observe, ObservedTrial
+from ._output import refuse_results, write_whole
+
+OBSERVATIONS_FORMAT = "realitygap observations 1"
+_WIDTHS = {"commands": 2, "wheels": 2, "poses": 3}
+
+
+@dataclass(frozen=True)
+class ObservationsHead:
+    """What all trials of a file have in common.
+
+    Attributes:
+        target: On which platform, as the user named it.
+        label: What figures of its trials say: SIM, TWIN, EMULATED or REAL.
+        robot: Which robot it is, by name or file.
+        arena: Where, as `Arena.to_dict` has it.
+        step_s: How long one command lasts [s].
+        observe: How much was looked at.
+    """
+
+    target: str
+    label: str
+    robot: str
+    arena: Mapping[str, Any]
+    step_s: float
+    observe: Observe
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, equal to those that come out of a file."""
+        plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return plain
+
+
+@dataclass(frozen=True)
+class Observations:
+    """The trials of a file.
+
+    Attributes:
+        head: What they have in common.
+        trials: In the order in which they ended.
+        problem: What was left out and why; empty where nothing was.
+    """
+
+    head: ObservationsHead
+    trials: tuple[ObservedTrial, ...]
+    problem: str = ""
+
+
+def trial_to_dict(trial: ObservedTrial) -> dict[str, Any]:
+    """A trial as plain values; what is not known of its battery is null."""
+    values = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in vars(trial).items()
+    }
+    return {**values, "battery_v": None if math.isnan(trial.battery_v) else trial.battery_v}
+
+
+def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
+    """The trial that `trial_to_dict` described.
+
+    Raises:
+        ValueError: Something is missing, or not of the shape that it has in a trial.
+    """
+    try:
+        battery_v, measured = values["battery_v"], values.get("end_pose")
+        trial = ObservedTrial(
+            start=_pose(values["start"]),
+            step_s=float(values["step_s"]),
+            commands=_table("commands", values),
+            readings=_table("readings", values),
+            stalled=np.array(values["stalled"], np.bool_).reshape(-1),
+            cells=tuple(int(cell) for cell in values["cells"]),
+            wheels=_table("wheels", values),
+            poses=_table("poses", values),
+            genome=str(values["genome"]),
+            number=int(values["number"]),
+            purpose=str(values["purpose"]),
+            battery_v=math.nan if battery_v is None else float(battery_v),
+            end=str(values["end"]),
+            end_pose=None if measured is None else _pose(measured),
+        )
+    except KeyError as error:
+        raise ValueError(f"a trial without {error}") from None
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"a trial that cannot be read ({error})") from None
+    t = len(trial.commands)
+    rows = {"readings": len(trial.readings), "stalled": len(trial.stalled)}
+    rows |= {
+        name: len(table) - 1
+        for name, table in (("wheels", trial.wheels), ("poses", trial.poses))
+        if len(table)
+    }
+    for name, n in rows.items():
+        if n != t:
+            raise ValueError(f"a trial with {t} commands whose {name} are of {n}")
+    return trial
+
+
+def _pose(values: Any) -> tuple[float, float, float]:
+    x, y, heading = map(float, values)
+    return x, y, heading
+
+
+def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
+    rows = values[name]
+    width = _WIDTHS.get(name) or (len(rows[0]) if rows else 0)
+    table: NDArray[np.float64] = np.array(rows, np.float64).reshape(len(rows), width)
+    return table
+
+
+class ObservationsFile:
+    """A file to which trials are added as they end.
+
+    One that is there is taken up where it ends: a torn last line is cut off, and what it was is told in `problem`.
+
+    Args:
+        path: Where; made where there is none.
+        head: What its trials have in common.
+
+    Attributes:
+        trials: Those that it had when it was opened.
+        problem: What was cut off; empty where nothing was.
+
+    Raises:
+        RecordError: It is another file, of another target, damaged, or cannot be written.
+    """
+
+    def __init__(self, path: Path | str, head: ObservationsHead) -> None:
+        self.path = Path(path)
+        self.head = head
+        self.trials: tuple[ObservedTrial, ...] = ()
+        self.problem = ""
+        refuse_results(self.path)
+        held = self._take_up()
+        try:
+            self._file = self.path.open("r+b" if self.path.exists() else "xb", buffering=0)
+            self._file.truncate(held)
+            self._file.seek(held)
+            if not held:
+                self._write(_first_line(head))
+        except OSError as error:
+            raise self._cannot(error) from error
+
+    def _take_up(self) -> int:
+        """How many bytes of what is there are kept."""
+        if not self.path.exists():
+            return 0
+        with reading(self.path):
+            data = self.path.read_bytes()
+        if b"\n" not in data and _first_line(self.head).startswith(data):
+            return 0  # a crash while the first line was written
+        found, held = _parse(self.path, data)
+        there, wanted = found.head.to_dict(), self.head.to_dict()
+        other = [name for name in wanted if there[name] != wanted[name]]
+        if other:
+            what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
+            raise RecordError(
+                f"{self.path} has trials of something else: {what}. They are not put together. Name another file."
+            )
+        self.trials, self.problem = found.trials, found.problem
+        return held
+
+    def append(self, trial: ObservedTrial) -> None:
+        """Keep a trial; it is on the disk when this returns.
+
+        Raises:
+            RecordError: It cannot be written; what was kept before is safe.
+        """
+        try:
+            self._write(_line(trial_to_dict(trial)))
+        except OSError as error:
+            raise self._cannot(error) from error
+
+    def _write(self, line: bytes) -> None:
+        n = self._file.write(line)
+        os.fsync(self._file.fileno())
+        if n != len(line):
+            raise OSError(0, "it is full")
+
+    def _cannot(self, error: OSError) -> RecordError:
+        return RecordError(
+            f"Could not write {self.path}: {error.strerror or error}. What was kept before is safe. Make room, or name "
+            "a file that can be written."
+        )
+
+    def close(self) -> None:
+        """Let go of it; safe to call twice."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[ObservedTrial]) -> None:
+    """Write trials into a file of their own, whole; one that is there is replaced.
+
+    Raises:
+        RecordError: It cannot be written.
+    """
+    write_whole(Path(path), [_first_line(head), *(_line(trial_to_dict(trial)) for trial in trials)])
+
+
+def read_observations(path: Path | str) -> Observations:
+    """Read the trials of a file; a torn last line is left out, and `problem` says so.
+
+    Raises:
+        RecordError: There is none, it is of another format, or damaged before its last line.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise RecordError(f"There is no file {path}. Name one with observed trials.")
+    with reading(path):
+        data = path.read_bytes()
+    return _parse(path, data)[0]
+
+
+def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
+    """What a file holds, and how many of its bytes."""
+    first, newline, rest = data.partition(b"\n")
+    head = _head(path, first)
+    trials: list[ObservedTrial] = []
+    held = len(first) + len(newline)
+    problem = ""
+    lines = rest.split(b"\n")
+    for number, line in enumerate(lines, 2):
+        is_last = number == len(lines) + 1
+        if is_last and not line:
+            break
+        try:
+            trials.append(trial_from_dict(_object(line)))
+        except ValueError as error:
+            if not is_last:
+                raise RecordError(f"{path} is damaged: line {number} is {error}.") from None
+            problem = (
+                f"{path}: the last line, {len(line)} bytes, was cut off in a crash, and its trial is lost."
+            )
+        else:
+            held += len(line) + (not is_last)
+    return Observations(head, tuple(trials), problem), held
+
+
+def _object(line: bytes) -> dict[str, Any]:
+    try:
+        values = json.loads(line)
+    except ValueError:
+        raise ValueError("no JSON") from None
+    if not isinstance(values, dict):
+        raise ValueError("no object")
+    return values
+
+
+def _head(path: Path, line: bytes) -> ObservationsHead:
+    try:
+        values = _object(line)
+    except ValueError:
+        values = {}
+    if values.get("format") != OBSERVATIONS_FORMAT:
+        raise RecordError(
+            f"{path} is no file of observed trials, or of another version: its first line does not say "
+            f"{OBSERVATIONS_FORMAT!r}. Name one that this realitygap ({__version__}) wrote."
+        )
+    names = ObservationsHead.__dataclass_fields__
+    missing = [name for name in names if name not in values]
+    if missing or values["observe"] not in OBSERVATIONS:
+        what = f"has no {', '.join(missing)}" if missing else f"says observe {values['observe']!r}"
+        raise RecordError(f"{path} is damaged: its first line {what}.")
+    return ObservationsHead(**{name: values[name] for name in names})
+
+
+def _first_line(head: ObservationsHead) -> bytes:
+    return _line({"format": OBSERVATIONS_FORMAT, **head.to_dict(), "realitygap": __version__})
+
+
+def _line(values: Mapping[str, Any]) -> bytes:
+    return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{value.get('name', '...')!r}"
+    return repr(value)

@@ -1,0 +1,57 @@
+"""Plain values as TOML, for files that are written to be read by people."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+DIGITS = 9
+"""Of a number: more than any measurement has, and few enough to be read."""
+
+
+def toml_value(value: Any) -> str:
+    """A value on one line.
+
+    Args:
+        value: Texts, numbers, truth values, and lists, arrays and tables of such.
+
+    Raises:
+        TypeError: TOML has no such value, such as None.
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float):
+        return repr(float(f"{value:.{DIGITS}g}"))
+    if isinstance(value, Mapping):
+        parts = ", ".join(f"{toml_key(key)} = {toml_value(part)}" for key, part in value.items())
+        return f"{{ {parts} }}" if parts else "{}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml_value, value))}]"
+    raise TypeError(f"{value!r} is a {type(value).__name__}, expected a text, a number, a list or a table.")
+
+
+def toml_key(key: str) -> str:
+    """A key, in quotes where it needs them."""
+    is_bare = bool(key) and key.isascii() and all(letter.isalnum() or letter in "_-" for letter in key)
+    return key if is_bare else toml_value(key)
+
+
+def toml_table(values: Mapping[str, Any]) -> str:
+    """A table, a line for each key; a list of tables or texts has a line for each of them."""
+    return "\n".join(f"{toml_key(key)} = {_spread(value)}" for key, value in values.items())
+
+
+def _spread(value: Any) -> str:
+    is_long = isinstance(value, list | tuple) and any(isinstance(part, Mapping | str) for part in value)
+    if not is_long:
+        return toml_value(value)
+    return "\n".join(["[", *(f"    {toml_value(part)}," for part in value), "]"])

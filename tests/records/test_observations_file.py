@@ -1,0 +1,168 @@
+"""The file of observed trials."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from realitygap.errors import RecordError
+from realitygap.records import (
+    ObservationsFile,
+    ObservationsHead,
+    ObservedTrial,
+    read_observations,
+    trial_to_dict,
+    write_observations,
+)
+from realitygap.world import paper_arena
+
+HEAD = ObservationsHead(
+    "twin:worn.toml", "TWIN", "scribbler-s2-fluke2", paper_arena().to_dict(), 0.5, "track"
+)
+
+
+def trial(number: int, t: int = 3) -> ObservedTrial:
+    rng = np.random.default_rng(number)
+    return ObservedTrial(
+        start=(0.19, 0.2, math.pi / 7),
+        step_s=0.5,
+        commands=rng.uniform(-1, 1, (t, 2)),
+        readings=rng.uniform(0, 1, (t, 3)),
+        stalled=rng.random(t) < 0.5,
+        cells=(3, 7, 71),
+        wheels=rng.normal(size=(t + 1, 2)),
+        poses=rng.normal(size=(t + 1, 3)),
+        number=number,
+        purpose="motion",
+        battery_v=float("nan") if number else 7.25,
+    )
+
+
+def same(one: ObservedTrial, other: ObservedTrial) -> bool:
+    return trial_to_dict(one) == trial_to_dict(other)
+
+
+def test_trials_come_back_as_they_were(tmp_path: Path) -> None:
+    trials = [
+        trial(0),
+        trial(1, 0),
+        replace(trial(2), wheels=np.empty((0, 2)), poses=np.empty((0, 3)), cells=()),
+    ]
+    write_observations(tmp_path / "one.jsonl", HEAD, trials)
+    found = read_observations(tmp_path / "one.jsonl")
+    assert found.head.to_dict() == HEAD.to_dict()
+    assert found.problem == ""
+    assert all(same(*pair) for pair in zip(found.trials, trials, strict=True))
+    assert found.trials[2].observe == "cells"
+    assert math.isnan(found.trials[1].battery_v)
+    assert found.trials[0].commands.dtype == float
+    assert found.trials[0].stalled.dtype == bool
+
+
+def test_a_trial_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor).st_size))
+    with ObservationsFile(tmp_path / "one.jsonl", HEAD) as file:
+        for number in range(3):
+            file.append(trial(number))
+            assert synced[-1] == file.path.stat().st_size
+            assert len(read_observations(file.path).trials) == number + 1
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(cut=st.integers(0, 3000), more=st.booleans())
+def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_taken_up(
+    tmp_path: Path, cut: int, more: bool
+) -> None:
+    path = tmp_path / "cut.jsonl"
+    trials = [trial(number, 2) for number in range(3)]
+    write_observations(path, HEAD, trials)
+    whole = path.read_bytes()
+    ends = np.cumsum([len(line) for line in whole.splitlines(keepends=True)])
+    cut = min(cut, len(whole))
+    path.write_bytes(whole[:cut])
+    n_whole = int(np.sum(ends[1:] - 1 <= cut))  # without its newline a line is whole, too
+    if cut >= ends[0] - 1:
+        found = read_observations(path)
+        assert [each.number for each in found.trials] == list(range(n_whole))
+        assert ("cut off" in found.problem) == (cut not in ends and cut + 1 not in ends)
+    else:
+        with pytest.raises(RecordError, match="no file of observed trials"):
+            read_observations(path)
+    with ObservationsFile(path, HEAD) as file:
+        assert len(file.trials) == n_whole
+        if more:
+            file.append(trial(9, 2))
+    expected = [*range(n_whole), *([9] if more else [])]
+    again = read_observations(path)
+    assert [each.number for each in again.trials] == expected
+    assert again.problem == ""
+
+
+def test_trials_of_something_else_are_not_put_into_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "one.jsonl"
+    write_observations(path, HEAD, [trial(0)])
+    before = path.read_bytes()
+    with pytest.raises(
+        RecordError, match=r"target 'twin:worn.toml' and not 'sim'; observe 'track' and not 'cells'"
+    ):
+        ObservationsFile(path, replace(HEAD, target="sim", observe="cells"))
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (b"", "no file of observed trials"),
+        (b'{"a": 1}\n{"b": 2}\n', "no file of observed trials"),
+        (b"\xff\xfe\x00binary", "no file of observed trials"),
+        (b'{"format": "realitygap observations 9"}\n', "or of another version"),
+        (b'{"format": "realitygap observations 1"}\n', "has no target, label, robot, arena, step_s, observe"),
+    ],
+)
+def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, text: bytes, said: str) -> None:
+    path = tmp_path / "other.jsonl"
+    path.write_bytes(text)
+    with pytest.raises(RecordError, match=said):
+        read_observations(path)
+    if text:
+        with pytest.raises(RecordError, match=said):
+            ObservationsFile(path, HEAD)
+        assert path.read_bytes() == text
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"readings": [[0.1]]}, "a trial with 3 commands whose readings are of 1"),
+        ({"poses": [[1, 2]]}, "a trial that cannot be read"),
+        ({"cells": "many"}, "a trial that cannot be read"),
+        ({"end": ...}, "a trial without 'end'"),
+    ],
+)
+def test_damage_before_the_last_line_is_told_with_its_line(
+    tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    path = tmp_path / "one.jsonl"
+    write_observations(path, HEAD, [trial(0), trial(1)])
+    lines = path.read_text().splitlines()
+    values = {**json.loads(lines[1]), **change}
+    lines[1] = json.dumps({name: value for name, value in values.items() if value is not ...})
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(RecordError, match=f"line 2 is {said}"):
+        read_observations(path)
+
+
+def test_a_file_that_is_not_there_is_told_in_one_message(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="There is no file"):
+        read_observations(tmp_path / "none.jsonl")
+    with pytest.raises(RecordError, match="Could not write"):
+        ObservationsFile(tmp_path / "no folder" / "one.jsonl", HEAD)

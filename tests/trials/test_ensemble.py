@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from realitygap.evolution import NeatSettings, Population
+from realitygap.robots import SimPlatform
+from realitygap.trials import NoiseKey, Play, SimEnsemble, trace_genome
+from realitygap.trials import _ensemble as module
+from realitygap.world import paper_arena
+
+START = [0.1905, 0.1905, 0.0]
+
+
+@pytest.fixture(scope="module")
+def genomes():
+    return Population(3, 2, NeatSettings.named("rosenzweig-remy"), seed=4).ask()[:3]
+
+
+@pytest.fixture(scope="module")
+def ensemble():
+    return SimEnsemble(SimPlatform(), paper_arena())
+
+
+def test_controllers_drive_the_trials_that_try_genomes_gives(ensemble, genomes):
+    driven = ensemble.drive(genomes, [START] * 3, 100, {}, 7)
+    for k, genome in enumerate(genomes):
+        track = trace_genome(
+            SimPlatform(), paper_arena(), genome, noise=0.0, noise_key=NoiseKey(7, individual=k)
+        )
+        assert np.allclose(driven.poses[0, k, :, :2], track.poses[:, :2], atol=1e-5)
+        assert np.array_equal(driven.readings[0, k], track.answers[:, :3].astype(np.float32))
+        assert set(np.flatnonzero(driven.cells[0, k])) == set(track.cells)
+        assert np.array_equal(driven.stalled[0, k], track.stalled)
+
+
+def test_commands_of_a_controller_replayed_give_its_trial(ensemble, genomes):
+    values = {"drive.track": [0.14, 0.16], "range.0.decay": [0.1, 0.2], "drive.delay": [0.0, 0.3]}
+    driven = ensemble.drive(genomes, [START] * 3, 60, values, 7)
+    for m in range(2):
+        one = {name: value[m : m + 1] for name, value in values.items()}
+        both = SimEnsemble(
+            SimPlatform(), paper_arena(), ranges={n: (min(v), max(v)) for n, v in values.items()}
+        )
+        replayed = both.replay([START] * 3, driven.commands[m], one, 7, same_noise=True)
+        if m == 0:  # robots after the first draw other random numbers
+            assert np.array_equal(replayed.poses[0], driven.poses[0])
+            assert np.array_equal(replayed.wheels[0], driven.wheels[0])
+    assert not np.array_equal(driven.poses[0], driven.poses[1])
+
+
+def test_how_robots_are_parted_among_threads_changes_nothing(genomes, monkeypatch):
+    values = {"drive.gain_left": np.linspace(0.9, 1.1, 40)}
+    play = Play(np.array([START] * 3), 30, genomes=tuple(genomes))
+    one = SimEnsemble(SimPlatform(), paper_arena(), threads=1)
+    whole = one.summarize(play, values, 3, lambda r: r.coverage)
+    monkeypatch.setattr(module, "CHUNK_BYTES", 100_000)
+    parted = SimEnsemble(SimPlatform(), paper_arena(), threads=3).summarize(
+        play, values, 3, lambda r: r.coverage
+    )
+    assert whole.shape == (40, 3)
+    assert np.array_equal(whole, parted)
+
+
+def test_a_robot_put_back_is_predicted_from_there(ensemble):
+    commands = np.tile([[1.0, 0.0]], (1, 6, 1))
+    free = ensemble.replay([START], commands, {}, 1).poses[0, 0]
+    anchors = np.full((1, 7, 3), np.nan)
+    anchors[0, 3] = [0.5, 0.3, np.pi / 2]
+    moved = ensemble.replay([START], commands, {}, 1, anchors=anchors).poses[0, 0]
+    assert np.array_equal(moved[:4], free[:4])
+    turn = np.pi / 2 - free[3, 2]
+    step = free[4] - free[3]
+    ahead = [step[0] * np.cos(turn) - step[1] * np.sin(turn), step[0] * np.sin(turn) + step[1] * np.cos(turn)]
+    assert moved[4] - [0.5, 0.3, np.pi / 2] == pytest.approx([*ahead, step[2]], abs=1e-5)
+
+
+def test_what_is_not_kept_has_no_steps(ensemble):
+    rehearsal = ensemble.replay([START], np.ones((1, 5, 2)), {}, 1, keep=("stalled",))
+    assert rehearsal.poses.shape == (1, 1, 0, 3)
+    assert rehearsal.stalled.shape == (1, 1, 6)
+
+
+def test_sets_that_do_not_fit_are_refused(ensemble):
+    with pytest.raises(ValueError, match=r"drive.lag has shape \(3,\), expected \(2,\)"):
+        ensemble.replay([START], np.ones((1, 5, 2)), {"drive.track": [0.1, 0.2], "drive.lag": [0, 0, 0]}, 1)
+    with pytest.raises(ValueError, match=r"drive\.trak"):
+        ensemble.replay([START], np.ones((1, 5, 2)), {"drive.trak": [0.1]}, 1)
+    with pytest.raises(ValueError, match="greater than 0|more than 0"):
+        ensemble.replay([START], np.ones((1, 5, 2)), {"drive.track": [-0.1]}, 1)
+    with pytest.raises(ValueError, match="commands has shape"):
+        ensemble.replay([START] * 2, np.ones((1, 5, 2)), {}, 1)

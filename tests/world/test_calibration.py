@@ -1,0 +1,118 @@
+"""A calibration's file, and the robot that it makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from realitygap.errors import DescriptionError
+from realitygap.world import Calibration, Distribution, Fitted, load_calibration, load_robot, read_calibration
+
+
+def made(**values) -> Calibration:
+    """A calibration of the track, from two draws, with other values where given."""
+    track = Fitted(
+        name="drive.track",
+        estimate=0.15,
+        low=0.14,
+        high=0.16,
+        prior_low=0.1,
+        prior_high=0.2,
+        identified=True,
+        unit="m",
+    )
+    plain = {
+        "kind": "motion",
+        "robot": "scribbler-s2-fluke2",
+        "target": "twin:worn.toml",
+        "label": "TWIN",
+        "observe": "track",
+        "trials": 3,
+        "date": "2026-11-21T15:00:00+00:00",
+        "method": "told",
+        "fitted": (track,),
+        "numbers": {"drive.track": 0.15, "drive.gain_left": 1.02},
+        "draws": {"drive.track": (0.149, 0.151), "drive.gain_left": (1.0, 1.04)},
+    }
+    return Calibration(**(plain | values))
+
+
+def written(folder: Path, calibration: Calibration) -> Path:
+    """Its file."""
+    file = folder / "fit.toml"
+    file.write_text(calibration.to_toml(), encoding="utf-8")
+    return file
+
+
+def test_a_calibration_survives_the_trip_through_its_file(tmp_path):
+    told = made(notes=('a "quote"\x7f\n', "ü"), evidence={"rows of": [1, 2.5, {"x": [True, "y"]}]})
+    assert load_calibration(written(tmp_path, told)) == told
+
+
+def test_numbers_in_the_file_are_short_enough_to_read_and_stay_when_written_again(tmp_path):
+    told = made(numbers={"drive.track": 0.1 + 0.2 / 3})
+    text = told.to_toml()
+    assert '"drive.track" = 0.166666667' in text
+    assert load_calibration(written(tmp_path, told)).to_toml() == text
+
+
+def test_the_robot_of_a_calibration_has_its_numbers_and_says_where_they_come_from(tmp_path):
+    robot = load_robot(written(tmp_path, made()))
+    base = load_robot("scribbler-s2-fluke2")
+    assert (robot.drive.track, robot.drive.gain_left) == (0.15, 1.02)
+    assert robot.drive.speed == base.drive.speed
+    assert robot.name == "fit"
+    assert robot.sources[-1] == "fit.toml: motion of twin:worn.toml, 2026-11-21T15:00:00+00:00"
+
+
+def test_a_calibration_finds_the_robot_file_that_lies_beside_it(tmp_path):
+    (tmp_path / "mine.toml").write_text('base = "scribbler-s2"\n[drive]\nspeed = 0.2\n')
+    robot = load_robot(written(tmp_path, made(robot="mine.toml")))
+    assert (robot.drive.speed, robot.drive.track) == (0.2, 0.15)
+
+
+def test_what_is_no_calibration_is_told_from_one(tmp_path):
+    plain = tmp_path / "mine.toml"
+    plain.write_text('base = "scribbler-s2"\n')
+    assert read_calibration(plain) is None
+    assert read_calibration("scribbler-s2") is None
+    assert read_calibration(tmp_path / "none.toml") is None
+    assert read_calibration(written(tmp_path, made())) == made()
+    with pytest.raises(DescriptionError, match=r"mine.toml is no calibration"):
+        load_calibration(plain)
+    with pytest.raises(DescriptionError, match=r"There is no calibration .*none.toml"):
+        load_calibration(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('"realitygap calibration 1"', '"realitygap calibration 9"', "format"),
+        ('kind = "motion"', 'kind = "notion"', "kind: expected 'path'"),
+        ("low = 0.14", "low = 0.24", "low is 0.24, expected at most high, 0.16"),
+        ("[0.149, 0.151]", "[0.149]", "expected as many of each number, came 1 to 2"),
+        ("trials = 3", "trials = -3", "trials: expected at least 0"),
+        ('robot = "scribbler-s2-fluke2"', 'robot = "scribbler-s2-fluke3"', "Unknown robot"),
+        ('"drive.track" = 0.15', '"drive.trick" = 0.15', "drive.trick: no number of this name"),
+        ('"drive.track" = 0.15', '"drive.track" = -0.15', "drive.track: expected more than 0"),
+        ("trials = 3", "trials = ", "not TOML"),
+    ],
+)
+def test_mistakes_in_the_file_are_told_with_their_place(tmp_path, old, new, says):
+    file = written(tmp_path, made())
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    with pytest.raises(DescriptionError, match=says):
+        load_robot(file)
+
+
+def test_numbers_drawn_together_stay_together():
+    distributions = [
+        Distribution(choice=(1.0, 2.0, 3.0), together="a"),
+        Distribution(choice=(10.0, 20.0, 30.0)),
+    ]
+    units = np.array([0.1, 0.5, 0.9])
+    assert (distributions[0].of(units) * 10).tolist() == distributions[1].of(units).tolist()

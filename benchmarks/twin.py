@@ -1,7 +1,7 @@
 """How long a twin takes for a trial of 100 commands of 0.5 s: seconds of a processor, the least of several.
 
-    python benchmarks/twin.py                    # the families close, slippery and alien
-    python benchmarks/twin.py worn --repeats 20
+`python benchmarks/twin.py` measures the families close, slippery and alien;
+`python benchmarks/twin.py worn --repeats 20` another one.
 """
 
 from __future__ import annotations

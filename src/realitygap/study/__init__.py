@@ -12,22 +12,34 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
+from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
+from ._transfer_target import KeptTarget
 
 __all__ = [
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "SECTIONS",
+    "STRATEGIES",
     "ConditionNotes",
+    "Estimate",
+    "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "Strategist",
     "Study",
     "StudyResult",
     "StudySection",
+    "TransferPlan",
+    "TransferResult",
+    "Transferred",
     "TrialsSection",
+    "choose_condition",
     "connect_robot",
     "drive_study",
+    "estimate_mean",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -40,7 +52,9 @@ __all__ = [
     "parse_study",
     "refuse_port_without_robot",
     "run_study",
+    "strategy_names",
     "study_template",
     "task_settings",
+    "transfer",
     "usable_processors",
 ]

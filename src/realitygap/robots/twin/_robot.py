@@ -27,6 +27,7 @@ from ._stall import Idler
 
 FULL_SCALE = 6400.0  # of a Fluke's obstacle reading
 TICK_STEPS = round(TICK_S / STEP_S)
+CRUISE_STEPS = 2 * TICK_STEPS  # while nothing changes but slowly
 
 
 class TwinClock:
@@ -148,7 +149,8 @@ class TwinRobot:
                 self._phase = 0
             if not self._phase:
                 self._speeds = self._regulator.tick()
-            n = min(TICK_STEPS - self._phase, end - self._steps)
+            whole = CRUISE_STEPS if self._regulator.is_steady and self._servo.is_steady else TICK_STEPS
+            n = min(whole - self._phase, end - self._steps)
             if self._heard:
                 n = min(n, self._heard[0][0] - self._steps)
             self._pass(n)
@@ -213,7 +215,7 @@ class TwinRobot:
         return self._servo.volts
 
     def path(self) -> NDArray[np.float64]:
-        """(n, 3) x [m], y [m] and heading [rad] since the start, each 20 ms or more often: the line of the pen."""
+        """(n, 3) x [m], y [m] and heading [rad] since the start, each 40 ms or more often: the line of the pen."""
         return np.array(self._points)
 
     @property

@@ -56,6 +56,7 @@ from realitygap.report._permutation import (
     smallest_p,
 )
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
+from realitygap.report._sensor_figure import draw_sensors, save_sensor_figure
 from realitygap.report._show import save_arena, save_robot, save_view
 from realitygap.report._species_figure import draw_species
 from realitygap.report._statistics import (
@@ -114,6 +115,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "draw_individuals",
     "draw_better_individuals",
     "draw_networks",
+    "draw_sensors",
     "draw_species",
     "draw_lineage",
     "draw_trial",
@@ -121,6 +123,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Drawing",
     "save_drawing",
     "save_picture",
+    "save_sensor_figure",
     "save_view",
     "save_arena",
     "save_robot",

@@ -26,7 +26,7 @@ from realitygap.world import Arena, Calibration, load_robot, read_calibration
 
 from ._calibrate_kinds import KINDS, Parts
 from ._targets import observations_head
-from ._wrapped_targets import Guide, GuidedTarget, KeptTarget, RuledTarget
+from ._wrapped_targets import Guide, GuidedTarget, ResumableTarget, RuledTarget, is_whole
 
 SEED_STRIDE = 10_000
 """Between the numbers of trials of calibrations with different seeds."""
@@ -84,7 +84,7 @@ def calibrate(
         head = observations_head(target, observe, str(robot))
         with ObservationsFile(trials_file, head) as file:
             plans = made.plans(target.arena, base, budget)
-            trials = _carry_out(kind, KeptTarget(around, file), plans, observe, seed, tell)
+            trials = _carry_out(kind, ResumableTarget(around, file), plans, observe, seed, tell)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
     return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
 
@@ -160,8 +160,9 @@ def _fit(
 
 
 def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:
-    """Trials of which a later one with the same purpose and number took the place are left out."""
-    return list({(trial.purpose, trial.number, trial.start): trial for trial in found.trials}.values())
+    """Trials that were cut off, and those of which a later one with the same number took the place, are left out."""
+    whole = [trial for trial in found.trials if is_whole(trial)]
+    return list({(trial.purpose, trial.number, trial.start): trial for trial in whole}.values())
 
 
 def _calibration(

@@ -180,7 +180,7 @@ def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]
     """What Figure 3 draws of a sensor."""
     return {
         "name": fit.name,
-        "distances_m": [float(np.median(placement.distances)) for placement in placements],
+        "distances_m": [float(placement.distances.min()) for placement in placements],
         "readings": [np.round(placement.readings, 5).tolist() for placement in placements],
         "curve": {key: np.round(values, 5).tolist() for key, values in fit.curve.items()},
         "p": fit.p,

@@ -12,7 +12,7 @@ import numpy as np
 from realitygap.calibration import ruled
 from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import Target, TrialPlan
+from realitygap.trials import EndReason, Target, TrialPlan
 
 Tell = Callable[[int, ObservedTrial], None]
 
@@ -31,8 +31,8 @@ class Guide(Protocol):
         """Put the robot at the start of plan `number` of n: go on, take the one before back, or stop for today."""
         ...
 
-    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial:
-        """The trial with what a person measured of it."""
+    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+        """The trial with what a person measured of it; None: it is to be driven again."""
         ...
 
 
@@ -117,14 +117,17 @@ class GuidedTarget(_Around):
                 k = max(k - 1, 0)
                 continue
             (trial,) = self.target.carry_out([plans[k]], observe)
-            trials[k] = self._guide.measure(plans[k], trial)
+            measured = self._guide.measure(plans[k], trial)
+            if measured is None:
+                continue
+            trials[k] = measured
             if tell is not None:
-                tell(k, trials[k])
+                tell(k, measured)
             k += 1
         return [trials[k] for k in range(len(plans))]
 
 
-class KeptTarget(_Around):
+class ResumableTarget(_Around):
     """Trials are kept as they end, and those that a file has already are not carried out again.
 
     Of trials of one plan the last one counts.
@@ -133,7 +136,7 @@ class KeptTarget(_Around):
     def __init__(self, target: Target, file: ObservationsFile) -> None:
         super().__init__(target)
         self._file = file
-        self.trials = {_what(trial): trial for trial in file.trials}
+        self.trials = {_what(trial): trial for trial in file.trials if is_whole(trial)}
         self.n_found = 0
 
     def carry_out(
@@ -149,13 +152,19 @@ class KeptTarget(_Around):
 
         def keep(k: int, trial: ObservedTrial) -> None:
             self._file.append(trial)
-            self.trials[wanted[missing[k]]] = trial
-            if tell is not None:
-                tell(missing[k], trial)
+            if is_whole(trial):
+                self.trials[wanted[missing[k]]] = trial
+                if tell is not None:
+                    tell(missing[k], trial)
 
         if missing:
             self.target.carry_out([plans[k] for k in missing], observe, keep)
         return [self.trials[what] for what in wanted]
+
+
+def is_whole(trial: ObservedTrial) -> bool:
+    """Whether a trial came to its own end, and was not cut off."""
+    return trial.end not in (EndReason.LOST, EndReason.INTERRUPTED)
 
 
 def _what(trial: ObservedTrial) -> tuple[object, ...]:

@@ -1,6 +1,7 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._mazes import MAZE_SEEDS, measure_maze
@@ -15,6 +16,7 @@ from ._template import study_template
 from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
+from ._wrapped_targets import Guide, StoppedByPerson
 
 __all__ = [
     "DEFAULT_NEAT",
@@ -23,11 +25,13 @@ __all__ = [
     "STRATEGIES",
     "ConditionNotes",
     "Estimate",
+    "Guide",
     "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "StoppedByPerson",
     "Strategist",
     "Study",
     "StudyResult",
@@ -36,6 +40,8 @@ __all__ = [
     "TransferResult",
     "Transferred",
     "TrialsSection",
+    "calibrate",
+    "calibrate_from",
     "choose_condition",
     "connect_robot",
     "drive_study",
@@ -52,6 +58,7 @@ __all__ = [
     "parse_study",
     "refuse_port_without_robot",
     "run_study",
+    "save_calibration",
     "strategy_names",
     "study_template",
     "task_settings",

@@ -1,8 +1,10 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
+from ._gap import GapStudy, run_gap, study_gap
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy
 from ._realism import measure_realism
@@ -18,6 +20,8 @@ __all__ = [
     "MAZE_SEEDS",
     "SECTIONS",
     "ConditionNotes",
+    "Controller",
+    "GapStudy",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
@@ -39,7 +43,10 @@ __all__ = [
     "open_target",
     "parse_study",
     "refuse_port_without_robot",
+    "run_gap",
     "run_study",
+    "sample_controllers",
+    "study_gap",
     "study_template",
     "task_settings",
     "usable_processors",

@@ -26,6 +26,7 @@ from ._result import MEASURES, GapResult
 from ._shapley import coalitions, shapley_values
 from ._side import GapSide
 from ._verdict import verdict_of
+from ._why import Why, explain_gap
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # all of it
@@ -76,6 +77,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "bootstrap",
     "interval",
     # why
+    "Why",
+    "explain_gap",
     "coalitions",
     "shapley_values",
 ]

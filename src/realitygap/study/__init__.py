@@ -14,10 +14,12 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._why import PARTS, calibration_of, part_of, why_gap
 
 __all__ = [
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
+    "PARTS",
     "SECTIONS",
     "ConditionNotes",
     "Controller",
@@ -30,6 +32,7 @@ __all__ = [
     "StudyResult",
     "StudySection",
     "TrialsSection",
+    "calibration_of",
     "connect_robot",
     "drive_study",
     "load_study",
@@ -42,6 +45,7 @@ __all__ = [
     "observations_head",
     "open_target",
     "parse_study",
+    "part_of",
     "refuse_port_without_robot",
     "run_gap",
     "run_study",
@@ -50,4 +54,5 @@ __all__ = [
     "study_template",
     "task_settings",
     "usable_processors",
+    "why_gap",
 ]

@@ -18,6 +18,7 @@ from ._robot import robot
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
+from ._transfer import transfer
 from ._trials import trials
 
 app = typer.Typer(
@@ -61,3 +62,4 @@ app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
 app.command("trials")(trials)
+app.command("transfer")(transfer)

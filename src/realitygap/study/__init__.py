@@ -14,6 +14,9 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
+from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
+from ._transfer_target import KeptTarget
 from ._why import PARTS, calibration_of, part_of, why_gap
 
 __all__ = [
@@ -21,20 +24,29 @@ __all__ = [
     "MAZE_SEEDS",
     "PARTS",
     "SECTIONS",
+    "STRATEGIES",
     "ConditionNotes",
     "Controller",
+    "Estimate",
     "GapStudy",
+    "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "Strategist",
     "Study",
     "StudyResult",
     "StudySection",
+    "TransferPlan",
+    "TransferResult",
+    "Transferred",
     "TrialsSection",
     "calibration_of",
+    "choose_condition",
     "connect_robot",
     "drive_study",
+    "estimate_mean",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -50,9 +62,11 @@ __all__ = [
     "run_gap",
     "run_study",
     "sample_controllers",
+    "strategy_names",
     "study_gap",
     "study_template",
     "task_settings",
+    "transfer",
     "usable_processors",
     "why_gap",
 ]

@@ -14,6 +14,7 @@ from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
+from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
@@ -26,6 +27,7 @@ from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
 from ._target import Target, TrialPlan
 from ._target_sim import SimTarget
+from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
@@ -49,6 +51,7 @@ __all__ = [
     "SimScene",
     "SimTarget",
     "SimTrials",
+    "SimTwin",
     "SimWorld",
     "SimWorldRobot",
     "Target",
@@ -57,6 +60,7 @@ __all__ = [
     "TrialInterrupted",
     "TrialPlan",
     "TrialStopped",
+    "TwinTarget",
     "Verdict",
     "WitnessOperator",
     "carry_out_on_robot",
@@ -66,6 +70,7 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "open_trials",
+    "open_twin",
     "paper_inputs",
     "poses_of",
     "preflight",

@@ -26,13 +26,14 @@ from ._draws import Draws
 from ._sim import sim_rules
 from ._sim_scene import SimScene, sim_scene
 
-CHUNK_BYTES = 100_000_000  # of what a thread keeps at once
+CHUNK_BYTES = 32_000_000  # of what a thread keeps at once
 START = ("arena.start.x", "arena.start.y", "arena.start.heading")
 KEPT = ("poses", "readings", "stalled", "wheels", "commands")
 """What can be kept of every step."""
 
 Values = Mapping[str, ArrayLike]
 T = TypeVar("T")
+F = TypeVar("F", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -198,19 +199,18 @@ class SimEnsemble:
         play: Play,
         values: Values,
         key: int,
-        of: Callable[[Rehearsal], NDArray[np.floating]],
+        of: Callable[[Rehearsal], NDArray[F]],
         *,
         keep: Sequence[str] = KEPT,
         same_noise: bool = False,
-    ) -> NDArray[np.float64]:
+    ) -> NDArray[F]:
         """(m, ...) what `of` makes of the trials, some robots at a time: memory stays flat.
 
         Args:
             play: The trials.
             of: Called from several threads with some of the robots; must answer a row for each of them.
         """
-        parts = self._parts(play, values, key, keep, same_noise, of)
-        return np.concatenate([np.asarray(part, np.float64) for part in parts])
+        return np.concatenate(self._parts(play, values, key, keep, same_noise, of))
 
     def _parts(
         self,

@@ -1,0 +1,174 @@
+"""The posterior of a robot's parameters from whole trials, by simulation alone.
+
+Rounds of approximate Bayesian computation: parameters are drawn from the prior within a box, trials carried out with
+them, vectors of what is seen pressed into summaries (`_score.py`), and parameters regressed on these. The box then
+shrinks to where the posterior is.
+
+Sources: semi-automatic summaries, Fearnhead & Prangle, JRSS B 74 (2012); regression adjustment, Beaumont, Zhang & Balding,
+Genetics 162 (2002); rounds whose proposals are the prior cut to where the posterior can be, so that no weights are needed:
+truncated sequential estimation, Deistler, Goncalves & Macke, NeurIPS 2022.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from realitygap.world import RobotModel
+
+from ._evidence import Evidence, Vectors
+from ._prior import Floats, Parameter, numbers_of, values_of
+from ._score import Compression, learn_compression
+
+Effort = Literal["small", "full"]
+Simulate = Callable[[Evidence, Mapping[str, Floats], int], Vectors]
+"""(m, d) vectors of trials carried out with m sets of numbers, and a key of random numbers."""
+
+N_LEARN = {"small": 800, "full": 1500}
+N_REGRESS = {"small": 800, "full": 1500}
+N_LAST = {"small": 2000, "full": 5000}
+ROUNDS = {"small": 4, "full": 7}
+N_DRAWS = 500
+END = 4.0  # standard deviations of the prior beyond which nothing is
+MARGIN = 0.3  # share of its width by which the box is larger than the posterior, to each side
+CUT = 0.005  # quantile of the posterior that the box leaves out to each side, before the margin
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What trials leave of the prior.
+
+    Attributes:
+        places: (n, p) draws on the scale on which the prior is standard normal.
+        values: (n,) draws of each parameter.
+        summaries: (p,) of what was observed, less what was expected, in standard deviations of the simulations nearby.
+        n_simulated: Sets of numbers tried.
+    """
+
+    places: Floats
+    values: dict[str, Floats]
+    off: Floats
+    n_simulated: int
+
+
+def fit_all(
+    evidence: Sequence[Evidence],
+    simulate: Simulate,
+    prior: Sequence[Parameter],
+    robot: RobotModel,
+    *,
+    seed: int,
+    effort: Effort = "full",
+    tell: Callable[[str], None] | None = None,
+) -> Posterior:
+    """The posterior of all parameters together.
+
+    Args:
+        evidence: What was observed, and what to carry out anew.
+        simulate: Carries it out.
+        prior: Of the parameters.
+        robot: Whose numbers they stand for.
+        seed: Of all random numbers.
+        effort: How many simulations.
+        tell: Called with a line after each round.
+    """
+    rng = np.random.default_rng(seed)
+    p = len(prior)
+    low, high = np.full(p, -END), np.full(p, END)
+    seen = [one.seen[None] for one in evidence]
+    n_simulated = 0
+    draws = np.zeros((0, p))
+    off = np.zeros(p)
+
+    def make(n: int) -> tuple[Floats, list[Vectors]]:
+        nonlocal n_simulated
+        n_simulated += n
+        places = _draw(rng, low, high, n)
+        numbers = numbers_of(prior, values_of(prior, places), robot)
+        key = int(rng.integers(2**62))
+        return places, [simulate(one, numbers, key + k) for k, one in enumerate(evidence)]
+
+    for turn in range(ROUNDS[effort]):
+        is_last = turn == ROUNDS[effort] - 1
+        places, vectors = make(N_LEARN[effort])
+        learned = [
+            learn_compression(places, some, one.finest) for some, one in zip(vectors, evidence, strict=True)
+        ]
+        del vectors
+        places, vectors = make(N_LAST[effort] if is_last else N_REGRESS[effort])
+        summaries = np.concatenate([press(v) for press, v in zip(learned, vectors, strict=True)], axis=1)
+        del vectors
+        observed = np.concatenate([press(v) for press, v in zip(learned, seen, strict=True)], axis=1)[0]
+        draws, off = _adjusted(rng, places, summaries, observed, low, high)
+        if tell is not None:
+            tell(f"round {turn + 1} of {ROUNDS[effort]}: {np.mean(high - low) / (2 * END):.0%} of the prior's width")
+        if not is_last:
+            low, high = _next_box(draws)
+    keep = draws[rng.permutation(len(draws))[:N_DRAWS]]
+    return Posterior(keep, values_of(prior, keep), off, n_simulated)
+
+
+def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats:
+    """(n, p) from the prior within a box; evenly spread along each parameter (Latin hypercube)."""
+    ranks = np.argsort(rng.uniform(size=(len(low), n)), axis=1).T
+    u = (ranks + rng.uniform(size=ranks.shape)) / n
+    return np.asarray(ndtri(np.clip(ndtr(low) + u * (ndtr(high) - ndtr(low)), ndtr(-END), ndtr(END))))
+
+
+def _adjusted(
+    rng: np.random.Generator, places: Floats, summaries: Floats, observed: Floats, low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
+    """Draws from the posterior: parameters moved by their regression on the summaries to what was observed.
+
+    First all simulations say which combination of summaries tells of each parameter; then those nearest in these
+    combinations say how parameters scatter around.
+    """
+    n, p = places.shape
+    scale = summaries.std(axis=0) + 1e-12
+    here = np.clip((observed - summaries.mean(axis=0)) / scale, -6, 6)
+    there = (summaries - summaries.mean(axis=0)) / scale
+    told, told_here = _predict(there, places, here)
+    left = places - told
+    spread = left.std(axis=0) + 1e-9
+    far = ((told - told_here) / spread) ** 2
+    # A parameter that is not told weighs nothing: all simulations are as near.
+    distance = far.sum(axis=1)
+    n_near = int(max(n // 3, min(n, 12 * p)))
+    reach = np.partition(distance, n_near - 1)[n_near - 1]
+    weight = np.maximum(1.0 - distance / (reach * 1.0001 + 1e-12), 0.0)
+    near = weight > 0
+    moved, _ = _local(told[near], places[near], weight[near], told_here)
+    which = rng.choice(near.sum(), 4 * N_DRAWS, p=weight[near] / weight.sum())
+    return np.clip(moved[which], -END, END), (told_here - told[near].mean(axis=0)) / (told[near].std(axis=0) + 1e-9)
+
+
+def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
+    """Ridge regression of places on summaries; what it says of the simulations, and of the observed."""
+    n, q = summaries.shape
+    mean = places.mean(axis=0)
+    gram = summaries.T @ summaries + 1e-3 * n * np.eye(q)
+    slopes = np.linalg.solve(gram, summaries.T @ (places - mean))
+    return mean + summaries @ slopes, mean + here @ slopes
+
+
+def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> tuple[Floats, Floats]:
+    """Places moved to `here` along a weighted linear regression on what was told."""
+    design = np.column_stack([np.ones(len(told)), told - here])
+    weighed = design * weight[:, None]
+    gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *told.var(axis=0) + 1e-12])
+    slopes = np.linalg.solve(gram, weighed.T @ places)
+    return slopes[0] + (places - design @ slopes), slopes
+
+
+def _next_box(draws: Floats) -> tuple[Floats, Floats]:
+    low, high = np.quantile(draws, [CUT, 1 - CUT], axis=0)
+    margin = MARGIN * (high - low) + 0.02
+    return np.maximum(low - margin, -END), np.minimum(high + margin, END)
+
+
+__all__ = ["Compression", "Effort", "Posterior", "Simulate", "fit_all"]

@@ -1,0 +1,234 @@
+"""What trials tell of a robot, as long vectors: of the observed ones, and of the same trials carried out in `sim`.
+
+Each vector is a fixed function of what is seen, so a simulator that is right makes vectors of the same distribution:
+
+* Commands given one by one are given again, and all that is seen counts.
+* With poses, a robot is put back to where it was seen before each command, and each command is predicted by itself
+  (multiple shooting): what it answers does not depend on what it was about to do then, so controllers' trials serve too.
+* With encoders, the wheels of any trial are predicted from its commands: in `sim` nothing else moves them.
+* Without poses, controllers drive anew, as what they do next depends on what they saw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.evolution import Genome
+from realitygap.records import Observe, ObservedTrial
+from realitygap.trials import Play, Rehearsal
+
+Vectors = NDArray[np.float32]
+
+BLOCK = 5  # steps over which what controllers do is averaged: beyond, chance has moved what they meet
+LEAST_STEPS = 5  # of a trial that tells anything
+
+# The least that can be told apart of each kind, as standard deviation: below it a simulator without noise would be
+# refuted by rounding.
+FINEST = {"ahead": 2e-4, "aside": 2e-4, "turn": 1e-3, "reading": 0.02, "stall": 0.02, "wheels": 1e-4, "cell": 0.05,
+          "command": 0.02, "coverage": 0.01}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Trials to be carried out anew, and what counts of them.
+
+    Attributes:
+        play: The trials.
+        keep: What must be kept of their steps.
+        of: (m, d) vectors of m robots' trials.
+        seen: (d,) of the observed trials.
+        kinds: (d,) what each entry is, a key of `FINEST`.
+        trial: (d,) from which of the observed trials it is.
+        step: (d,) at which step; -1 for what is of the whole trial.
+    """
+
+    play: Play
+    keep: tuple[str, ...]
+    of: Callable[[Rehearsal], Vectors]
+    seen: Vectors
+    kinds: NDArray[np.str_]
+    trial: NDArray[np.int64]
+    step: NDArray[np.int64]
+
+    @property
+    def finest(self) -> Vectors:
+        """(d,) the least that can be told apart."""
+        return np.array([FINEST[kind] for kind in self.kinds], np.float32)
+
+
+@dataclass
+class _Columns:
+    """Entries of vectors, a group after the other."""
+
+    parts: list[Vectors] = field(default_factory=list)
+    kinds: list[NDArray[np.str_]] = field(default_factory=list)
+    trial: list[NDArray[np.int64]] = field(default_factory=list)
+    step: list[NDArray[np.int64]] = field(default_factory=list)
+
+    def add(self, kind: str, values: NDArray[np.floating] | NDArray[np.bool_], per_step: int = 1) -> None:
+        """Values (m, k, t, ...), or (m, k, c) of the whole trial where `per_step` is 0."""
+        m, k = values.shape[:2]
+        flat = values.reshape(m, -1).astype(np.float32)
+        each = flat.shape[1] // k
+        self.parts.append(flat)
+        self.kinds.append(np.full(flat.shape[1], kind))
+        self.trial.append(np.repeat(np.arange(k), each))
+        steps = np.full(values.shape[1:], -1)
+        if per_step:
+            steps[:] = (np.arange(values.shape[2]) * per_step).reshape(1, -1, *[1] * (values.ndim - 3))
+        self.step.append(steps.reshape(-1))
+
+    @property
+    def vectors(self) -> Vectors:
+        return np.concatenate(self.parts, axis=1)
+
+
+def evidence_of(
+    trials: Sequence[ObservedTrial], genomes: Sequence[Genome | None], n_cells: int
+) -> list[Evidence]:
+    """What trials tell, by groups of as many steps.
+
+    Args:
+        trials: As observed.
+        genomes: The controller of each; None where commands were given.
+        n_cells: Of the arena's grid.
+    """
+    numbered = [
+        (k, trial, genome)
+        for k, (trial, genome) in enumerate(zip(trials, genomes, strict=True))
+        if len(trial.commands) >= LEAST_STEPS
+    ]
+
+    def alike(one: tuple[int, ObservedTrial, Genome | None]) -> tuple[int, str, bool]:
+        return len(one[1].commands), one[1].observe, one[2] is not None and one[1].observe != "track"
+
+    found: list[Evidence] = []
+    for (_, observe, is_driven), group in groupby(sorted(numbered, key=alike), key=alike):
+        found += _of_group(list(group), observe, is_driven, n_cells)  # type: ignore[arg-type]
+    return found
+
+
+def _of_group(
+    group: list[tuple[int, ObservedTrial, Genome | None]], observe: Observe, is_driven: bool, n_cells: int
+) -> list[Evidence]:
+    number = np.array([k for k, _, _ in group])
+    seen = _as_rehearsal([trial for _, trial, _ in group], n_cells)
+    starts = np.array([t.poses[0] if len(t.poses) else t.start for _, t, _ in group])
+    commands = np.array([trial.commands for _, trial, _ in group])
+    steps = commands.shape[1]
+    given = Play(starts, steps, commands)
+    if observe == "track":
+        anchors = np.array([trial.poses for _, trial, _ in group])
+        put_back = Play(starts, steps, commands, anchors=anchors)
+        keep = ("poses", "readings", "stalled", "wheels")[: 4 if seen.wheels.shape[2] else 3]
+        made = [_evidence(put_back, keep, partial(_shooting, anchors), seen, number)]
+    elif is_driven:
+        driven = Play(starts, steps, genomes=tuple(genome for _, _, genome in group if genome is not None))
+        made = [_evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)]
+    else:
+        made = [_evidence(given, ("readings", "stalled"), partial(_step_by_step, steps), seen, number)]
+    if observe == "encoders":
+        made.append(_evidence(given, ("wheels",), _wheels, seen, number))
+    return made
+
+
+def _evidence(
+    play: Play,
+    keep: tuple[str, ...],
+    columns_of: Callable[[Rehearsal], _Columns],
+    seen: Rehearsal,
+    number: NDArray[np.int64],
+) -> Evidence:
+    columns = columns_of(seen)
+    return Evidence(
+        play,
+        keep,
+        lambda rehearsal: columns_of(rehearsal).vectors,
+        columns.vectors[0],
+        np.concatenate(columns.kinds),
+        number[np.concatenate(columns.trial)],
+        np.concatenate(columns.step),
+    )
+
+
+def _as_rehearsal(trials: Sequence[ObservedTrial], n_cells: int) -> Rehearsal:
+    """What was observed, as if one robot had rehearsed it; what was not seen has no steps."""
+    cells = np.zeros((1, len(trials), n_cells), np.bool_)
+    for k, trial in enumerate(trials):
+        cells[0, k, list(trial.cells)] = True
+
+    def stacked(name: str, dtype: type) -> NDArray[np.generic]:
+        return np.array([[getattr(trial, name) for trial in trials]], dtype)
+
+    return Rehearsal(
+        stacked("poses", np.float64),  # type: ignore[arg-type]
+        stacked("readings", np.float32),  # type: ignore[arg-type]
+        stacked("stalled", np.bool_),  # type: ignore[arg-type]
+        stacked("wheels", np.float64) if all(len(t.wheels) for t in trials) else np.empty((1, len(trials), 0, 2)),  # type: ignore[arg-type]
+        stacked("commands", np.float32),  # type: ignore[arg-type]
+        cells,
+    )  # fmt: skip
+
+
+def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
+    """What each command did to a robot that was put back before it, in its own frame, and what it sensed there."""
+    before = anchors[:, :-1].astype(np.float32)
+    moved = rehearsal.poses[:, :, 1:] - before
+    sine, cosine = np.sin(before[..., 2]), np.cos(before[..., 2])
+    columns = _Columns()
+    columns.add("ahead", moved[..., 0] * cosine + moved[..., 1] * sine)
+    columns.add("aside", moved[..., 1] * cosine - moved[..., 0] * sine)
+    columns.add("turn", (moved[..., 2] + np.pi) % (2 * np.pi) - np.pi)
+    t = before.shape[1]
+    columns.add("reading", rehearsal.readings[:, :, :t])
+    columns.add("stall", rehearsal.stalled[:, :, :t])
+    if rehearsal.wheels.shape[2]:
+        columns.add("wheels", np.diff(rehearsal.wheels, axis=2))
+    return columns
+
+
+def _step_by_step(t: int, rehearsal: Rehearsal) -> _Columns:
+    """All that is seen of trials with t given commands, from afar."""
+    columns = _Columns()
+    columns.add("reading", rehearsal.readings[:, :, :t])
+    columns.add("stall", rehearsal.stalled[:, :, :t])
+    columns.add("cell", rehearsal.cells, 0)
+    columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
+    return columns
+
+
+def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
+    """What controllers saw and did in t steps, in blocks of time, and how it hangs together."""
+    readings = rehearsal.readings[:, :, :t]
+    stalled = rehearsal.stalled[:, :, :t, None].astype(np.float32)
+    commands = rehearsal.commands
+    columns = _Columns()
+    columns.add("reading", _blocks(readings), BLOCK)
+    columns.add("stall", _blocks(stalled), BLOCK)
+    columns.add("command", _blocks(commands), BLOCK)
+    columns.add("cell", rehearsal.cells, 0)
+    columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
+    most = readings.max(axis=-1, keepdims=True)
+    seen = np.concatenate([most, most == 0, most - readings.min(axis=-1, keepdims=True), stalled, commands], axis=-1)
+    for lag in (0, 1, 2, 4):
+        a, b = seen[:, :, : t - lag], seen[:, :, lag:]
+        columns.add("reading", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
+    return columns
+
+
+def _blocks(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    m, k, t = values.shape[:3]
+    whole = t - t % BLOCK
+    return values[:, :, :whole].reshape(m, k, whole // BLOCK, BLOCK, *values.shape[3:]).mean(axis=3)
+
+
+def _wheels(rehearsal: Rehearsal) -> _Columns:
+    columns = _Columns()
+    columns.add("wheels", np.diff(rehearsal.wheels, axis=2))
+    return columns

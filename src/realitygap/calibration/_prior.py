@@ -1,0 +1,202 @@
+"""What is thought possible of a robot before it is observed: parameters, each of which may stand for several numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from realitygap.world import Distribution, RobotModel
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a parameter of value v does to a number of the robot: makes it v, or changes what it is.
+
+    Attributes:
+        number: By dotted name.
+        how: `is`: v * factor; `times`: the number is multiplied by v; `plus`: v * factor is added.
+        factor: See there.
+    """
+
+    number: str
+    how: Literal["is", "times", "plus"] = "is"
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a robot with its prior.
+
+    Attributes:
+        name: Such as drive.gain.
+        prior: What is thought possible; a distribution without an atom.
+        unit: Such as m.
+        expand: What it does to the robot's numbers.
+        advice: What to record where observations do not identify it.
+    """
+
+    name: str
+    prior: Distribution
+    unit: str = ""
+    expand: tuple[Effect, ...] = ()
+    advice: str = ""
+
+    @property
+    def width(self) -> float:
+        """Of the prior, on its own scale: of the logarithm where ratios are as likely."""
+        return float(self.scale(self.prior.highest) - self.scale(self.prior.lowest))
+
+    def scale(self, values: NDArray[np.floating] | float) -> Floats:
+        """Values on the scale on which the prior is even."""
+        log = self.prior.log_uniform is not None
+        return np.log(values) if log else np.asarray(values, np.float64)
+
+
+def standard_of(prior: Sequence[Parameter], values: Mapping[str, Floats]) -> Floats:
+    """(m, p) values on the scale on which each prior is a standard normal distribution; within 4 of 0."""
+    places = [
+        (p.scale(np.asarray(values[p.name], np.float64)) - p.scale(p.prior.lowest)) / p.width for p in prior
+    ]
+    least = ndtr(-4.0)
+    return np.asarray(ndtri(np.clip(np.stack(places, axis=1), least, 1 - least)))
+
+
+def values_of(prior: Sequence[Parameter], standard: Floats) -> dict[str, Floats]:
+    """(m,) values of each parameter from points (m, p) on that scale."""
+    return {
+        p.name: p.prior.of(np.minimum(ndtr(z), 1 - 1e-12)) for p, z in zip(prior, standard.T, strict=True)
+    }
+
+
+def numbers_of(
+    prior: Sequence[Parameter], values: Mapping[str, Floats], robot: RobotModel
+) -> dict[str, Floats]:
+    """(m,) each number of the robot that the parameters decide, by dotted name."""
+    plain = {
+        name: value.center if isinstance(value, Distribution) else value
+        for name, value in robot.numbers().items()
+    }
+    numbers: dict[str, Floats] = {}
+    for how in ("is", "times", "plus"):
+        for parameter in prior:
+            value = np.asarray(values[parameter.name], np.float64)
+            for effect in parameter.expand:
+                if effect.how == how:
+                    before = numbers.get(effect.number, np.full(len(value), plain[effect.number]))
+                    numbers[effect.number] = {
+                        "is": value * effect.factor,
+                        "times": before * value,
+                        "plus": before + value * effect.factor,
+                    }[how]
+    return numbers
+
+
+def ranges_of(
+    prior: Sequence[Parameter], robot: RobotModel, n: int = 4096
+) -> dict[str, tuple[float, float]]:
+    """Least and most of the robot's numbers over the prior."""
+    corners = np.random.default_rng(0).choice([-8.0, 8.0], (n, len(prior)))
+    numbers = numbers_of(prior, values_of(prior, corners), robot)
+    return {name: (float(value.min()), float(value.max())) for name, value in numbers.items()}
+
+
+def _even(low: float, high: float) -> Distribution:
+    return Distribution(uniform=(low, high))
+
+
+def _ratio(low: float, high: float) -> Distribution:
+    return Distribution(log_uniform=(low, high))
+
+
+DRIVE: tuple[tuple[str, Distribution, str, str], ...] = (
+    ("lag", _even(0.0, 0.4), "s", "sudden starts and stops, with --observe encoders or track"),
+    ("delay", _even(0.0, 0.6), "s", "sudden starts and stops, with --observe encoders or track"),
+    ("delay_jitter", _even(0.0, 0.25), "s", "many sudden turns, with --observe track"),
+    ("dead_band", _even(0.0, 0.3), "", "slow straight lines of growing speed"),
+    ("slip", _even(0.0, 0.25), "", "straight lines, with --observe track and encoders: without these it is drive.gain"),
+    ("drift_per_m", _even(-0.6, 0.6), "rad/m", "straight lines ahead and back, with --observe track"),
+    ("heading_noise_per_m", _ratio(0.004, 0.6), "rad", "straight lines, with --observe track"),
+    ("heading_noise_per_s", _ratio(0.001, 0.2), "rad", "turns in place, with --observe track"),
+    ("travel_noise_per_m", _ratio(0.001, 0.1), "m", "straight lines, with --observe track"),
+    ("battery_sag", _even(0.0, 0.006), "1/s", "long trials of straight lines and turns"),
+)  # fmt: skip
+"""Numbers of the drive that are parameters themselves; ranges chosen for small robots with cheap motors."""
+
+RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
+    ("amplitude", _ratio(0.4, 3.0), "", "readings very near a wall"),
+    ("decay", _ratio(0.05, 0.5), "m", "readings at several distances"),
+    ("drop_most", _even(0.0, 1.0), "", "readings far from a wall, where light still comes back"),
+    ("drop_at", _even(0.0, 0.45), "m", "readings at several distances"),
+    ("drop_width", _ratio(0.005, 0.1), "m", "readings at several distances"),
+)
+"""Of range sensors, the same for all."""
+
+
+def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
+    """What is thought possible of a Scribbler, or of another robot that is driven by two wheels.
+
+    Ranges are wide, and chosen: ratios as likely for sizes, even for what may be nothing at all. A parameter of which
+    the robot has no number is left out.
+
+    Args:
+        robot: The robot as its file has it.
+    """
+    numbers = robot.numbers()
+    plain = {name: v.center if isinstance(v, Distribution) else v for name, v in numbers.items()}
+    track, ang = plain["drive.track"], plain["contact.ang"]
+    both = ("drive.gain_left", "drive.gain_right")
+    prior = [
+        Parameter("drive.gain", _ratio(0.5, 1.5), "", tuple(Effect(name) for name in both), "straight lines and turns"),
+        Parameter(
+            "drive.asymmetry", _even(-0.3, 0.3), "", (Effect(both[0], "plus", 0.5), Effect(both[1], "plus", -0.5)),
+            "straight lines ahead and back",
+        ),
+        Parameter("drive.track", _ratio(0.75 * track, 1.35 * track), "m", (Effect("drive.track"),), "turns in place"),
+        Parameter("drive.axle", _even(-0.03, 0.03), "m", (Effect("drive.axle"),), "turns in place, with --observe track"),
+        *_plain("drive", DRIVE, numbers),
+        Parameter("contact.friction", _even(0.0, 1.0), "", (Effect("contact.friction"),), "walls met at slant angles"),
+        Parameter("contact.lat", _ratio(0.05, 5.0), "", (Effect("contact.lat"),), "walls scraped along"),
+        Parameter("contact.ang", _ratio(ang / 8, ang * 8), "1/m2", (Effect("contact.ang"),), "walls met head on"),
+        Parameter("body.length", _even(0.8, 1.2), "", _corners(plain, "x"), "walls met head on"),
+        Parameter("body.width", _even(0.8, 1.2), "", _corners(plain, "y"), "walls scraped along"),
+    ]  # fmt: skip
+    return tuple(prior) + _of_ranges(robot)
+
+
+def _plain(
+    group: str, rows: Sequence[tuple[str, Distribution, str, str]], numbers: Mapping[str, object]
+) -> list[Parameter]:
+    return [
+        Parameter(f"{group}.{name}", prior, unit, (Effect(f"{group}.{name}"),), advice)
+        for name, prior, unit, advice in rows
+        if f"{group}.{name}" in numbers
+    ]
+
+
+def _corners(numbers: Mapping[str, float], axis: str) -> tuple[Effect, ...]:
+    return tuple(
+        Effect(name, "times") for name in numbers if name.startswith("body.") and name.endswith(f".{axis}")
+    )
+
+
+def _of_ranges(robot: RobotModel) -> tuple[Parameter, ...]:
+    """Those of range sensors whose light falls off with the distance."""
+    seen = [k for k, sensor in enumerate(robot.range) if sensor.response in ("ir", "pulses")]
+    rows = list(RANGE) if seen else []
+    counted = [k for k in seen if robot.range[k].response == "pulses"]
+    if counted:
+        rows.append(("burst", _even(0.0, 1.0), "", "many readings in one place"))
+    if len(counted) < len(seen):
+        rows.append(("noise_gain", _ratio(0.002, 0.5), "", "many readings in one place"))
+        rows.append(("outlier_most", _even(0.0, 1.0), "", "readings far from a wall"))
+    return tuple(
+        Parameter(f"range.{name}", prior, unit, tuple(Effect(f"range.{k}.{name}") for k in seen), advice)
+        for name, prior, unit, advice in rows
+    )

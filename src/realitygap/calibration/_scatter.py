@@ -1,0 +1,88 @@
+"""How observed motions scatter around simulated ones: the noise of `sim`, and that of whoever observes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._handles import MOTION_NOISE, Handle
+from ._simulate import Bools, Floats
+
+JITTER, TRAVEL_PER_M, HEADING_PER_M, HEADING_PER_S, ACROSS_PER_M, PLACE, ANGLE, WHEEL_PER_M, WHEEL = range(9)
+"""What scatters: first the simulator's own numbers, as `MOTION_NOISE`, then what is not asked for."""
+
+OBSERVER = (
+    Handle("skid.per_m", 0.0, 0.1, "m"),
+    Handle("camera.place", 0.0, 0.02, "m"),
+    Handle("camera.angle", 0.0, 0.1, "rad"),
+    Handle("encoder.noise_per_m", 0.0, 0.05, "m"),
+    Handle("encoder.count", 0.0, 0.01, "m"),
+)
+"""Skids sideways, errors of a camera in a place and a heading, errors of encoders that grow with the way or do not."""
+
+LEAST = np.array([1e-4, 1e-4, 1e-4, 1e-4, 1e-4]) ** 2
+"""Variance of each channel in any case [m2, rad2]: single precision, and what no camera tells."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """The likelihood of what differs between observed and simulated windows.
+
+    Variances grow with the way and the time as in `sim`. A late command moves all channels of a window together: a
+    rank of its own in their covariance.
+
+    Attributes:
+        way: (w,) driven by the wheels, the mean of both [m].
+        wheel_way: (w, 2) of each [m].
+        moving_s: (w,) time in which a wheel turns [s].
+        late: (w, 5) what one second of delay changes.
+        seen: (w, 5) whether a channel was observed.
+    """
+
+    way: Floats
+    wheel_way: Floats
+    moving_s: Floats
+    late: Floats
+    seen: Bools
+
+    def variances(self, noise: Floats) -> Floats:
+        """(w, 5) of the channels, without what lateness does."""
+        square = noise * noise
+        own = np.empty(self.late.shape)
+        own[:, 0] = square[TRAVEL_PER_M] * self.way + 2 * square[PLACE]
+        own[:, 1] = square[ACROSS_PER_M] * self.way + 2 * square[PLACE]
+        own[:, 2] = (
+            square[HEADING_PER_M] * self.way + square[HEADING_PER_S] * self.moving_s + 2 * square[ANGLE]
+        )
+        own[:, 3:] = square[WHEEL_PER_M] * self.wheel_way + 2 * square[WHEEL]
+        return np.asarray(own + LEAST)
+
+    def log_likelihood(self, off: Floats, noise: Floats) -> float:
+        """Of differences (w, 5), where those not observed are 0."""
+        own = self.variances(noise)
+        precise = self.seen / own
+        jitter = noise[JITTER] ** 2 / 3.0  # the variance of jitter * U(-1, 1)
+        weighed = precise * self.late
+        spread = 1.0 + jitter * np.einsum("wc,wc->w", weighed, self.late)
+        along = np.einsum("wc,wc->w", weighed, off)
+        logs = np.log(own).sum(where=self.seen) + np.log(spread).sum()
+        return -0.5 * float(logs + (precise * off * off).sum() - jitter * (along * along / spread).sum())
+
+    def whitened(self, rows: Floats, noise: Floats) -> Floats:
+        """Differences (w, 5) or their derivatives (w, 5, p), made of variance 1 and independent."""
+        deep = rows.reshape(*rows.shape[:2], -1)
+        root = np.sqrt(self.seen / self.variances(noise))
+        direction = root * self.late
+        size = np.einsum("wc,wc->w", direction, direction)
+        share = 1.0 - 1.0 / np.sqrt(1.0 + noise[JITTER] ** 2 / 3.0 * size)
+        scaled = root[:, :, None] * deep
+        along = np.einsum("wc,wcp->wp", direction, scaled)
+        taken = (share / np.maximum(size, 1e-300))[:, None, None] * direction[:, :, None] * along[:, None, :]
+        return np.asarray((scaled - taken).reshape(rows.shape))
+
+
+def scatter_handles(handles: dict[str, Handle], limits: Sequence[Handle] = OBSERVER) -> list[Handle]:
+    """What scatters, in the order of its numbers."""
+    return [*(handles[name] for name in MOTION_NOISE), *limits]

@@ -1,0 +1,217 @@
+"""Families of twins: which numbers are drawn, and between what limits."""
+
+from __future__ import annotations
+
+import itertools
+import zlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from realitygap.errors import did_you_mean, whole_number
+
+from ._model import TwinModel
+from ._random import FAMILY, numbers_for
+
+Value = bool | int | float | str
+
+
+class Range(NamedTuple):
+    """A number that is drawn evenly from `low` to `high`."""
+
+    low: float
+    high: float
+
+
+class Family(NamedTuple):
+    """A kind of twin.
+
+    Attributes:
+        meaning: What is wrong with it.
+        numbers: What is drawn, or set, besides what every twin draws; by dotted name.
+        oddities: Of an alien: groups of numbers, of which `n_oddities` are taken.
+        n_oddities: How many.
+    """
+
+    meaning: str
+    numbers: dict[str, Range | Value]
+    oddities: Mapping[str, dict[str, Range | Value]] = MappingProxyType({})
+    n_oddities: int = 0
+
+
+EVERY: dict[str, Range | Value] = {
+    "body.length_scale": Range(0.98, 1.02),
+    "body.width_scale": Range(0.98, 1.02),
+    "body.corner_radius": Range(0.008, 0.012),
+    "body.mass": Range(0.8, 1.0),
+    "body.center": Range(0.008, 0.016),
+    "wheels.track": Range(0.150, 0.156),
+    "wheels.friction": Range(0.5, 0.7),
+    "walls.friction": Range(0.2, 0.4),
+    "motors.speed": Range(0.145, 0.155),
+    "motors.gain_left": Range(0.98, 1.02),
+    "motors.gain_right": Range(0.98, 1.02),
+    "motors.lag": Range(0.02, 0.06),
+    "motors.delay": Range(0.02, 0.06),
+    "motors.delay_jitter": Range(0.0, 0.02),
+    "motors.drift_per_m": Range(-0.05, 0.05),
+    "motors.wander": Range(0.005, 0.02),
+    "motors.wander_s": Range(0.5, 2.0),
+    "battery.volts": Range(8.4, 9.0),
+    "ir.cone": Range(0.14, 0.21),
+    "ir.half": Range(0.11, 0.13),
+    "ir.steepness": Range(1.7, 2.3),
+    "ir.incidence": Range(0.5, 1.5),
+    "ir.spread": Range(0.05, 0.15),
+    "ir.noise": Range(0.05, 0.15),
+    "ir.missed": Range(0.0, 0.03),
+}
+"""What is drawn for twins of every family but `same`; a family's own limits come before these."""
+
+_ODDITIES: dict[str, dict[str, Range | Value]] = {
+    "tilted floor, weak motors": {
+        "oddities.slope": Range(0.10, 0.16),
+        "oddities.uphill": Range(-3.14, 3.14),
+        "motors.stiffness": Range(0.006, 0.012),
+    },
+    "gains that change in a trial": {
+        "oddities.turn_at": Range(8.0, 20.0),
+        "oddities.turned_left": Range(0.3, 0.6),
+        "oddities.turned_right": Range(0.9, 1.1),
+    },
+    "speed that goes with the heading": {
+        "oddities.compass": Range(0.5, 0.8),
+        "oddities.compass_heading": Range(-3.14, 3.14),
+    },
+    "readings that latch": {"oddities.latch": Range(8, 20)},
+    "inverted readings": {"oddities.inverted": True},
+    "swapped wheels": {"oddities.swapped": True},
+    "sticky patch of floor": {
+        "oddities.patch.x": Range(0.35, 0.7),
+        "oddities.patch.y": Range(0.2, 0.4),
+        "oddities.patch.radius": Range(0.15, 0.25),
+        "oddities.patch.slows": Range(0.6, 0.9),
+    },
+}
+
+FAMILIES: dict[str, Family] = {
+    "close": Family("a robot as it should be, and a little unlike its file", {}),
+    "worn": Family(
+        "tired motors that differ, a dead band, old cells",
+        {
+            "motors.gain_left": Range(0.78, 1.0),
+            "motors.gain_right": Range(0.78, 1.0),
+            "motors.dead_band_left": Range(0.0, 0.2),
+            "motors.dead_band_right": Range(0.0, 0.2),
+            "motors.lag": Range(0.05, 0.15),
+            "motors.torque": Range(0.1, 0.25),
+            "motors.drift_per_m": Range(-0.3, 0.3),
+            "motors.wander": Range(0.02, 0.05),
+            "battery.volts": Range(7.0, 8.2),
+            "battery.fall_per_s": Range(0.002, 0.01),
+            "battery.slows": Range(0.5, 1.0),
+        },
+    ),
+    "slippery": Family(
+        "wheels that slip, a caster that drags, walls of another friction",
+        {
+            "wheels.friction": Range(0.12, 0.3),
+            "wheels.caster_friction": Range(0.05, 0.15),
+            "walls.friction": Range(0.02, 0.6),
+            "body.mass": Range(0.8, 1.3),
+        },
+    ),
+    "delayed": Family(
+        "commands that come late, and unevenly so",
+        {
+            "motors.delay": Range(0.12, 0.4),
+            "motors.delay_jitter": Range(0.03, 0.12),
+            "motors.lag": Range(0.08, 0.3),
+        },
+    ),
+    "noisy-ir": Family(
+        "infrared of another reach, whose counts scatter, are missed and remember",
+        {
+            "ir.half": Range(0.08, 0.18),
+            "ir.steepness": Range(1.0, 3.0),
+            "ir.incidence": Range(0.5, 3.0),
+            "ir.cone": Range(0.1, 0.35),
+            "ir.spread": Range(0.2, 0.6),
+            "ir.noise": Range(0.2, 0.6),
+            "ir.memory": Range(0.2, 0.8),
+            "ir.missed": Range(0.05, 0.25),
+        },
+    ),
+    "odd-body": Family(
+        "a shell of another size, wheels elsewhere, another weight",
+        {
+            "body.length_scale": Range(0.85, 1.15),
+            "body.width_scale": Range(0.85, 1.15),
+            "body.corner_radius": Range(0.004, 0.022),
+            "body.mass": Range(0.7, 1.4),
+            "body.inertia": Range(0.002, 0.006),
+            "body.center": Range(0.015, 0.03),
+            "wheels.track": Range(0.135, 0.17),
+            "wheels.axle": Range(-0.02, 0.012),
+            "walls.friction": Range(0.1, 0.6),
+        },
+    ),
+    "boxed": Family(
+        "a box of cardboard around the shell, as the paper proposes",
+        {
+            "body.cardboard.0": Range(0.180, 0.200),
+            "body.cardboard.1": Range(0.160, 0.175),
+            "walls.friction": Range(0.3, 0.6),
+        },
+    ),
+    "same": Family("`sim` itself behind the same wall: no gap at all", {"engine": "sim"}),
+    "alien": Family("two things that no numbers of `sim` can express", {}, _ODDITIES, 2),
+}
+"""By name; the numbers of each are drawn by `sample_twin`."""
+
+
+def sample_twin(family: str, seed: int) -> TwinModel:
+    """A twin drawn from a family: the same for the same seed, everywhere.
+
+    Args:
+        family: One of `FAMILIES`.
+        seed: 0 or more; also that of the twin's noise.
+
+    Raises:
+        ValueError: There is no such family, or the seed is negative.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"Unknown family {family!r}. {did_you_mean(family, FAMILIES)}")
+    seed = whole_number("seed", seed, 0, 2**63 - 1)
+    kind = FAMILIES[family]
+    random = numbers_for(seed, zlib.crc32(family.encode()), FAMILY)
+    wanted = dict(kind.numbers) if "engine" in kind.numbers else {**EVERY, **kind.numbers}
+    if kind.n_oddities:
+        order = random.permutation(len(kind.oddities))[: kind.n_oddities]
+        names = list(kind.oddities)
+        for k in sorted(order):
+            wanted |= kind.oddities[names[k]]
+    values: dict[str, Any] = {"name": f"{family}-{seed}", "family": family, "seed": seed}
+    for name, how in wanted.items():
+        _put(values, name.split("."), _drawn(how, random))
+    return TwinModel(**values)
+
+
+def _drawn(how: Range | Value, random: np.random.Generator) -> Value:
+    if not isinstance(how, Range):
+        return how
+    if isinstance(how.low, int) and isinstance(how.high, int):
+        return int(random.integers(how.low, how.high + 1))
+    return float(f"{random.uniform(how.low, how.high):.4g}")
+
+
+def _put(values: dict[str, Any], path: list[str], value: Value) -> None:
+    """Put a value where its dotted name says, making tables, and lists for numbered entries."""
+    for key, following in itertools.pairwise(path):
+        values = values.setdefault(key, [0.0, 0.0] if following.isdigit() else {})
+    if isinstance(values, list):
+        values[int(path[-1])] = value
+    else:
+        values[path[-1]] = value

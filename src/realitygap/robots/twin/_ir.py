@@ -1,0 +1,84 @@
+"""A twin's infrared sensors: light sent in a cone, what comes back of it, and the pulses that are counted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._model import TwinModel
+from ._physics import Physics
+from ._random import LIGHT, numbers_for
+
+DARK = 1e-12  # light below which no pulse is seen
+
+
+class IrSensors:
+    """The infrared sensors of one twin in one trial.
+
+    The light of a ray that meets a wall after d comes back as gain * (half / d)^2 * cos(angle)^incidence, weighted by a
+    lobe with half its strength at the edge of the cone, and so much of the pulses is seen as a logistic curve in the
+    light's logarithm says. Each sensor asks anew, so that three that ask one emitter differ.
+
+    Args:
+        model: The twin.
+        number: Of the trial.
+    """
+
+    def __init__(self, model: TwinModel, number: int) -> None:
+        ir = self._ir = model.ir
+        self._seed, self._number = model.seed, number
+        self._full, self._odd = model.battery.full, model.oddities
+        parts = np.linspace(-1.0, 1.0, ir.rays) if ir.rays > 1 else np.zeros(1)
+        self._spread = parts * ir.cone
+        weights = 1 - 0.5 * parts**2
+        self._weights = weights / weights.sum()
+        self._stray = 0.0
+        self._held: tuple[int, NDArray[np.float64]] | None = None
+
+    def light(self, physics: Physics, volts: float) -> NDArray[np.float64]:
+        """(s,) light that comes back to each sensor; 1 where half the pulses are seen."""
+        ir = self._ir
+        found: dict[tuple[float, float, float], float] = {}
+        values = []
+        for mount in ir.mount:
+            where = (mount.x, mount.y, mount.direction)
+            if where not in found:
+                far, cosine = physics.look(mount.x, mount.y, mount.direction + self._spread, ir.reach)
+                back = (ir.half / np.maximum(far, 1e-3)) ** 2 * cosine**ir.incidence
+                found[where] = float(self._weights @ np.where(far < ir.reach, back, 0.0))
+            values.append(mount.gain * found[where])
+        light: NDArray[np.float64] = np.array(values) * (max(volts, 0.0) / self._full) ** ir.supply
+        return light
+
+    def readings(self, physics: Physics, volts: float, step: int) -> NDArray[np.float64]:
+        """(s,) the share of pulses counted before command `step`, 0..1."""
+        odd = self._odd
+        if odd.latch and self._held is not None and step - self._held[0] <= odd.latch:
+            return self._held[1]
+        counts = self.count(self.light(physics, volts), step)
+        readings = counts / self._ir.pulses
+        if odd.inverted:
+            readings = 1.0 - readings
+        self._held = (step, readings)
+        return readings
+
+    def count(self, light: NDArray[np.float64], step: int) -> NDArray[np.int64]:
+        """(s,) pulses counted of light (s,), with the noise of a step."""
+        ir = self._ir
+        random = numbers_for(self._seed, self._number, LIGHT, step)
+        bright = light
+        if ir.noise:
+            common = math.sqrt(ir.memory)
+            own = random.standard_normal(len(light) + 1)
+            self._stray = ir.memory * self._stray + math.sqrt(1 - ir.memory**2) * float(own[0])
+            bright = light * np.exp(ir.noise * (common * self._stray + math.sqrt(1 - ir.memory) * own[1:]))
+        share = 1.0 / (1.0 + np.maximum(bright, DARK) ** -ir.steepness)
+        if ir.spread:
+            strength = 1 / ir.spread - 1
+            share = random.beta(np.maximum(share * strength, 1e-9), np.maximum((1 - share) * strength, 1e-9))
+        counts = random.binomial(ir.pulses, share)
+        if ir.missed:
+            counts[random.random(len(counts)) < ir.missed] = 0
+        return np.asarray(counts, np.int64)

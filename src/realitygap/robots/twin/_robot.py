@@ -1,0 +1,228 @@
+"""A twin as one robot under the contract that a physical one meets."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import RobotError, whole_number
+from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.world import Arena, Pose
+
+from ._cells import cells_along
+from ._encoders import Encoders
+from ._ir import IrSensors
+from ._model import TwinModel
+from ._motors import TICK_S, PlainSpeeds, Servo, SpeedSteps
+from ._physics import Physics
+from ._random import DELAYS, numbers_for
+from ._shape import STEP_S
+from ._stall import Idler
+
+FULL_SCALE = 6400.0  # of a Fluke's obstacle reading
+TICK_STEPS = round(TICK_S / STEP_S)
+CRUISE_STEPS = 2 * TICK_STEPS  # while nothing changes but slowly
+
+
+class TwinClock:
+    """The time of a twin: it passes while commands are carried out, and while somebody waits."""
+
+    def __init__(self, wait: Callable[[float], None] | None = None) -> None:
+        self._wait = wait
+        self.seconds = 0.0
+
+    def now(self) -> float:
+        """Seconds since the twin was made."""
+        return self.seconds
+
+    def sleep(self, seconds: float) -> None:
+        """Let so much time pass; the robot goes on with what it was told."""
+        if self._wait is None:
+            self.seconds += seconds
+        else:
+            self._wait(seconds)
+
+
+class TwinRobot:
+    """A twin, one command at a time: pseudo-reality of the wheels, motors and sensors that its file describes.
+
+    Everything is a function of the twin, the arena, the trial's number and the commands.
+
+    | command | least | most | unit |
+    |---|---|---|---|
+    | move | -1 | 1 | 1: full speed, the end ahead first |
+    | turn | -1 | 1 | 1: one wheel full ahead, the other full back, to the left |
+
+    | observation | from 0 | to 1 | raw |
+    |---|---|---|---|
+    | each infrared sensor, from left to right | no pulse came back | all did | 0 to 6400 |
+
+    Args:
+        model: The twin.
+        arena: Where.
+        number: Of the trial: it chooses the noise.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        ValueError: The twin's engine is sim, which `realitygap.trials.open_twin` opens.
+    """
+
+    label: Label = "TWIN"
+
+    def __init__(self, model: TwinModel, arena: Arena, *, number: int = 0) -> None:
+        if model.engine != "mujoco":
+            raise ValueError(
+                f"twin {model.name!r} has engine {model.engine!r}, expected 'mujoco'. Open it by "
+                "realitygap.trials.open_twin."
+            )
+        self.model, self.arena = model, arena
+        self.number = whole_number("number", number, 0)
+        self.step_s = model.step_s
+        self.n_sensors = len(model.ir.mount)
+        self.clock = TwinClock(self.wait)
+        self._physics = Physics(model, arena)
+        self._is_open = True
+        self.reset()
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Begin trial `number` at a pose, or at the arena's start; the heading is that of the body's x."""
+        self._check_open()
+        model, number = self.model, self.number
+        self._start = self.arena.start if pose is None else Pose(*map(float, pose))
+        self._physics.place(self._start)
+        self._servo = Servo(model, number)
+        self._regulator = SpeedSteps() if model.motors.stepped else PlainSpeeds()
+        self._speeds = self._regulator.tick()
+        self._ir = IrSensors(model, number)
+        self._idler = Idler(model, self._start)
+        self._encoders = Encoders(model, number)
+        self._delays = numbers_for(model.seed, number, DELAYS)
+        self._heard: deque[tuple[int, float, float]] = deque()  # steps of time, left, right
+        self._steps = self._phase = 0
+        self._turned = (0.0, 0.0)
+        self._points = [tuple(self._start)]
+        self._seen: Observation | None = None
+        self.n_steps = 0
+
+    def observe(self) -> Observation:
+        """Read the sensors; the same until the next command."""
+        self._check_open()
+        if self._seen is None:
+            readings = self._ir.readings(self._physics, self._servo.volts, self.n_steps)
+            raw = tuple((readings * FULL_SCALE).tolist())
+            self._seen = Observation(tuple(readings.tolist()), self._idler.stalled, raw)
+        return self._seen
+
+    def drive(self, command: Command) -> None:
+        """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1."""
+        self._check_open()
+        move, turn = check_command(command)
+        self.order(_within(move - turn), _within(move + turn))
+        self._advance(round(self.step_s / STEP_S))
+        self.n_steps += 1
+        self._seen = None
+
+    def order(self, left: float, right: float) -> None:
+        """Tell the wheels, each -1 to 1; they hear it after the delay, and go on until they hear something else."""
+        motors = self.model.motors
+        late = motors.delay + motors.delay_jitter * float(self._delays.uniform(-1.0, 1.0))
+        due = self._steps + max(0, round(late / STEP_S))
+        self._heard.append((max(due, self._heard[-1][0]) if self._heard else due, left, right))
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass; the robot goes on with what it was told."""
+        self._check_open()
+        self._advance(round(seconds / STEP_S))
+
+    def _advance(self, steps: int) -> None:
+        """Let steps of the physics pass, cut where the regulator ticks or a command is heard."""
+        end = self._steps + steps
+        while self._steps < end:
+            while self._heard and self._heard[0][0] <= self._steps:
+                self._regulator.drive(*self._heard.popleft()[1:])
+                self._phase = 0
+            if not self._phase:
+                self._speeds = self._regulator.tick()
+            whole = CRUISE_STEPS if self._regulator.is_steady and self._servo.is_steady else TICK_STEPS
+            n = min(whole - self._phase, end - self._steps)
+            if self._heard:
+                n = min(n, self._heard[0][0] - self._steps)
+            self._pass(n)
+            self._phase = (self._phase + n) % TICK_STEPS
+
+    def _pass(self, steps: int) -> None:
+        seconds = steps * STEP_S
+        physics = self._physics
+        here = self._points[-1]
+        left, right = self._servo.follow(*self._speeds, Pose(*here), seconds)
+        physics.move(left, right, steps)
+        self._steps += steps
+        self.clock.seconds += seconds
+        pose, turned, before = physics.pose, physics.wheels, self._turned
+        self._idler.watch(pose, turned[0] - before[0], turned[1] - before[1], seconds)
+        self._encoders.turn(turned[0] - before[0], turned[1] - before[1])
+        self._turned = turned
+        self._points.append(tuple(pose))
+
+    def stop(self) -> None:
+        """Stop the motors; safe to call at any moment, and twice."""
+        if self._is_open:
+            self._heard.clear()
+            self._regulator.drive(0.0, 0.0)
+            self._phase = 0
+
+    def close(self) -> None:
+        """Let go of it; safe to call twice."""
+        self._is_open = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise RobotError("This twin is closed: make a new one.")
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is: of the pen, the heading of the body's x [rad, 0 to 2 pi]."""
+        x, y, heading = self._points[-1]
+        return Pose(x, y, heading % math.tau)
+
+    @property
+    def encoders(self) -> tuple[float, float]:
+        """Way of the left and the right wheel since the start of the trial, as its encoders tell it [m]."""
+        return self._encoders.told
+
+    @property
+    def wheels(self) -> tuple[float, float]:
+        """The same: a twin shows what a robot shows."""
+        return self.encoders
+
+    @property
+    def battery_v(self) -> float:
+        """Of its battery now [V]."""
+        return self._servo.volts
+
+    def path(self) -> NDArray[np.float64]:
+        """(n, 3) x [m], y [m] and heading [rad] since the start, each 40 ms or more often: the line of the pen."""
+        return np.array(self._points)
+
+    @property
+    def visited_cells(self) -> tuple[int, ...]:
+        """Cells visited along the line, in order of first visit, columns * row + column."""
+        return cells_along(self.path(), self.arena.grid)
+
+
+def _within(wheel: float) -> float:
+    return min(max(wheel, -1.0), 1.0)

@@ -1,6 +1,10 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._closing import ClosingProgress, closing_the_gap
+from ._closing_plan import NAME as CLOSING
+from ._closing_plan import SMALL, ClosingPlan
+from ._closing_summary import summarize_closing
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._mazes import MAZE_SEEDS, measure_maze
@@ -17,10 +21,14 @@ from ._transfer_result import Estimate, Strategist, Transferred, TransferResult,
 from ._transfer_target import KeptTarget
 
 __all__ = [
+    "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "SECTIONS",
+    "SMALL",
     "STRATEGIES",
+    "ClosingPlan",
+    "ClosingProgress",
     "ConditionNotes",
     "Estimate",
     "KeptTarget",
@@ -37,6 +45,7 @@ __all__ = [
     "Transferred",
     "TrialsSection",
     "choose_condition",
+    "closing_the_gap",
     "connect_robot",
     "drive_study",
     "estimate_mean",
@@ -54,6 +63,7 @@ __all__ = [
     "run_study",
     "strategy_names",
     "study_template",
+    "summarize_closing",
     "task_settings",
     "transfer",
     "usable_processors",

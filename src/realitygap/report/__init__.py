@@ -18,6 +18,20 @@ from realitygap.report._audit import (
 )
 from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
+from realitygap.report._closing import (
+    FAMILY_HEAD,
+    GOAL_HEAD,
+    STRATEGY_HEAD,
+    TWIN_HEAD,
+    WHY_HEAD,
+    family_table,
+    goal_table,
+    strategy_table,
+    twin_table,
+    why_table,
+    write_closing_page,
+)
+from realitygap.report._closing_figures import draw_closing
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
@@ -129,6 +143,19 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Side",
     "draw_divergence",
     "save_divergence",
+    # closing-the-gap
+    "write_closing_page",
+    "draw_closing",
+    "goal_table",
+    "family_table",
+    "why_table",
+    "twin_table",
+    "strategy_table",
+    "GOAL_HEAD",
+    "FAMILY_HEAD",
+    "WHY_HEAD",
+    "TWIN_HEAD",
+    "STRATEGY_HEAD",
     # in motion
     "write_movie",
     "watch",

@@ -52,12 +52,14 @@ class IrSensors:
         light: NDArray[np.float64] = np.array(values) * (max(volts, 0.0) / self._full) ** ir.supply
         return light
 
-    def readings(self, physics: Physics, volts: float, step: int) -> NDArray[np.float64]:
-        """(s,) the share of pulses counted before command `step`, 0..1."""
+    def readings(
+        self, physics: Physics, volts: float, step: int, stronger: float = 1.0
+    ) -> NDArray[np.float64]:
+        """(s,) the share of pulses counted before command `step`, 0..1; light may go farther than usual."""
         odd = self._odd
         if odd.latch and self._held is not None and step - self._held[0] <= odd.latch:
             return self._held[1]
-        counts = self.count(self.light(physics, volts), step)
+        counts = self.count(self.light(physics, volts) * stronger**2, step)
         readings = counts / self._ir.pulses
         if odd.inverted:
             readings = 1.0 - readings

@@ -24,7 +24,7 @@ SHELL = (
 )
 
 
-class TwinBody(Settings):
+class TwinChassis(Settings):
     """What can collide, and how heavy it is."""
 
     corners: tuple[tuple[Offset, Offset], ...] = Field(
@@ -285,7 +285,7 @@ class TwinModel(Settings):
         "which there is no gap. Of all else in the file, sim takes only step_s and seed.",
     )
     step_s: Annotated[float, Field(ge=0.02, le=60)] = Field(0.5, description="How long a command lasts [s].")
-    body: TwinBody = TwinBody()
+    body: TwinChassis = TwinChassis()
     wheels: TwinWheels = TwinWheels()
     walls: TwinWalls = TwinWalls()
     motors: TwinMotors = TwinMotors()

@@ -18,6 +18,20 @@ from realitygap.report._audit import (
 )
 from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
+from realitygap.report._closing import (
+    FAMILY_HEAD,
+    GOAL_HEAD,
+    STRATEGY_HEAD,
+    TWIN_HEAD,
+    WHY_HEAD,
+    family_table,
+    goal_table,
+    strategy_table,
+    twin_table,
+    why_table,
+    write_closing_page,
+)
+from realitygap.report._closing_figures import draw_closing
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
@@ -66,10 +80,15 @@ from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
 from realitygap.report._trial_figure import draw_trial
 
 __all__ = [
+    "FAMILY_HEAD",
+    "GOAL_HEAD",
     "NARROW",
     "REPORT_NAME",
+    "STRATEGY_HEAD",
     "SUMMARY_SCHEMA",
     "TASK_SCHEMA",
+    "TWIN_HEAD",
+    "WHY_HEAD",
     "WIDE",
     "Agreement",
     "Audit",
@@ -108,6 +127,7 @@ __all__ = [
     "draw_arena_and_robot",
     "draw_better_individuals",
     "draw_choices",
+    "draw_closing",
     "draw_coverage",
     "draw_distance",
     "draw_divergence",
@@ -120,6 +140,8 @@ __all__ = [
     "draw_trial",
     "export_frame",
     "export_individual",
+    "family_table",
+    "goal_table",
     "holm",
     "interval_ranks",
     "measure_agreement",
@@ -142,9 +164,13 @@ __all__ = [
     "save_view",
     "sign_flip_p",
     "smallest_p",
+    "strategy_table",
     "summarize",
     "summarize_tasks",
+    "twin_table",
     "watch",
+    "why_table",
+    "write_closing_page",
     "write_movie",
     "write_report",
 ]

@@ -2,6 +2,10 @@
 
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
+from ._closing import ClosingProgress, closing_the_gap
+from ._closing_plan import NAME as CLOSING
+from ._closing_plan import SMALL, ClosingPlan
+from ._closing_summary import summarize_closing
 from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
@@ -22,11 +26,15 @@ from ._why import PARTS, calibration_of, part_of, why_gap
 from ._wrapped_targets import Guide, StoppedByPerson
 
 __all__ = [
+    "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "PARTS",
     "SECTIONS",
+    "SMALL",
     "STRATEGIES",
+    "ClosingPlan",
+    "ClosingProgress",
     "ConditionNotes",
     "Controller",
     "Estimate",
@@ -50,6 +58,7 @@ __all__ = [
     "calibrate_from",
     "calibration_of",
     "choose_condition",
+    "closing_the_gap",
     "connect_robot",
     "drive_study",
     "estimate_mean",
@@ -72,6 +81,7 @@ __all__ = [
     "strategy_names",
     "study_gap",
     "study_template",
+    "summarize_closing",
     "task_settings",
     "transfer",
     "usable_processors",

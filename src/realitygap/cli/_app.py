@@ -21,6 +21,7 @@ from ._simulate import simulate
 from ._study import new_study, run
 from ._transfer import transfer
 from ._trials import trials
+from ._twin import twin
 
 app = typer.Typer(
     name="realitygap",
@@ -63,5 +64,6 @@ app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
+app.add_typer(twin, name="twin")
 app.command("trials")(trials)
 app.command("transfer")(transfer)

@@ -142,7 +142,7 @@ def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person
     assert ahead - kept[0].start[0] == pytest.approx(13.75 * 0.0254)
     assert left - kept[0].start[1] == pytest.approx(-0.125 * 0.0254)
     assert heading == pytest.approx(0.0349, abs=1e-4)
-    # the third trial, the fourth, back to the third, which is 14 in now, its first answer mistyped, and the fourth again
+    # the third trial, the fourth, back to the third, which is 14 in now, an answer mistyped, and the fourth again
     second = person(*("?", "r", *STRAIGHT), "r", *("", "x", "14", "0", "r"), *("", "14", "0", "0"), *TURN)
     out = run(*command)
     assert "Trial 1 of 2: put it with 24 in free ahead" in out

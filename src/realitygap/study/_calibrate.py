@@ -21,7 +21,7 @@ from realitygap.records import (
 )
 from realitygap.robots import DEFAULT_ROBOT
 from realitygap.trials import Target, TrialPlan
-from realitygap.world import Arena, Calibration, load_robot, read_calibration
+from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
 from ._calibrate_kinds import KINDS, Kind, Parts
 from ._targets import observations_head

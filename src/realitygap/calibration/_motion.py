@@ -133,11 +133,11 @@ class DeadBand:
 def _solve(problem: Problem) -> tuple[Floats, DeadBand, Floats]:
     noise = FIRST_NOISE
     problem = problem.fixed_at(**{"drive.dead_band": plain_numbers(problem.robot)["drive.dead_band"]})
-    scatter = scatter_of(problem, problem.own, problem.slopes(problem.own))
+    scatter = scatter_of(problem, problem.own)
     place = _first_place(problem, scatter, noise)
     rng = np.random.default_rng(0)
     for _ in range(ROUNDS):
-        scatter = scatter_of(problem, place, problem.slopes(place))
+        scatter = scatter_of(problem, place)
         dead_band = _dead_band(problem, scatter, noise, place)
         problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
         place, _ = best_place(problem, scatter, noise, place)
@@ -191,7 +191,7 @@ def _report(
     rng: np.random.Generator,
 ) -> MotionFit:
     slopes = problem.slopes(place)
-    scatter = scatter_of(problem, place, slopes)
+    scatter = scatter_of(problem, place)
     off = np.nan_to_num(problem.off(place[None])[0])
     noises = scatter_parameters(problem.known)
     places, scatters = draw_posterior(rng, scatter, place, slopes, off, noise, noises)

@@ -18,8 +18,9 @@ from ._handles import Known, own_values, place_of, values_at
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
 from ._prior import Parameter
 from ._scatter import NoisePrior, Scatter
-from ._simulate import Bools, Floats, Ints, Simulate
-from ._windows import Windows, differences, simulate_windows, ways_driven
+from ._simulate import Bools, Floats, Ints, Simulate, plain_numbers
+from ._wheel_ways import wheel_ways
+from ._windows import Windows, differences, simulate_windows, wrapped
 
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
@@ -84,23 +85,41 @@ def make_problem(
     return Problem(simulate, robot, known, windows, tuple(known[name] for name in names), {}, places)
 
 
-def scatter_of(problem: Problem, place: Floats, slopes: Floats) -> Scatter:
+def scatter_of(problem: Problem, place: Floats) -> Scatter:
     """How windows scatter around what is simulated at a place."""
     values = values_at(problem.free, place[None])
     values |= {name: np.array([value]) for name, value in problem.fixed.items()}
     windows = problem.windows
-    way = ways_driven(problem.simulate, problem.robot, problem.known, windows, values)
-    span = (windows.last - windows.first) * windows.step_s
-    names = [handle.name for handle in problem.free]
-    late = np.zeros((len(way), 5))
-    if "drive.delay" in names:
-        k = names.index("drive.delay")
-        late = slopes[:, :, k] / problem.free[k].width  # its prior is even: places are in proportion
-    _, after, wheels = windows.seen
+    ways = wheel_ways(problem.simulate, problem.robot, problem.known, windows, values)
+    made = simulate_windows(problem.simulate, problem.robot, problem.known, windows, values)
+    before, after, wheels = windows.seen
     seen = np.concatenate([np.repeat(np.isfinite(after[:, :1]), 3, axis=1), np.isfinite(wheels)], axis=1)
-    stands = way.max(axis=1) < LEAST_WAY
+    stands = ways.way.max(axis=1) < LEAST_WAY
     seen[stands & has_moved(windows), :3] = False
-    return Scatter(way.mean(axis=1), way, np.where(stands, 0.0, span), late, seen)
+    span = (windows.last - windows.first) * windows.step_s
+    turn = np.nan_to_num(wrapped(made.after[0, :, 2] - before[:, 2]))
+    own = plain_numbers(problem.robot)
+    slip, track = (
+        float(values[name][0]) if name in values else own[name] for name in ("drive.slip", "drive.track")
+    )
+    return Scatter(
+        way=ways.way.mean(axis=1),
+        chord=np.sinc(turn / (2 * np.pi)),
+        wheel_way=ways.way,
+        moving_s=np.where(stands, 0.0, span),
+        late=_in_channels(ways.late, slip, track),
+        carried=_in_channels(ways.carried, slip, track),
+        seen=seen,
+    )
+
+
+def _in_channels(wheels: Floats, slip: float, track: float) -> Floats:
+    """(w, 5) what ways (w, 2) of the wheels come to along, across, around and at each of them."""
+    left, right = wheels.T
+    grip = 1.0 - slip
+    return np.stack(
+        [grip * (left + right) / 2, np.zeros_like(left), grip * (right - left) / track, left, right], axis=1
+    )
 
 
 def has_moved(windows: Windows) -> Bools:

@@ -7,7 +7,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,9 +21,9 @@ from realitygap.records import (
 )
 from realitygap.robots import DEFAULT_ROBOT
 from realitygap.trials import Target, TrialPlan
-from realitygap.world import Arena, Calibration, load_robot, read_calibration
+from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
-from ._calibrate_kinds import KINDS, Parts
+from ._calibrate_kinds import KINDS, Kind, Parts
 from ._targets import observations_head
 from ._wrapped_targets import Guide, GuidedTarget, ResumableTarget, RuledTarget, is_whole
 
@@ -77,14 +76,14 @@ def calibrate(
             f"{target.name} has {target.n_sensors} range sensors and robot {base.name!r} {len(base.range)}. Build on "
             "the robot that it is (--base ROBOT)."
         )
+    plans = _plans(made, target.arena, base, budget)
     around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
     if trials_file is None:
-        trials = _carry_out(kind, around, made.plans(target.arena, base, budget), observe, seed, tell)
+        trials = _carry_out(around, plans, observe, seed, tell)
     else:
         head = observations_head(target, observe, str(robot))
         with ObservationsFile(trials_file, head) as file:
-            plans = made.plans(target.arena, base, budget)
-            trials = _carry_out(kind, ResumableTarget(around, file), plans, observe, seed, tell)
+            trials = _carry_out(ResumableTarget(around, file), plans, observe, seed, tell)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
     return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
 
@@ -130,14 +129,21 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
     write_whole(path, calibration.model_copy(update={"robot": robot}).to_toml().encode())
 
 
-def _kind(kind: str) -> Any:
+def _kind(kind: str) -> Kind:
     if kind not in KINDS:
         raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, KINDS)}")
     return KINDS[kind]
 
 
+def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    try:
+        return kind.plans(arena, robot, budget)
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+
+
 def _carry_out(
-    kind: str, target: Target, plans: Sequence[TrialPlan], observe: Observe, seed: int, tell: Tell | None
+    target: Target, plans: Sequence[TrialPlan], observe: Observe, seed: int, tell: Tell | None
 ) -> list[ObservedTrial]:
     plans = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     done: set[int] = set()

@@ -164,7 +164,7 @@ class ResumableTarget(_Around):
 
 def is_whole(trial: ObservedTrial) -> bool:
     """Whether a trial came to its own end, and was not cut off."""
-    return trial.end not in (EndReason.LOST, EndReason.INTERRUPTED)
+    return trial.end == EndReason.STEP_LIMIT
 
 
 def _what(trial: ObservedTrial) -> tuple[object, ...]:

@@ -13,6 +13,7 @@ from ._audit_distance import audit_distance
 from ._bench import bench
 from ._emulate import emulate
 from ._export import export
+from ._gap import gap, plan
 from ._results import digest, report
 from ._robot import robot
 from ._show import show
@@ -62,4 +63,6 @@ app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
 app.command("trials")(trials)
+app.command("gap")(gap)
+app.command("plan")(plan)
 app.command("transfer")(transfer)

@@ -10,7 +10,7 @@ from realitygap.errors import StudyError
 from realitygap.gap import Why
 from realitygap.records import OBSERVATIONS, Observe
 from realitygap.trials import Target
-from realitygap.world import Arena, load_arena
+from realitygap.world import Arena, Calibration, load_arena
 
 from ._controllers import sample_controllers
 from ._gap import GapStudy, Tell, study_gap
@@ -108,7 +108,7 @@ def gap_between(
             trials=trials,
             margin=margin,
             observe=observe,
-            misspecified=None if calibration is None else calibration.misspecified,
+            misspecified=_misspecified(calibration),
             reevolved=there,
             seed=seed,
             tell=tell,
@@ -122,13 +122,18 @@ def gap_between(
     return GapBetween(found, parts)
 
 
+def _misspecified(calibration: Calibration | None) -> bool | None:
+    """What the predictive check of a whole calibration said; only that one fits trials as wholes."""
+    return calibration.misspecified if calibration is not None and calibration.kind == "all" else None
+
+
 def _open(
     spec: str, arena: Arena, noise: float | None, key: int, processes: int | None, witness: str | None
 ) -> Target:
     level = (PAPERS_NOISE if spec == "jyro" else 0.0) if noise is None else noise
     more = {"processes": processes, "witness": witness}
     given = {name: value for name, value in more.items() if value is not None}
-    return open_target(spec, arena, noise=level, key=key, **given)  # type: ignore[arg-type]
+    return open_target(spec, arena, noise=level, key=key, **given)
 
 
 def _refuse_more_than_is_seen(target: Target, observe: Observe) -> None:

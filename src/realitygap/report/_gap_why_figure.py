@@ -43,5 +43,6 @@ def draw_gap_why(why: Why, gap: GapStudy, *, width: float = WIDE) -> Drawing:
         axes.axvline(0, color=Ink.MUTED, linewidth=0.7)
         axes.set_yticks(range(len(order)), [why.parts[k] for k in order])
         axes.tick_params(axis="y", length=0)
+        axes.locator_params(axis="x", nbins=5 if width > 6 else 3)
         axes.set_xlabel("fall of the RMS gap", labelpad=3)
         return Drawing(to_svg(figure, "gap-why", alt), caption, alt, figure)

@@ -1,6 +1,11 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._calibrate import calibrate, calibrate_from, save_calibration
+from ._closing import ClosingProgress, closing_the_gap
+from ._closing_plan import NAME as CLOSING
+from ._closing_plan import SMALL, ClosingPlan
+from ._closing_summary import summarize_closing
 from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
@@ -20,24 +25,31 @@ from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_name
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
 from ._why import PARTS, calibration_of, part_of, why_gap
+from ._wrapped_targets import Guide, StoppedByPerson
 
 __all__ = [
+    "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "PARTS",
     "SECTIONS",
+    "SMALL",
     "STRATEGIES",
+    "ClosingPlan",
+    "ClosingProgress",
     "ConditionNotes",
     "Controller",
     "Estimate",
     "GapBetween",
     "GapPlan",
     "GapStudy",
+    "Guide",
     "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "StoppedByPerson",
     "Strategist",
     "Study",
     "StudyResult",
@@ -46,8 +58,11 @@ __all__ = [
     "TransferResult",
     "Transferred",
     "TrialsSection",
+    "calibrate",
+    "calibrate_from",
     "calibration_of",
     "choose_condition",
+    "closing_the_gap",
     "connect_robot",
     "drive_study",
     "estimate_mean",
@@ -70,9 +85,11 @@ __all__ = [
     "run_gap",
     "run_study",
     "sample_controllers",
+    "save_calibration",
     "strategy_names",
     "study_gap",
     "study_template",
+    "summarize_closing",
     "task_settings",
     "transfer",
     "usable_processors",

@@ -137,8 +137,12 @@ class Servo:
         """Share of the speed that the battery leaves."""
         battery = self._battery
         self._used += battery.fall_per_s * work * seconds
-        self.volts = battery.volts - self._used - battery.sag * work
+        self.volts = self.volts_at(work)
         return max(0.0, 1 - battery.slows * (1 - self.volts / battery.full))
+
+    def volts_at(self, load: float) -> float:
+        """Of the battery with the motors at a load of 0 to 1 [V]."""
+        return self._battery.volts - self._used - self._battery.sag * load
 
     def _stray(self, seconds: float) -> None:
         """Let the wheels' speeds wander on."""

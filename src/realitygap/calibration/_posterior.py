@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from ._scatter import NoisePrior
 from ._simulate import Floats
 
 SWEEPS, BURN_IN = 600, 150
@@ -68,34 +69,30 @@ def _between(rng: np.random.Generator, a: float, b: float) -> float:
 def walk(
     rng: np.random.Generator,
     at: Floats,
-    high: Floats,
-    log_density: Callable[[Floats], float],
-    now: float,
+    prior: NoisePrior,
+    log_likelihood: Callable[[Floats], float],
     reach: Floats,
-    free: Floats,
-) -> tuple[Floats, float]:
-    """One round of Metropolis steps over numbers from 0 to `high`, one after the other; `reach` adapts.
+) -> Floats:
+    """The next draw of noise: a round of Metropolis steps, one number after the other, whose reach adapts.
 
     Args:
         rng: Random numbers.
         at: (q,) the draw before.
-        high: (q,) upper ends.
-        log_density: Of all numbers.
-        now: Its value at `at`.
+        prior: Of noise.
+        log_likelihood: Of all numbers.
         reach: (q,) standard deviations of proposals; changed.
-        free: (q,) indices of those that move.
     """
-    here = at.copy()
-    for k in free.astype(np.int64):
+    here, now = at.copy(), log_likelihood(at) + prior.log_density(at)
+    for k in range(len(at)):
         new = here.copy()
         new[k] = abs(here[k] + reach[k] * rng.standard_normal())
-        if new[k] > high[k]:
+        if not prior.low[k] <= new[k] <= prior.high[k]:
             reach[k] *= 0.95
             continue
-        value = log_density(new)
+        value = log_likelihood(new) + prior.log_density(new)
         if np.log(rng.uniform()) < value - now:
             here, now = new, value
-            reach[k] = min(reach[k] * 1.1, high[k])
+            reach[k] = min(reach[k] * 1.1, prior.high[k])
         else:
             reach[k] *= 0.94
-    return here, now
+    return here

@@ -7,18 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._handles import MOTION_NOISE, Handle
+from realitygap.world import Distribution
+
+from ._handles import MOTION_NOISE, Known
+from ._prior import Parameter
 from ._simulate import Bools, Floats
 
 JITTER, TRAVEL_PER_M, HEADING_PER_M, HEADING_PER_S, ACROSS_PER_M, PLACE, ANGLE, WHEEL_PER_M, WHEEL = range(9)
 """What scatters: first the simulator's own numbers, as `MOTION_NOISE`, then what is not asked for."""
 
 OBSERVER = (
-    Handle("skid.per_m", 0.0, 0.1, "m"),
-    Handle("camera.place", 0.0, 0.02, "m"),
-    Handle("camera.angle", 0.0, 0.1, "rad"),
-    Handle("encoder.noise_per_m", 0.0, 0.05, "m"),
-    Handle("encoder.count", 0.0, 0.01, "m"),
+    Parameter("skid.per_m", Distribution(uniform=(0.0, 0.1)), "m"),
+    Parameter("camera.place", Distribution(uniform=(0.0, 0.02)), "m"),
+    Parameter("camera.angle", Distribution(uniform=(0.0, 0.1)), "rad"),
+    Parameter("encoder.noise_per_m", Distribution(uniform=(0.0, 0.05)), "m"),
+    Parameter("encoder.count", Distribution(uniform=(0.0, 0.01)), "m"),
 )
 """Skids sideways, errors of a camera in a place and a heading, errors of encoders that grow with the way or do not."""
 
@@ -83,6 +86,38 @@ class Scatter:
         return np.asarray((scaled - taken).reshape(rows.shape))
 
 
-def scatter_handles(handles: dict[str, Handle], limits: Sequence[Handle] = OBSERVER) -> list[Handle]:
+def scatter_parameters(known: Known) -> list[Parameter]:
     """What scatters, in the order of its numbers."""
-    return [*(handles[name] for name in MOTION_NOISE), *limits]
+    return [*(known[name] for name in MOTION_NOISE), *OBSERVER]
+
+
+@dataclass(frozen=True)
+class NoisePrior:
+    """What is thought possible of the numbers that scatter.
+
+    Attributes:
+        low, high: (q,) ends.
+        is_ratio: (q,) whether ratios are as likely, and not differences.
+    """
+
+    low: Floats
+    high: Floats
+    is_ratio: Bools
+
+    @classmethod
+    def of(cls, parameters: Sequence[Parameter]) -> NoisePrior:
+        """That of parameters."""
+        priors = [parameter.prior for parameter in parameters]
+        return cls(
+            np.array([prior.lowest for prior in priors]),
+            np.array([prior.highest for prior in priors]),
+            np.array([prior.log_uniform is not None for prior in priors]),
+        )
+
+    def log_density(self, noise: Floats) -> float:
+        """Of noise within the ends."""
+        return -float(np.log(noise[self.is_ratio]).sum())
+
+    def inside(self, noise: Floats) -> Floats:
+        """The nearest noise that is possible."""
+        return np.clip(noise, self.low, self.high)

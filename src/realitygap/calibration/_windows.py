@@ -10,7 +10,7 @@ import numpy as np
 from realitygap.records import ObservedTrial
 from realitygap.world import Arena, RobotModel
 
-from ._handles import numbers_of
+from ._handles import Known, robot_numbers
 from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, plain_numbers, starts_of
 
 CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
@@ -128,11 +128,11 @@ def _is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
 
 
 def simulate_windows(
-    simulate: Simulate, robot: RobotModel, windows: Windows, values: Mapping[str, Floats]
+    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
 ) -> Simulated:
     """Each window from where the robot was seen at its beginning, without noise, with each of m sets of parameters."""
     m = len(next(iter(values.values())))
-    numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | numbers_of(robot, values)
+    numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | robot_numbers(known, robot, values)
     has_poses = bool(np.isfinite(windows.anchors).any())
     done = simulate(
         starts_of(windows.trials),
@@ -184,7 +184,7 @@ def _moved(before: Floats, after: Floats, axle: Floats) -> Floats:
 
 
 def ways_driven(
-    simulate: Simulate, robot: RobotModel, windows: Windows, values: Mapping[str, Floats]
+    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
 ) -> Floats:
     """(w, 2) how far each wheel drives in a window with one set of parameters, there and back added up [m].
 
@@ -192,7 +192,7 @@ def ways_driven(
     drive without delay and lag, of which lag still gives a part to the step after.
     """
     prompt = {**values, "drive.delay": np.zeros(1), "drive.lag": np.zeros(1)}
-    numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | numbers_of(robot, prompt)
+    numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | robot_numbers(known, robot, prompt)
     done = simulate(starts_of(windows.trials), windows.commands, numbers, 0, keep=("wheels",))
     asked = np.diff(np.asarray(done.wheels[0], np.float64), axis=1)
     late = float(values["drive.delay"][0]) / windows.step_s

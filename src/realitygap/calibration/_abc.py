@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from realitygap.world import RobotModel
@@ -106,7 +105,9 @@ def fit_all(
         observed = np.concatenate([press(v) for press, v in zip(learned, seen, strict=True)], axis=1)[0]
         draws, off = _adjusted(rng, places, summaries, observed, low, high)
         if tell is not None:
-            tell(f"round {turn + 1} of {ROUNDS[effort]}: {np.mean(high - low) / (2 * END):.0%} of the prior's width")
+            tell(
+                f"round {turn + 1} of {ROUNDS[effort]}: {np.mean(high - low) / (2 * END):.0%} of the prior's width"
+            )
         if not is_last:
             low, high = _next_box(draws)
     keep = draws[rng.permutation(len(draws))[:N_DRAWS]]
@@ -144,7 +145,9 @@ def _adjusted(
     near = weight > 0
     moved, _ = _local(told[near], places[near], weight[near], told_here)
     which = rng.choice(near.sum(), 4 * N_DRAWS, p=weight[near] / weight.sum())
-    return np.clip(moved[which], -END, END), (told_here - told[near].mean(axis=0)) / (told[near].std(axis=0) + 1e-9)
+    return np.clip(moved[which], -END, END), (told_here - told[near].mean(axis=0)) / (
+        told[near].std(axis=0) + 1e-9
+    )
 
 
 def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:

@@ -130,7 +130,9 @@ def _of_group(
         made = [_evidence(put_back, keep, partial(_shooting, anchors), seen, number)]
     elif is_driven:
         driven = Play(starts, steps, genomes=tuple(genome for _, _, genome in group if genome is not None))
-        made = [_evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)]
+        made = [
+            _evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)
+        ]
     else:
         made = [_evidence(given, ("readings", "stalled"), partial(_step_by_step, steps), seen, number)]
     if observe == "encoders":
@@ -215,7 +217,9 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     columns.add("cell", rehearsal.cells, 0)
     columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
     most = readings.max(axis=-1, keepdims=True)
-    seen = np.concatenate([most, most == 0, most - readings.min(axis=-1, keepdims=True), stalled, commands], axis=-1)
+    seen = np.concatenate(
+        [most, most == 0, most - readings.min(axis=-1, keepdims=True), stalled, commands], axis=-1
+    )
     for lag in (0, 1, 2, 4):
         a, b = seen[:, :, : t - lag], seen[:, :, lag:]
         columns.add("reading", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)

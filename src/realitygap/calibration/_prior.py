@@ -98,9 +98,7 @@ def numbers_of(
     return numbers
 
 
-def ranges_of(
-    prior: Sequence[Parameter], robot: RobotModel, n: int = 4096
-) -> dict[str, tuple[float, float]]:
+def ranges_of(prior: Sequence[Parameter], robot: RobotModel, n: int = 4096) -> dict[str, tuple[float, float]]:
     """Least and most of the robot's numbers over the prior."""
     corners = np.random.default_rng(0).choice([-8.0, 8.0], (n, len(prior)))
     numbers = numbers_of(prior, values_of(prior, corners), robot)

@@ -54,6 +54,11 @@ from realitygap.report._effects import (
 )
 from realitygap.report._formats import save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
+from realitygap.report._gap_maps_figure import draw_gap_maps
+from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
+from realitygap.report._gap_page import refuse_gap_page, write_gap_report
+from realitygap.report._gap_replay_figure import draw_gap_replay
+from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
@@ -84,6 +89,17 @@ __all__ = [
     "GOAL_HEAD",
     "NARROW",
     "REPORT_NAME",
+    # the gap between two platforms
+    "write_gap_report",
+    "refuse_gap_page",
+    "draw_gap_pairs",
+    "draw_gap_differences",
+    "draw_gap_maps",
+    "draw_gap_replay",
+    "draw_gap_why",
+    # numbers
+    "summarize",
+    "summarize_tasks",
     "STRATEGY_HEAD",
     "SUMMARY_SCHEMA",
     "TASK_SCHEMA",

@@ -5,6 +5,7 @@ from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
 from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
+from ._motion_plans import motion_plans
 from ._path import PathFit, fit_path, path_plans
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
@@ -24,6 +25,7 @@ __all__ = [
     "fit_path",
     "fit_sensor",
     "independence",
+    "motion_plans",
     "moved_in",
     "path_plans",
     "placements_of",

@@ -129,7 +129,11 @@ def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats
 
 
 def _adjusted(
-    rng: np.random.Generator, places: Floats, summaries: Floats, observed: Floats, groups: Sequence[NDArray[np.int64]]
+    rng: np.random.Generator,
+    places: Floats,
+    summaries: Floats,
+    observed: Floats,
+    groups: Sequence[NDArray[np.int64]],
 ) -> tuple[Floats, Floats]:
     """Draws from the posterior: parameters moved by their regression on the summaries to what was observed.
 

@@ -20,7 +20,15 @@ from ._prior import Floats
 
 N_PREDICTIVE = 200  # robots from the posterior
 
-TOLERATED = {"ahead": 0.2, "turn": 0.2, "reading": 0.35, "stall": 1.0, "coverage": 1.0, "command": 0.5, "wheels": 0.2}
+TOLERATED = {
+    "ahead": 0.2,
+    "turn": 0.2,
+    "reading": 0.35,
+    "stall": 1.0,
+    "coverage": 1.0,
+    "command": 0.5,
+    "wheels": 0.2,
+}
 """Share of the variance of each kind of observation up to which a fit counts as well specified."""
 
 
@@ -75,7 +83,12 @@ def misfits(
             at = one.kinds == kind
             seen = one.seen[at].astype(np.float64)
             row = np.array(
-                [off[at].sum(), expected[at].sum(), ((seen - seen.mean()) ** 2).sum(), *own[:, at].sum(axis=1)]
+                [
+                    off[at].sum(),
+                    expected[at].sum(),
+                    ((seen - seen.mean()) ** 2).sum(),
+                    *own[:, at].sum(axis=1),
+                ]
             )
             sums[str(kind)] = sums.get(str(kind), np.zeros(3 + len(made))) + row
     found = []

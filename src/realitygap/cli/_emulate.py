@@ -28,6 +28,10 @@ def emulate(
     arena: Annotated[
         str, typer.Option(metavar="NAME", help="Where it stands: an arena by name, or a TOML or SVG file.")
     ] = "paper",
+    twin: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A twin to drive behind it, from `realitygap twin sample`."),
+    ] = None,
     link: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Also make a link to the pseudo-terminal here.")
     ] = None,
@@ -35,7 +39,14 @@ def emulate(
         int | None,
         typer.Option(metavar="PORT", min=0, max=65535, help="A TCP port of this machine instead; 0 for any."),
     ] = None,
-    speed: Annotated[float, typer.Option(min=0.001, max=1000, help="Its seconds in one of real time.")] = 1.0,
+    speed: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            max=1000,
+            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass.",
+        ),
+    ] = 1.0,
     timing: Annotated[
         str, typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time.")
     ] = "on",
@@ -72,6 +83,8 @@ def emulate(
 
     Example: realitygap emulate scribbler --tcp 7001 --witness 7002 --faults drop=0.001,hangup=60
 
+    Example: realitygap emulate scribbler --twin worn-1.toml
+
     Example: realitygap emulate scribbler --model s1 --fluke 1 --exec "python2 program.py {port}"
 
     In Python: realitygap.emulator.serve_pty(realitygap.emulator.Emulator("s2", "2"))
@@ -87,6 +100,8 @@ def emulate(
     options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
     if fluke is not None:
         options["fluke"] = fluke
+    if twin is not None:
+        options["twin"] = str(twin)
     if state is not None:
         options["state"] = str(state)
     emulator = make_emulator(model, options)

@@ -9,7 +9,7 @@ from ._port import EmulatedPort, EmulatorClock, register
 from ._scene import Scene
 from ._scene_file import open_scene
 from ._serve import Server, serve_pty, serve_tcp
-from ._simulated import SCRIBBLER_BODY, BoxOnWheels, SimulatedRobot
+from ._simulated import SCRIBBLER_BODY, BoxOnWheels, RobotOfItsOwn, SimulatedRobot
 from ._witness import DirectWitness, RemoteWitness, Witness, connect_witness
 
 register()
@@ -23,6 +23,7 @@ __all__ = [
     "EmulatorClock",
     "Faults",
     "RemoteWitness",
+    "RobotOfItsOwn",
     "Scene",
     "Server",
     "SimulatedRobot",

@@ -25,7 +25,7 @@ from ._power import DROP_OUT_VOLTS, Battery
 from ._scene import Scene, paper_scene
 from ._scribbler import BYTE_NS, Scribbler
 from ._senses import Senses
-from ._simulated import BoxOnWheels, SimulatedRobot
+from ._simulated import BoxOnWheels, RobotOfItsOwn, SimulatedRobot
 from ._table import Table
 from ._time import SECOND, nanoseconds
 
@@ -47,7 +47,8 @@ class Emulator:
         faults: What goes wrong on the link; nothing by default.
         timing: Whether bytes, tones, sensors and writing to memory take their time.
         state: The file in which it keeps name, password, data, forwardness, echo mode and volume.
-        robot: What moves behind it, instead of a box on two wheels in the arena.
+        robot: What moves behind it, instead of a box on two wheels in the arena; one of its own infrared and battery
+            is asked for these, too.
 
     Raises:
         RobotError: There is no such model, or the file of its state cannot be read.
@@ -94,7 +95,8 @@ class Emulator:
         motors = S1Motors(self.memory.data) if self.model == "s1" else S2Motors()
         spacing = S1_SPACING if self.model == "s1" else S2_SPACING
         body: SimulatedRobot = robot or BoxOnWheels(arena, spacing)
-        self.battery = Battery(self.faults.sag)
+        own = body if isinstance(body, RobotOfItsOwn) else None
+        self.battery = Battery(self.faults.sag, own.volts if own else None)
         self.table = Table(body, motors, self.battery, arena)
         self.senses = Senses(body, self.scene, seed)
         self.fluke: Fluke | None = None
@@ -184,6 +186,11 @@ class Emulator:
         if self._events:
             times.append(self._events[0][0])
         return min((time for time in times if time is not None), default=None)
+
+    @property
+    def is_talking(self) -> bool:
+        """Whether bytes are on their way, to it or from it."""
+        return bool(self._incoming) or self._line.due(1) is not None
 
     # -- bytes --
 
@@ -283,6 +290,8 @@ class Emulator:
             raise ValueError(f"pose is {tuple(pose)!r}, expected three finite numbers.")
         self.table.advance_to(self._now)
         self.robot.drop_motions()
+        if isinstance(self.table.robot, RobotOfItsOwn):
+            self.table.robot.restart(seed)
         self.table.place(Pose(x, y, heading - self._turn), self._now)
         self.senses.restart(seed)
 

@@ -16,6 +16,8 @@ import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, Timeout
 
 from realitygap.errors import RobotError, did_you_mean
+from realitygap.robots.twin import TwinBody, load_twin
+from realitygap.world import Arena
 
 from ._emulator import Emulator
 from ._faults import Faults
@@ -24,7 +26,7 @@ from ._time import SECOND, nanoseconds
 from ._witness import DirectWitness
 
 SCHEME = "emulator"
-KEYS = ("fluke", "arena", "seed", "speed", "timing", "faults", "state", "id")
+KEYS = ("fluke", "arena", "seed", "speed", "timing", "faults", "state", "id", "twin")
 FASTEST = 1000.0
 _shared: dict[str, tuple[Emulator, RLock]] = {}
 
@@ -262,7 +264,7 @@ def _parse(url: str) -> tuple[str, dict[str, str]]:
 
 
 def make_emulator(model: str, options: dict[str, str]) -> Emulator:
-    """The emulator that text options describe: fluke, arena, seed, timing, faults, state.
+    """The emulator that text options describe: fluke, arena, seed, timing, faults, state, twin.
 
     Raises:
         RobotError: One of them is not known or out of range.
@@ -270,15 +272,25 @@ def make_emulator(model: str, options: dict[str, str]) -> Emulator:
     timing = options.get("timing", "on")
     if timing not in ("on", "off"):
         raise RobotError(f"timing={timing}: expected on or off.")
+    scene = open_scene(options.get("arena", "paper"))
     return Emulator(
         model,  # type: ignore[arg-type]  # checked there
         options.get("fluke", "2" if model == "s2" else "1"),  # type: ignore[arg-type]  # checked there
-        arena=open_scene(options.get("arena", "paper")),
+        arena=scene,
         seed=int(_number("seed", options.get("seed", "0"), 0, 2**63, whole=True)),
         faults=Faults.parse(options.get("faults", "")),
         timing=timing == "on",
         state=Path(options["state"]) if options.get("state") else None,
+        robot=_twin(options["twin"], scene.arena) if options.get("twin") else None,
     )
+
+
+def _twin(file: str, arena: Arena) -> TwinBody:
+    """A twin's body from its file."""
+    try:
+        return TwinBody(load_twin(file), arena)
+    except ValueError as error:
+        raise RobotError(f"{error}") from error
 
 
 def _number(name: str, text: str, least: float, most: float, *, whole: bool = False) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ._time import SECOND
 
 FULL_VOLTS, EMPTY_VOLTS = 9.0, 6.0  # a full set; the Fluke blinks below 6.15 V
@@ -17,10 +19,12 @@ class Battery:
 
     Args:
         sag: Share of the voltage lost under full load, of weak cells.
+        own_volts: What a robot that has cells of its own says of them under a load of 0 to 1 [V].
     """
 
-    def __init__(self, sag: float = 0.0) -> None:
-        self._sag = OWN_SAG + sag
+    def __init__(self, sag: float = 0.0, own_volts: Callable[[float], float] | None = None) -> None:
+        self._sag = sag + (OWN_SAG if own_volts is None else 0.0)
+        self._own_volts = own_volts
         self.used = 0.0  # share of the capacity
 
     def drain(self, load: float, duration_ns: int) -> None:
@@ -30,5 +34,7 @@ class Battery:
 
     def volts(self, load: float) -> float:
         """The voltage with the motors at a load of 0 to 1."""
+        if self._own_volts is not None:
+            return self._own_volts(load) * (1 - self._sag * load)
         resting = FULL_VOLTS - (FULL_VOLTS - EMPTY_VOLTS) * self.used
         return resting * (1 - self._sag * load)

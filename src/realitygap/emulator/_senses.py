@@ -14,7 +14,7 @@ import numpy as np
 from realitygap.world import BARE_FLOOR
 
 from ._scene import Scene
-from ._simulated import SimulatedRobot
+from ._simulated import RobotOfItsOwn, SimulatedRobot
 
 IR_REACH = 0.15  # of the robot's own IR at the usual threshold of 20 [m]: sources say 4 to 6 in, and 10 in
 IR_THRESHOLD = 20
@@ -66,6 +66,7 @@ class Senses:
 
     def __init__(self, robot: SimulatedRobot, scene: Scene, seed: int) -> None:
         self._robot = robot
+        self._own = robot if isinstance(robot, RobotOfItsOwn) else None
         self._scene = scene
         self.restart(seed)
 
@@ -126,6 +127,8 @@ class Senses:
             power: Of its emitters, 0 to 255.
             in_pulses: Whether it is a Fluke 2, which sends ten pulses from its only emitter.
         """
+        if self._own is not None:
+            return self._own.obstacle(emitter, _stronger(power, in_pulses=in_pulses))
         first = 3 * list(FLUKE_EMITTERS).index("center" if in_pulses else emitter)
         far = float(self._robot.ranges(_FLUKE_RAYS[first : first + 3], OBSTACLE_REACH).min())
         share = _returned(far, power, in_pulses=in_pulses)
@@ -148,7 +151,14 @@ def _ir_reach(threshold: int) -> float:
 
 def _returned(far: float, power: int, *, in_pulses: bool) -> float:
     """The share of emitted light that counts as returned; half of it at a distance that grows with the power."""
-    if not power or far >= OBSTACLE_REACH:
+    more = _stronger(power, in_pulses=in_pulses)
+    if not more or far >= OBSTACLE_REACH:
         return 0.0
-    more = power / IR_POWER if in_pulses else 2.0 ** ((power - IR_POWER) / POWER_DOUBLES)
     return float(1 / (1 + (far / (OBSTACLE_HALF * more)) ** 4))
+
+
+def _stronger(power: int, *, in_pulses: bool) -> float:
+    """By how much farther light goes than with the usual power."""
+    if not power:
+        return 0.0
+    return power / IR_POWER if in_pulses else float(2.0 ** ((power - IR_POWER) / POWER_DOUBLES))

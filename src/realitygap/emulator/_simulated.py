@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -46,6 +46,34 @@ class SimulatedRobot(Protocol):
             mounts: (r, 3) forward [m], left [m] of the origin and direction [rad, positive to the left].
             reach: The largest distance that counts [m].
         """
+        ...
+
+
+@runtime_checkable
+class RobotOfItsOwn(SimulatedRobot, Protocol):
+    """A simulated robot that has more of its own than motion: noise, a Fluke's infrared, a battery.
+
+    Attributes:
+        rolls: Whether it still moves, or will, though its motors are off.
+    """
+
+    rolls: bool
+
+    def restart(self, seed: int) -> None:
+        """Take other random numbers from the next `place` on."""
+        ...
+
+    def obstacle(self, emitter: str, stronger: float) -> int:
+        """What a Fluke counts, 0 (free) to 6400 (near).
+
+        Args:
+            emitter: "left", "center" or "right".
+            stronger: By how much farther its light goes than with the usual power; 0 for no light.
+        """
+        ...
+
+    def volts(self, load: float) -> float:
+        """Of its battery, with the motors at a load of 0 to 1 [V]."""
         ...
 
 

@@ -11,7 +11,7 @@ from realitygap.world import Arena, Grid, Pose
 
 from ._motors import STEP_NS, STEP_S, Motors
 from ._power import Battery
-from ._simulated import SimulatedRobot
+from ._simulated import RobotOfItsOwn, SimulatedRobot
 from ._time import SECOND
 
 MOST_POINTS = 1_000_000  # of the path that are kept: 80 minutes of driving; the oldest go first
@@ -29,6 +29,7 @@ class Table:
 
     def __init__(self, robot: SimulatedRobot, motors: Motors, battery: Battery, arena: Arena) -> None:
         self.robot, self.motors, self.battery, self.arena = robot, motors, battery, arena
+        self._own = robot if isinstance(robot, RobotOfItsOwn) else None
         self.time = 0  # up to where it has been computed [ns]
         self._begin_path()
 
@@ -43,14 +44,15 @@ class Table:
         """Compute all steps that end by a time [ns]."""
         if now - self.time < STEP_NS:
             return
-        if not self.motors.turning:
-            self._stand(now)
-            return
         while now - self.time >= STEP_NS:
-            self._step()
-            if not self.motors.turning:
+            if not self._moves:
                 self._stand(now)
                 return
+            self._step()
+
+    @property
+    def _moves(self) -> bool:
+        return self.motors.turning or (self._own is not None and self._own.rolls)
 
     def _stand(self, now: int) -> None:
         """Nothing moves: as many steps as there are at once."""
@@ -64,7 +66,7 @@ class Table:
         self.battery.drain(self.motors.load, STEP_NS)
         self.time += STEP_NS
         self.motors.turned(self.time, *turned, slipping=self.robot.stalled)
-        if not self.robot.stalled:
+        if not self.robot.stalled or self.robot.pose != self._noted:
             self._note()
 
     @property
@@ -79,7 +81,8 @@ class Table:
         self._note()
 
     def _note(self) -> None:
-        self.points.extend((self.time / SECOND, *self.robot.pose))
+        self._noted = self.robot.pose
+        self.points.extend((self.time / SECOND, *self._noted))
         if len(self.points) > 4 * MOST_POINTS:
             self.cells()
             gone = len(self.points) // 16

@@ -1,8 +1,84 @@
-"""How far two platforms are apart: arrays of trials in, measures with intervals out."""
+"""How far two platforms are apart: arrays of trials in, measures with intervals out.
 
+`measure_gap` gives all measures; each has a file of its own, and can be had alone. No platform is run here.
+"""
+
+from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means
+from ._correlation import reliability, spearman, trials_for_reliability
+from ._coverage_map import CoverageMaps, coverage_maps
+from ._energy import energy_distances, energy_test, smallest_energy_p
+from ._equivalence import Equivalence, controllers_for_margin, equivalence_power, prove_equivalence
 from ._estimate import CONFIDENCE, Estimate
+from ._level import mean_difference, rms_of, shares_above, square_differences
+from ._means import difference_of_groups, mean_of
 from ._measure import measure_gap
+from ._plan import (
+    Needed,
+    plan_correlation,
+    plan_effect,
+    plan_margin,
+    spread_of_differences,
+    trial_reliability,
+)
+from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor
+from ._replay_error import ReplayError, replay_error
 from ._result import MEASURES, GapResult
+from ._shapley import coalitions, shapley_values
 from ._side import GapSide
+from ._verdict import verdict_of
+from ._why import Why, explain_gap
 
-__all__ = ["CONFIDENCE", "MEASURES", "Estimate", "GapResult", "GapSide", "measure_gap"]
+__all__ = [  # noqa: RUF022 - grouped by subject
+    # all of it
+    "measure_gap",
+    "GapSide",
+    "GapResult",
+    "Estimate",
+    "MEASURES",
+    "CONFIDENCE",
+    "verdict_of",
+    # level
+    "mean_difference",
+    "square_differences",
+    "rms_of",
+    "shares_above",
+    # order
+    "spearman",
+    "reliability",
+    "trials_for_reliability",
+    "mean_maximum_rank_violation",
+    "rank_violation_floor",
+    # behavior
+    "energy_distances",
+    "energy_test",
+    "smallest_energy_p",
+    "CoverageMaps",
+    "coverage_maps",
+    "ReplayError",
+    "replay_error",
+    # equivalence, and what n can carry
+    "Equivalence",
+    "prove_equivalence",
+    "equivalence_power",
+    "controllers_for_margin",
+    "Needed",
+    "plan_effect",
+    "plan_margin",
+    "plan_correlation",
+    "spread_of_differences",
+    "trial_reliability",
+    # means of a few
+    "mean_of",
+    "difference_of_groups",
+    # resampling
+    "SMALLEST_N",
+    "resampled",
+    "shrunk_means",
+    "bootstrap",
+    "interval",
+    # why
+    "Why",
+    "explain_gap",
+    "coalitions",
+    "shapley_values",
+]

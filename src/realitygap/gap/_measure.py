@@ -2,11 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from . import _bootstrap
+from ._bootstrap import SMALLEST_N, bootstrap, bootstrap_mean, interval
+from ._correlation import reliability, spearman, trials_for_reliability
+from ._energy import ALPHA, energy_distances, energy_test, smallest_energy_p
+from ._equivalence import POWER, prove_equivalence
+from ._estimate import Estimate
+from ._level import mean_difference, rms_of, shares_above, square_differences
+from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor
 from ._result import GapResult
-from ._side import GapSide
+from ._side import GapSide, Values
 
 SEED = 7
 """Of every random draw in a measure, so that the same trials give the same numbers."""
+
+RESAMPLES = 2_000
+
+LEAST_RELIABILITY = 0.2
+"""Less is noise above all: a correlation over a ceiling so low can be anything."""
+
+WANTED_RELIABILITY = 0.5
+"""For which it is said how many trials it takes."""
+
+_FEW_SPLITS = 6
+"""Halves in each resample, whose number makes up for how few they are."""
 
 
 def measure_gap(
@@ -15,7 +39,7 @@ def measure_gap(
     *,
     margin: float | None = None,
     misspecified: bool | None = None,
-    resamples: int = 2_000,
+    resamples: int = RESAMPLES,
     seed: int = SEED,
 ) -> GapResult:
     """Measure the gap between a simulator and a target from trials of the same controllers on both.
@@ -28,7 +52,223 @@ def measure_gap(
         resamples: Of the bootstrap.
         seed: Of all random draws.
 
+    Returns:
+        All measures. What n cannot carry is refused there, with the n that would.
+
     Raises:
         ValueError: The sides differ in controllers, or a number is out of range.
     """
-    raise NotImplementedError
+    if source.n != target.n:
+        raise ValueError(
+            f"{source.name} has {source.n} controllers and {target.name} {target.n}, expected the same ones."
+        )
+    if margin is not None and not (math.isfinite(margin) and margin > 0):
+        raise ValueError(f"margin is {margin}, expected a number above 0, such as 0.05.")
+    work = _Work(source, target, resamples, np.random.default_rng(seed))
+    return GapResult(
+        source.name,
+        target.name,
+        (source.label, target.label),
+        (source.trials, target.trials),
+        rms=work.rms(),
+        level=work.level(),
+        a12=work.a12(),
+        srcc=work.srcc(),
+        srcc_disattenuated=work.disattenuated(),
+        noise_ceiling=work.ceiling(),
+        mmrv=work.mmrv(),
+        mmrv_floor=work.mmrv_floor(),
+        energy=work.energy(
+            source.cells.astype(float), target.cells.astype(float), "which cells were crossed"
+        ),
+        energy_ends=work.energy(source.ends, target.ends, "where trials end (observe track)"),
+        equivalence=work.equivalence(margin),
+        misspecified=misspecified,
+    )
+
+
+class _Work:
+    """Trials of both sides, the statistics of their resamples, and one method for each measure."""
+
+    def __init__(self, source: GapSide, target: GapSide, n_resamples: int, rng: np.random.Generator) -> None:
+        self.source, self.target, self.n = source, target, source.n
+        self.n_resamples, self.rng = n_resamples, rng
+        self.pair = source.values[None], target.values[None]
+        self.fewest = min(source.trials, target.trials)
+        self.alike = [side.name for side in (source, target) if np.ptp(side.means) == 0]
+        statistics: dict[str, _bootstrap.Statistic] = {"level": mean_difference}
+        if self.fewest >= 2:
+            statistics["square"] = lambda one, other: square_differences(one, other).mean(axis=1)
+        self.drawn = bootstrap(statistics, source, target, n_resamples, rng)
+        if self.n >= 2 and not self.alike:
+            self._draw_orders()
+
+    def _draw_orders(self) -> None:
+        """Statistics of ranks, and reliability of both sides of the same resamples."""
+        ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc, "mmrv": _mmrv}
+        if self.fewest >= 2:
+            ranks |= {
+                "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
+                "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
+                "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS),
+            }
+        self.drawn |= bootstrap(ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True)
+        if self.fewest < 2:
+            return
+        self.reliabilities = tuple(float(reliability(values, self.rng)[0]) for values in self.pair)
+
+    def _estimate(
+        self, value: float, drawn: Values, change: Callable[[Values], Values] | None = None
+    ) -> Estimate:
+        low, high = interval(drawn, self.n)
+        if low is None or high is None:
+            return Estimate(value, None, None, self.n, _no_interval(self.n))
+        if change is not None:
+            low, high = (float(change(np.array(end))) for end in (low, high))
+        # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
+        return Estimate(value, min(low, value), max(high, value), self.n)
+
+    # --- level ----------------------------------------------------------------------------------------------
+
+    def level(self) -> Estimate:
+        return self._estimate(float(mean_difference(*self.pair)[0]), self.drawn["level"])
+
+    def rms(self) -> Estimate:
+        if self.fewest < 2:
+            return Estimate.refusal(
+                self.n,
+                "One trial of each controller does not tell noise from a gap; 2 of each on both sides would.",
+            )
+        square = square_differences(*self.pair).mean(axis=1)
+        return self._estimate(float(rms_of(square)[0]), self.drawn["square"], rms_of)
+
+    def a12(self) -> Estimate:
+        shares = shares_above(self.source.values, self.target.values)
+        return self._estimate(float(shares.mean()), bootstrap_mean(shares, self.n_resamples, self.rng))
+
+    # --- order ----------------------------------------------------------------------------------------------
+
+    def _no_order(self) -> Estimate | None:
+        if self.n < SMALLEST_N:
+            return Estimate.refusal(
+                self.n,
+                f"An order of {self.n} controllers comes about by chance too easily (a perfect one in 1 of "
+                f"{math.factorial(self.n)}); {SMALLEST_N} would carry it.",
+            )
+        if self.alike:
+            return Estimate.refusal(
+                self.n,
+                f"On {' and '.join(self.alike)} all controllers do equally well, so there is no order; controllers "
+                "that differ would carry it.",
+            )
+        return None
+
+    def srcc(self) -> Estimate:
+        return self._no_order() or self._estimate(float(_srcc(*self.pair)[0]), self.drawn["srcc"])
+
+    def mmrv(self) -> Estimate:
+        return self._no_order() or self._estimate(float(_mmrv(*self.pair)[0]), self.drawn["mmrv"])
+
+    def _no_halves(self) -> Estimate | None:
+        if self.fewest < 2:
+            return Estimate.refusal(
+                self.n, "One trial of each controller has no halves; 2 on both sides would."
+            )
+        return self._no_order()
+
+    def ceiling(self) -> Estimate:
+        return self._no_halves() or self._estimate(
+            float(np.sqrt(np.prod(self.reliabilities))), np.sqrt(self.drawn["source"] * self.drawn["target"])
+        )
+
+    def disattenuated(self) -> Estimate:
+        refused = self._no_halves() or self._unreliable()
+        if refused:
+            return refused
+        drawn = self.drawn
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = drawn["srcc"] / np.sqrt(drawn["source"] * drawn["target"])
+        value = float(_srcc(*self.pair)[0] / np.sqrt(np.prod(self.reliabilities)))
+        found = self._estimate(_within_one(value), ratios, lambda end: np.clip(end, -1.0, 1.0))
+        return Estimate(found.estimate, found.low, found.high, found.n, found.refused, {"unclipped": value})
+
+    def _unreliable(self) -> Estimate | None:
+        for side, found in zip((self.source, self.target), self.reliabilities, strict=True):
+            if found < LEAST_RELIABILITY:
+                trials = trials_for_reliability(found, side.trials, WANTED_RELIABILITY)
+                would = (
+                    f"{trials} trials of each controller would"
+                    if trials is not None
+                    else "more trials would have to show first that controllers differ at all"
+                )
+                return Estimate.refusal(
+                    self.n,
+                    f"{side.name} does not repeat its own order (reliability {found:.2f} with {side.trials} trials of "
+                    f"each controller), so nothing can be set against it; {would}.",
+                )
+        return None
+
+    def mmrv_floor(self) -> Estimate:
+        return self._no_halves() or self._estimate(
+            float(rank_violation_floor(self.target.values[None], self.rng)[0]), self.drawn["floor"]
+        )
+
+    # --- behavior -------------------------------------------------------------------------------------------
+
+    def energy(self, one: Values, other: Values, what: str) -> Estimate:
+        if not (len(one) and len(other)):
+            return Estimate.refusal(self.n, f"Nobody saw {what} on both sides.")
+        if self.fewest < 2:
+            return Estimate.refusal(
+                self.n, "An energy distance needs 2 trials of each controller on both sides."
+            )
+        distances = energy_distances(one, other)
+        found = self._estimate(float(distances.mean()), bootstrap_mean(distances, self.n_resamples, self.rng))
+        smallest = smallest_energy_p(self.n, self.source.trials, self.target.trials)
+        p = energy_test(one, other, self.rng) if smallest < ALPHA else None
+        more = {"p": p}
+        why = "" if p is not None else f"So few trials give no p below {smallest:.2f}; twice as many would. "
+        return Estimate(found.estimate, found.low, found.high, self.n, (why + found.refused).strip(), more)
+
+    # --- equivalence ----------------------------------------------------------------------------------------
+
+    def equivalence(self, margin: float | None) -> Estimate:
+        if self.n < 2:
+            return Estimate.refusal(
+                self.n, "One controller does not tell how differences vary; 5 would.", margin=margin
+            )
+        found = prove_equivalence(self.target.means - self.source.means, margin)
+        more = {"margin": margin, "equivalent": found.equivalent}
+        why = ""
+        if margin is None:
+            why = "No margin was named (--margin), so equivalence is not tested."
+        else:
+            more["p"] = found.p
+            if not found.equivalent and found.power < POWER:
+                more["equivalent"] = None
+                why = _too_few(self.n, margin, found.power, found.needed)
+        return Estimate(found.difference, found.low, found.high, self.n, why, more)
+
+
+def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
+    would = f"{needed:,} would in 80 of 100" if needed is not None else "no number of controllers would"
+    return (
+        f"{n} controllers show equivalence at ±{margin:g} in {100 * power:.0f} of 100 studies even where there is no "
+        f"difference; {would}."
+    )
+
+
+def _no_interval(n: int) -> str:
+    return f"{n} controllers give no interval; {SMALLEST_N} would."
+
+
+def _within_one(value: float) -> float:
+    return max(-1.0, min(1.0, value))
+
+
+def _srcc(source: Values, target: Values) -> Values:
+    return spearman(source.mean(axis=2), target.mean(axis=2))
+
+
+def _mmrv(source: Values, target: Values) -> Values:
+    return mean_maximum_rank_violation(source.mean(axis=2), target.mean(axis=2))

@@ -45,12 +45,12 @@ class GapSide:
     @property
     def n(self) -> int:
         """Controllers."""
-        return self.values.shape[0]
+        return len(self.values)
 
     @property
     def trials(self) -> int:
         """Trials of each."""
-        return self.values.shape[1]
+        return int(self.values.shape[1])
 
     @property
     def means(self) -> Values:

@@ -86,10 +86,9 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
         ValueError: Something is missing, or not of the shape that it has in a trial.
     """
     try:
-        x, y, heading = map(float, values["start"])
-        battery_v = values["battery_v"]
+        battery_v, measured = values["battery_v"], values.get("end_pose")
         trial = ObservedTrial(
-            start=(x, y, heading),
+            start=_pose(values["start"]),
             step_s=float(values["step_s"]),
             commands=_table("commands", values),
             readings=_table("readings", values),
@@ -102,6 +101,7 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
             purpose=str(values["purpose"]),
             battery_v=math.nan if battery_v is None else float(battery_v),
             end=str(values["end"]),
+            end_pose=None if measured is None else _pose(measured),
         )
     except KeyError as error:
         raise ValueError(f"a trial without {error}") from None
@@ -118,6 +118,11 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
         if n != t:
             raise ValueError(f"a trial with {t} commands whose {name} are of {n}")
     return trial
+
+
+def _pose(values: Any) -> tuple[float, float, float]:
+    x, y, heading = map(float, values)
+    return x, y, heading
 
 
 def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:

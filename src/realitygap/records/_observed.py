@@ -34,6 +34,8 @@ class ObservedTrial:
         purpose: What it was driven for, such as controller, path, sensors, motion, contact.
         battery_v: At its start [V]; nan where it is not known.
         end: Why it ended, as `EndReason` has it.
+        end_pose: Where it stood at its end by a ruler: x [m], y [m], heading [rad] with all full turns from that of
+            the start on; None where nobody measured.
     """
 
     start: tuple[float, float, float]
@@ -49,6 +51,7 @@ class ObservedTrial:
     purpose: str = "controller"
     battery_v: float = float("nan")
     end: str = "step limit"
+    end_pose: tuple[float, float, float] | None = None
 
     @property
     def observe(self) -> Observe:

@@ -8,11 +8,12 @@ from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
 from ._scribbler_platform import ScribblerPlatform
-from ._sim import ARENA, DEFAULT_ROBOT, SimPlatform
+from ._sim import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform
 
 __all__ = [
     "ARENA",
     "DEFAULT_ROBOT",
+    "NOISE",
     "STEP_S",
     "Clock",
     "Command",

@@ -14,6 +14,12 @@ from ._random import LIGHT, numbers_for
 DARK = 1e-12  # light below which no pulse is seen
 
 
+def places_of(model: TwinModel) -> list[tuple[float, float]]:
+    """Where each sensor is, x and y [m]: with the shell its place is scaled."""
+    body = model.body
+    return [(mount.x * body.length_scale, mount.y * body.width_scale) for mount in model.ir.mount]
+
+
 class IrSensors:
     """The infrared sensors of one twin in one trial.
 
@@ -30,6 +36,7 @@ class IrSensors:
         ir = self._ir = model.ir
         self._seed, self._number = model.seed, number
         self._full, self._odd = model.battery.full, model.oddities
+        self._places = places_of(model)
         parts = np.linspace(-1.0, 1.0, ir.rays) if ir.rays > 1 else np.zeros(1)
         self._spread = parts * ir.cone
         weights = 1 - 0.5 * parts**2
@@ -42,22 +49,24 @@ class IrSensors:
         ir = self._ir
         found: dict[tuple[float, float, float], float] = {}
         values = []
-        for mount in ir.mount:
-            where = (mount.x, mount.y, mount.direction)
+        for mount, (x, y) in zip(ir.mount, self._places, strict=True):
+            where = (x, y, mount.direction)
             if where not in found:
-                far, cosine = physics.look(mount.x, mount.y, mount.direction + self._spread, ir.reach)
+                far, cosine = physics.look(x, y, mount.direction + self._spread, ir.reach)
                 back = (ir.half / np.maximum(far, 1e-3)) ** 2 * cosine**ir.incidence
                 found[where] = float(self._weights @ np.where(far < ir.reach, back, 0.0))
             values.append(mount.gain * found[where])
         light: NDArray[np.float64] = np.array(values) * (max(volts, 0.0) / self._full) ** ir.supply
         return light
 
-    def readings(self, physics: Physics, volts: float, step: int) -> NDArray[np.float64]:
-        """(s,) the share of pulses counted before command `step`, 0..1."""
+    def readings(
+        self, physics: Physics, volts: float, step: int, stronger: float = 1.0
+    ) -> NDArray[np.float64]:
+        """(s,) the share of pulses counted before command `step`, 0..1; light may go farther than usual."""
         odd = self._odd
         if odd.latch and self._held is not None and step - self._held[0] <= odd.latch:
             return self._held[1]
-        counts = self.count(self.light(physics, volts), step)
+        counts = self.count(self.light(physics, volts) * stronger**2, step)
         readings = counts / self._ir.pulses
         if odd.inverted:
             readings = 1.0 - readings

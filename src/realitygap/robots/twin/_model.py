@@ -24,7 +24,7 @@ SHELL = (
 )
 
 
-class TwinBody(Settings):
+class TwinChassis(Settings):
     """What can collide, and how heavy it is."""
 
     corners: tuple[tuple[Offset, Offset], ...] = Field(
@@ -155,8 +155,8 @@ class TwinBattery(Settings):
 class TwinMount(Settings):
     """Where an infrared sensor is."""
 
-    x: Offset = Field(0.089, description="Ahead of the pen [m].")
-    y: Offset = Field(0.0, description="To the left of it [m].")
+    x: Offset = Field(0.089, description="Ahead of the pen [m], before the shell is scaled.")
+    y: Offset = Field(0.0, description="To the left of it [m], likewise.")
     direction: Angle = Field(0.0, description="In which it looks, positive to the left [rad].")
     gain: Annotated[float, Field(ge=0, le=10)] = Field(
         1.0, description="By which its light is stronger than that of others."
@@ -285,7 +285,7 @@ class TwinModel(Settings):
         "which there is no gap. Of all else in the file, sim takes only step_s and seed.",
     )
     step_s: Annotated[float, Field(ge=0.02, le=60)] = Field(0.5, description="How long a command lasts [s].")
-    body: TwinBody = TwinBody()
+    body: TwinChassis = TwinChassis()
     wheels: TwinWheels = TwinWheels()
     walls: TwinWalls = TwinWalls()
     motors: TwinMotors = TwinMotors()

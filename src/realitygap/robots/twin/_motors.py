@@ -13,6 +13,7 @@ TICK_S = 0.020  # of the S2's regulator
 STEPS = 12  # of speed at full command
 LOWEST = 2
 NOMINAL = 0.15  # speed of an S2 at full command [m/s]
+STEADY = 0.002  # a lag that has no more to do than this is over [m/s]
 STANDING = (0.0, 0.0)
 
 
@@ -40,6 +41,11 @@ class SpeedSteps:
         self._shares, self._target = shares, max(LOWEST, fastest // 16)
         self._step = min(self._step, self._target)
 
+    @property
+    def is_steady(self) -> bool:
+        """Whether the speed stays as it is."""
+        return self._step == self._target
+
     def tick(self) -> tuple[float, float]:
         """Speeds for the next 20 ms, left and right, as shares of full speed."""
         step = self._step / STEPS
@@ -49,6 +55,8 @@ class SpeedSteps:
 
 class PlainSpeeds:
     """Speeds as they were commanded, at once."""
+
+    is_steady = True
 
     def __init__(self) -> None:
         self._shares = STANDING
@@ -68,6 +76,7 @@ class Servo:
     Attributes:
         volts: Of the battery now [V].
         time: Since the trial began [s].
+        is_steady: Whether the lag had caught up when speeds were last asked for.
     """
 
     def __init__(self, model: TwinModel, number: int) -> None:
@@ -79,6 +88,7 @@ class Servo:
         self._wander = [float(each) for each in wander]
         self._left = self._right = 0.0
         self._used = 0.0
+        self.is_steady = True
         self.time = 0.0
         self.volts = self._battery.volts
 
@@ -117,6 +127,7 @@ class Servo:
             left *= self._on_patch(pose, 1)
             right *= self._on_patch(pose, -1)
         keep = math.exp(-seconds / motors.lag) if motors.lag else 0.0
+        self.is_steady = abs(self._left - left) + abs(self._right - right) < STEADY
         self._left = left + (self._left - left) * keep
         self._right = right + (self._right - right) * keep
         self.time += seconds
@@ -126,8 +137,12 @@ class Servo:
         """Share of the speed that the battery leaves."""
         battery = self._battery
         self._used += battery.fall_per_s * work * seconds
-        self.volts = battery.volts - self._used - battery.sag * work
+        self.volts = self.volts_at(work)
         return max(0.0, 1 - battery.slows * (1 - self.volts / battery.full))
+
+    def volts_at(self, load: float) -> float:
+        """Of the battery with the motors at a load of 0 to 1 [V]."""
+        return self._battery.volts - self._used - self._battery.sag * load
 
     def _stray(self, seconds: float) -> None:
         """Let the wheels' speeds wander on."""

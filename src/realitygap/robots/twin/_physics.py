@@ -25,7 +25,12 @@ EYE_ABOVE = 0.05  # of the floor, where sensors look [m]
 @functools.lru_cache(maxsize=16)
 def _compiled(text: str) -> Any:
     """The model of a text in MuJoCo's XML; it is only read."""
-    return from_extra("mujoco", "twin").MjModel.from_xml_string(text)
+    mujoco = from_extra("mujoco", "twin")
+    if mujoco.get_mju_user_warning() is None:
+        mujoco.set_mju_user_warning(
+            lambda _: None
+        )  # else it leaves MUJOCO_LOG.TXT behind; `move` tells of trouble
+    return mujoco.MjModel.from_xml_string(text)
 
 
 class Physics:
@@ -63,6 +68,12 @@ class Physics:
         self._speed[:] = 0.0
         data.time = 0.0
         mujoco.mj_forward(self.mj_model, data)
+
+    def stand(self, pose: Pose) -> None:
+        """Show it at a pose, without physics."""
+        half = pose.heading / 2
+        self._place[:7] = pose.x, pose.y, self.radius, math.cos(half), 0.0, 0.0, math.sin(half)
+        self._mujoco.mj_forward(self.mj_model, self.mj_data)
 
     def move(self, left: float, right: float, steps: int) -> None:
         """Let time pass with the motors at speeds of their wheels [m/s].

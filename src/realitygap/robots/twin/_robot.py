@@ -27,6 +27,7 @@ from ._stall import Idler
 
 FULL_SCALE = 6400.0  # of a Fluke's obstacle reading
 TICK_STEPS = round(TICK_S / STEP_S)
+CRUISE_STEPS = 2 * TICK_STEPS  # while nothing changes but slowly
 
 
 class TwinClock:
@@ -106,6 +107,7 @@ class TwinRobot:
         self._steps = self._phase = 0
         self._turned = (0.0, 0.0)
         self._points = [tuple(self._start)]
+        self._times = [0.0]
         self._seen: Observation | None = None
         self.n_steps = 0
 
@@ -148,7 +150,8 @@ class TwinRobot:
                 self._phase = 0
             if not self._phase:
                 self._speeds = self._regulator.tick()
-            n = min(TICK_STEPS - self._phase, end - self._steps)
+            whole = CRUISE_STEPS if self._regulator.is_steady and self._servo.is_steady else TICK_STEPS
+            n = min(whole - self._phase, end - self._steps)
             if self._heard:
                 n = min(n, self._heard[0][0] - self._steps)
             self._pass(n)
@@ -167,6 +170,7 @@ class TwinRobot:
         self._encoders.turn(turned[0] - before[0], turned[1] - before[1])
         self._turned = turned
         self._points.append(tuple(pose))
+        self._times.append(self._steps * STEP_S)
 
     def stop(self) -> None:
         """Stop the motors; safe to call at any moment, and twice."""
@@ -213,8 +217,12 @@ class TwinRobot:
         return self._servo.volts
 
     def path(self) -> NDArray[np.float64]:
-        """(n, 3) x [m], y [m] and heading [rad] since the start, each 20 ms or more often: the line of the pen."""
+        """(n, 3) x [m], y [m] and heading [rad] since the start, each 40 ms or more often: the line of the pen."""
         return np.array(self._points)
+
+    def times(self) -> NDArray[np.float64]:
+        """(n,) since the start of each point of `path` [s]."""
+        return np.array(self._times)
 
     @property
     def visited_cells(self) -> tuple[int, ...]:

@@ -1,0 +1,63 @@
+"""The parameters of motion and of contact, taken from what is thought possible of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from realitygap.world import RobotModel
+
+from ._prior import Parameter, numbers_of, scribbler_prior
+from ._simulate import Floats, plain_numbers
+
+MOTION = (
+    "drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "drive.lag", "drive.delay", "drive.slip",
+    "drive.drift_per_m", "drive.battery_sag",
+)  # fmt: skip
+"""What decides the mean of a motion, smoothly."""
+
+MOTION_NOISE = (
+    "drive.delay_jitter", "drive.travel_noise_per_m", "drive.heading_noise_per_m", "drive.heading_noise_per_s",
+)  # fmt: skip
+"""What decides how motions scatter."""
+
+CONTACT = ("contact.friction", "contact.lat", "contact.ang")
+"""What decides how a robot gives way; `contact.long` is 1: only ratios count."""
+
+BELOW_ONE = 1.0 - 1e-12  # distributions are asked for places below 1
+Known = Mapping[str, Parameter]
+
+
+def parameters_of(robot: RobotModel, prior: Sequence[Parameter] | None = None) -> dict[str, Parameter]:
+    """What is thought possible of each parameter by name; of a Scribbler where no prior is given."""
+    return {parameter.name: parameter for parameter in prior or scribbler_prior(robot)}
+
+
+def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floats]:
+    """(m,) of each parameter at places (m, p) between the ends of its prior, 0..1, each as likely."""
+    return {
+        parameter.name: parameter.prior.of(np.clip(place, 0.0, BELOW_ONE))
+        for parameter, place in zip(parameters, places.T, strict=True)
+    }
+
+
+def place_of(parameter: Parameter, value: float) -> float:
+    """Where a value lies between the ends of the prior, 0..1; the nearest end where it lies beyond."""
+    low, high = parameter.prior.lowest, parameter.prior.highest
+    inside = min(max(value, low), high)
+    return float((parameter.scale(inside) - parameter.scale(low)) / parameter.width)
+
+
+def own_values(robot: RobotModel) -> dict[str, float]:
+    """Values of the parameters with the robot's own numbers."""
+    now = plain_numbers(robot)
+    left, right = now["drive.gain_left"], now["drive.gain_right"]
+    return {**now, "drive.gain": (left + right) / 2, "drive.asymmetry": left - right}
+
+
+def robot_numbers(known: Known, robot: RobotModel, values: Mapping[str, Floats]) -> dict[str, Floats]:
+    """(m,) of each of the robot's numbers that parameters (m,) stand for."""
+    plain = {name: value for name, value in values.items() if name not in known}
+    given = {name: value for name, value in values.items() if name in known}
+    return plain | numbers_of([known[name] for name in given], given, robot)

@@ -1,0 +1,114 @@
+"""What observations can tell of parameters, which only together, and what to record to tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from realitygap.records import OBSERVATIONS, Observe
+
+from ._handles import Known, place_of
+from ._prior import Parameter
+from ._simulate import Floats
+
+TELLS = 0.5  # of the prior's interval: a posterior wider than this is said not to be identified
+LEARNED = 20.0  # times the prior's precision: a parameter that would be known if the others were
+UNLEARNED = 6.0  # times the prior's precision along a direction: below it that direction is not known
+TOGETHER = 0.25  # share of a direction from which on a parameter belongs to it
+PRIOR_PRECISION = 12.0  # of an even prior over 0..1
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What was learned of a parameter.
+
+    Attributes:
+        ratio: Width of its posterior interval in parts of the prior's.
+        identified: Whether that is less than half.
+        partners: Parameters from which it cannot be told: only together they are known.
+    """
+
+    ratio: float
+    identified: bool
+    partners: tuple[str, ...] = ()
+
+
+def collinear_groups(sensitivities: Floats, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Groups of parameters that the observations know only together.
+
+    Args:
+        sensitivities: (n, p) derivatives of what was observed, in standard deviations of its noise, by each parameter
+            in parts of what was thought possible.
+        names: (p,) of the parameters.
+
+    Source: eigenvectors of the Fisher information, as in the profile of sloppy models (Gutenkunst et al. 2007).
+    """
+    information = sensitivities.T @ sensitivities
+    sizes, directions = np.linalg.eigh(information)
+    groups = []
+    for size, direction in zip(sizes, directions.T, strict=True):
+        if size >= UNLEARNED * PRIOR_PRECISION:
+            continue
+        group = tuple(
+            names[k]
+            for k in range(len(names))
+            if direction[k] ** 2 >= TOGETHER**2 and information[k, k] >= LEARNED * PRIOR_PRECISION
+        )
+        if len(group) > 1:
+            groups.append(group)
+    return groups
+
+
+def identify_from(
+    draws: Mapping[str, Floats], known: Known, sensitivities: Floats, free: Sequence[Parameter]
+) -> dict[str, Identified]:
+    """What was learned of each parameter, from draws of its posterior."""
+    groups = collinear_groups(sensitivities.reshape(-1, len(free)), [parameter.name for parameter in free])
+    found = {}
+    for name, values in draws.items():
+        low, high = np.quantile(values, [0.05, 0.95])
+        ratio = (place_of(known[name], float(high)) - place_of(known[name], float(low))) / 0.9
+        partners = sorted({other for group in groups if name in group for other in group} - {name})
+        found[name] = Identified(ratio, ratio < TELLS, tuple(partners))
+    return found
+
+
+WHEELS = "record the wheels' encoders (observe = encoders)"
+CAMERA = "record poses with a camera (observe = track)"
+
+RUNS = "drive straight, and turn in place, for longer"
+CHANGES = "change the command at every step, to and fro"
+SLOW = "give slow commands, one after the other"
+SPEEDS = "repeat runs at full and at low speed"
+ANGLES = "drive into walls at angles of 20 to 70 degrees, on both sides"
+LONG = "let trials last 100 commands"
+
+ADVICE: dict[str, tuple[str, str, str]] = {
+    "drive.gain": (f"drive straight from one wall to the other, or {WHEELS}", RUNS, RUNS),
+    "drive.asymmetry": (WHEELS, RUNS, RUNS),
+    "drive.track": (f"turn in place beside a wall for a whole trial, or {CAMERA}", CAMERA, RUNS),
+    "drive.axle": (CAMERA, CAMERA, "turn in place, both ways"),
+    "drive.lag": (WHEELS, f"{CHANGES}, with shorter steps", f"{CHANGES}, with shorter steps"),
+    "drive.delay": (WHEELS, CHANGES, CHANGES),
+    "drive.delay_jitter": (WHEELS, f"{CHANGES}, in more trials", f"{CHANGES}, in more trials"),
+    "drive.dead_band": (f"{WHEELS} under slow commands", SLOW, SLOW),
+    "drive.slip": (f"{WHEELS} and poses", CAMERA, f"{WHEELS} besides the poses"),
+    "drive.drift_per_m": (CAMERA, CAMERA, RUNS),
+    "drive.travel_noise_per_m": (CAMERA, CAMERA, "repeat long straight runs"),
+    "drive.heading_noise_per_m": (CAMERA, CAMERA, SPEEDS),
+    "drive.heading_noise_per_s": (CAMERA, CAMERA, SPEEDS),
+    "drive.battery_sag": (f"{WHEELS} in trials of 100 commands", LONG, LONG),
+    "contact.friction": (CAMERA, CAMERA, ANGLES),
+    "contact.lat": (CAMERA, CAMERA, "scrape along walls, turning into them"),
+    "contact.ang": (CAMERA, CAMERA, ANGLES),
+}
+"""What to record, where cells, encoders or a track were observed."""
+
+
+def advice_for(name: str, observe: Observe, partners: Sequence[str] = ()) -> str:
+    """What to record so that a parameter can be told, where this was observed."""
+    what = ADVICE[name][OBSERVATIONS.index(observe)] if name in ADVICE else "record more trials"
+    first = f"Known only together with {' and '.join(partners)}" if partners else "Not told from its prior"
+    return f"{first}: {what}."

@@ -1,0 +1,86 @@
+"""The likelihood of readings that are counts of pulses, as kernels/_sim_pulses.py draws them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ._ir_readings import Array, Placement, Places
+from ._ir_scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, Scale
+
+STRAY = 1e-6
+"""Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
+
+
+class PulseReadings:
+    """Counts of pulses at placements.
+
+    Args:
+        placements: Where, and what was read.
+        reach: Of the sensor [m].
+        pulses: Sent for one reading.
+        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+    """
+
+    def __init__(self, placements: list[Placement], reach: float, pulses: int, weight: float = 1.0) -> None:
+        self.places = Places.of(placements, reach)
+        self.pulses = pulses
+        self.weight = weight
+        self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
+        if self.places.battery_varied:
+            self.scales += (BATTERY,)
+        self.counts = np.array([self.binned(placement.readings) for placement in placements])
+
+    @property
+    def bins(self) -> Array:
+        """(b,) what each bin of readings stands for."""
+        return np.arange(self.pulses + 1) / self.pulses
+
+    def binned(self, readings: Array) -> NDArray[np.int64]:
+        """(b,) how many readings of each count."""
+        counts = np.clip(np.rint(np.asarray(readings) * self.pulses), 0, self.pulses).astype(np.int64)
+        return np.bincount(counts, minlength=self.pulses + 1)
+
+    def probabilities(self, values: Array) -> Array:
+        """(m, p, b) of each count at each placement.
+
+        Args:
+            values: (m, d) of the parameters, in the order of `scales`.
+        """
+        return self._at(self.places, values)
+
+    def _at(self, places: Places, values: Array) -> Array:
+        amplitude, decay, most, at, width, burst = values[:, :6].T
+        per_volt = values[:, 6] if values.shape[1] > 6 else np.zeros(len(values))
+        back = np.clip(places.response(amplitude, decay, per_volt), 0.0, 1.0)
+        promised = np.floor(back * self.pulses + 0.5).astype(np.int64)
+        missed = np.clip(places.logistic(most, at, width), 1e-12, 1.0 - 1e-12)
+        k = np.arange(self.pulses + 1)
+        left = promised[..., None] - k
+        logs = np.log(missed)[..., None] * np.maximum(left, 0) + np.log1p(-missed)[..., None] * k
+        apart = np.where(left >= 0, _ways(self.pulses)[promised] * np.exp(logs), 0.0)
+        shared = np.where(k == promised[..., None], (1.0 - missed)[..., None], 0.0)
+        shared = shared + np.where(k == 0, missed[..., None], 0.0)
+        mixed = burst[:, None, None] * shared + (1.0 - burst)[:, None, None] * apart
+        return np.asarray((1.0 - STRAY) * mixed + STRAY / (self.pulses + 1))
+
+    def log_likelihood(self, values: Array) -> Array:
+        """(m,) of (m, d) parameters."""
+        logs = np.log(self.probabilities(values))
+        return np.asarray(self.weight * np.einsum("mpb,pb->m", logs, self.counts))
+
+    def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
+        """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
+        blank = [Placement(each, np.empty(0)) for each in distances]
+        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
+        summed = np.cumsum(chances, axis=1)
+        place = [(summed < share).sum(axis=1) for share in shares]
+        return chances @ self.bins, np.minimum(np.array(place), self.pulses) / self.pulses
+
+
+def _ways(pulses: int) -> Array:
+    """(e, k) in how many ways k of e pulses can be seen; 0 for more than e."""
+    e, k = np.mgrid[: pulses + 1, : pulses + 1]
+    left = np.maximum(e - k, 0)
+    return np.asarray(np.where(k <= e, np.exp(gammaln(e + 1) - gammaln(k + 1) - gammaln(left + 1)), 0.0))

@@ -1,0 +1,261 @@
+"""Motors fitted to observed motion: gains, track, lag, delay, slip, drift and noise, by multiple shooting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from realitygap.records import Observe, ObservedTrial
+from realitygap.world import Arena, Fitted, RobotModel
+
+from ._handles import MOTION, MOTION_NOISE, own_values, parameters_of, robot_numbers, values_at
+from ._identify import Identified, advice_for, identify_from
+from ._prior import Parameter
+from ._scatter import Scatter, scatter_parameters
+from ._shooting import (
+    FIRST_NOISE,
+    Problem,
+    best_place,
+    draw_posterior,
+    make_problem,
+    scatter_of,
+    typical_noise,
+    widening,
+)
+from ._simulate import Bools, Floats, Simulate, plain_numbers
+from ._windows import CHANNELS, make_windows
+
+METHOD = (
+    "Multiple shooting (Bock 1987): each window is simulated from where the robot was seen; least squares by "
+    "Levenberg-Marquardt, draws from the posterior of the model that is linear there, with noise as `sim` has it; "
+    "widened where trials disagree by more than that (sandwich covariance, clustered by trial)."
+)
+N_DRAWS = 200
+ROUNDS = 3  # of weights and least squares in turn
+DELAYS = (0.0, 0.15, 0.3, 0.5)  # from which a fit begins, as parts of the range: it may have several minima
+
+
+@dataclass(frozen=True)
+class MotionFit:
+    """Parts of a calibration.
+
+    Attributes:
+        fitted: The parameters with 90 % intervals.
+        numbers: Of the robot by dotted name: the estimate.
+        draws: (d,) of each number in draws from the posterior, jointly.
+        method: How.
+        notes: What else there is to say.
+        evidence: What figures are drawn from.
+    """
+
+    fitted: tuple[Fitted, ...]
+    numbers: dict[str, float]
+    draws: dict[str, tuple[float, ...]]
+    method: str = METHOD
+    notes: tuple[str, ...] = ()
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+def observed_as(trials: Sequence[ObservedTrial], observe: Observe | None) -> list[ObservedTrial]:
+    """Trials of which no more than this is known."""
+    shown = []
+    for trial in trials:
+        if observe in ("cells", "encoders"):
+            trial = replace(trial, poses=np.empty((0, 3)))
+        shown.append(replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial)
+    return shown
+
+
+def fit_motion(
+    trials: Sequence[ObservedTrial],
+    simulate: Simulate,
+    robot: RobotModel,
+    arena: Arena,
+    *,
+    observe: Observe | None = None,
+    prior: Sequence[Parameter] | None = None,
+    window: int = 1,
+    seed: int = 0,
+) -> MotionFit:
+    """Fit the drive of a robot to windows of trials in which it touched nothing.
+
+    Args:
+        trials: As observed: with poses, with the way of the wheels, or both.
+        simulate: Carries out trials in the arena, such as `SimEnsemble(...).replay`.
+        robot: On whose numbers the fit builds.
+        arena: Where it drove.
+        observe: Use no more than this of the trials.
+        prior: What is thought possible; `scribbler_prior` when not given.
+        window: Commands from one observed pose to the next that is compared.
+        seed: Of the draws.
+
+    Raises:
+        ValueError: No trial, trials with commands of different lengths, or none in which the robot moved freely and
+            was seen.
+
+    Source: Bock (1987), multiple shooting. Noise and intervals: Gelman et al. (2013), Bayesian Data Analysis, ch. 11
+        and 12; White (1982), the sandwich. Differs: even priors between ends.
+    """
+    seen = observed_as(trials, observe)
+    windows = make_windows(seen, robot, arena, window)
+    windows = windows.only(
+        ~windows.touching & np.isfinite(np.concatenate([windows.seen[1], windows.seen[2]], 1)).any(1)
+    )
+    if not len(windows.trial):
+        raise ValueError(
+            "In no trial a robot was seen to move away from walls, expected poses (observe = track) or the way of the "
+            "wheels (observe = encoders). Record trials of motion_plans that way."
+        )
+    known = parameters_of(robot, prior)
+    problem = make_problem(simulate, robot, known, windows, MOTION)
+    place, dead_band, noise = _solve(problem)
+    problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
+    return _report(problem, place, noise, dead_band, np.random.default_rng(seed))
+
+
+@dataclass(frozen=True)
+class DeadBand:
+    """Between which commands a wheel begins to turn: the posterior is even within parts of the range."""
+
+    estimate: float
+    edges: Floats
+    weights: Floats
+
+    def draws(self, rng: np.random.Generator, n: int) -> Floats:
+        """(n,) from its posterior."""
+        part = rng.choice(len(self.weights), n, p=self.weights)
+        return np.asarray(rng.uniform(self.edges[part], self.edges[part + 1]))
+
+
+def _solve(problem: Problem) -> tuple[Floats, DeadBand, Floats]:
+    noise = FIRST_NOISE
+    problem = problem.fixed_at(**{"drive.dead_band": plain_numbers(problem.robot)["drive.dead_band"]})
+    scatter = scatter_of(problem, problem.own)
+    place = _first_place(problem, scatter, noise)
+    rng = np.random.default_rng(0)
+    for _ in range(ROUNDS):
+        scatter = scatter_of(problem, place)
+        dead_band = _dead_band(problem, scatter, noise, place)
+        problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
+        place, _ = best_place(problem, scatter, noise, place)
+        off = np.nan_to_num(problem.off(place[None])[0])
+        noise = typical_noise(rng, scatter, off, scatter_parameters(problem.known), noise)
+    return place, dead_band, noise
+
+
+def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
+    names = [parameter.name for parameter in problem.free]
+    found = []
+    for delay in DELAYS if "drive.delay" in names else DELAYS[:1]:
+        first = problem.own.copy()
+        if "drive.delay" in names:
+            first[names.index("drive.delay")] = delay
+        found.append(best_place(problem, scatter, noise, first))
+    return min(found, key=lambda pair: pair[1])[0]
+
+
+def _dead_band(problem: Problem, scatter: Scatter, noise: Floats, place: Floats) -> DeadBand:
+    """Nothing depends on it but which commands move a wheel: a number for each gap between those given."""
+    prior = problem.known["drive.dead_band"].prior
+    low, high = prior.lowest, prior.highest
+    windows = problem.windows
+    move, turn = windows.commands[windows.trial, windows.first].T
+    wheels = np.abs(np.clip(np.concatenate([move - turn, move + turn]), -1, 1))
+    given = np.unique(np.round(wheels, 6))
+    edges = np.unique(np.concatenate([[low], given[(given > low) & (given < high)], [high]]))
+    middles = (edges[:-1] + edges[1:]) / 2
+    logs = np.array([_log_likelihood(problem, scatter, noise, place, float(at)) for at in middles])
+    weights = np.exp(np.maximum(logs - logs.max(), -500.0)) * np.diff(edges)
+    weights /= weights.sum()
+    own = own_values(problem.robot)["drive.dead_band"]
+    best = int(np.argmax(weights))
+    inside = edges[best] <= own <= edges[best + 1]
+    return DeadBand(float(own if inside else middles[best]), edges, weights)
+
+
+def _log_likelihood(
+    problem: Problem, scatter: Scatter, noise: Floats, place: Floats, dead_band: float
+) -> float:
+    off = problem.fixed_at(**{"drive.dead_band": dead_band}).off(place[None])[0]
+    return scatter.log_likelihood(np.nan_to_num(off), noise)
+
+
+def _report(
+    problem: Problem,
+    place: Floats,
+    noise: Floats,
+    dead_band: DeadBand,
+    rng: np.random.Generator,
+) -> MotionFit:
+    slopes = problem.slopes(place)
+    scatter = scatter_of(problem, place)
+    off = np.nan_to_num(problem.off(place[None])[0])
+    noises = scatter_parameters(problem.known)
+    places, scatters = draw_posterior(rng, scatter, place, slopes, off, noise, noises)
+    wide = widening(scatter, slopes, off, problem.windows.trial, np.median(scatters, axis=0))
+    places = np.clip(place + (places - place) * wide, 0.0, 1.0)
+    draws = values_at(problem.free, places)
+    draws |= {parameter.name: scatters[:, k] for k, parameter in enumerate(noises[: len(MOTION_NOISE)])}
+    draws["drive.dead_band"] = dead_band.draws(rng, len(places))
+    best = {name: float(value[0]) for name, value in values_at(problem.free, place[None]).items()}
+    own = own_values(problem.robot)
+    best["drive.dead_band"] = dead_band.estimate
+    observe = problem.windows.trials[0].observe
+    found = identify_from(draws, problem.known, scatter.whitened(slopes, noise), problem.free)
+    for name in MOTION_NOISE:
+        best[name] = float(np.median(draws[name])) if found[name].identified else own[name]
+    fitted = tuple(
+        _fitted(problem.known[name], best[name], draws[name], found[name], observe) for name in draws
+    )
+    numbers = robot_numbers(
+        problem.known, problem.robot, {name: np.array([value]) for name, value in best.items()}
+    )
+    kept = rng.choice(len(places), N_DRAWS, replace=False)
+    drawn = robot_numbers(problem.known, problem.robot, {name: value[kept] for name, value in draws.items()})
+    return MotionFit(
+        fitted,
+        {name: float(value[0]) for name, value in numbers.items()},
+        {name: tuple(value.tolist()) for name, value in drawn.items()},
+        notes=_notes(problem, noises, scatters),
+        evidence={"windows": len(off), "rms": dict(zip(CHANNELS, _rms(off, scatter.seen), strict=True))},
+    )
+
+
+def _rms(off: Floats, seen: Bools) -> list[float]:
+    return [
+        float(np.sqrt(np.mean(off[seen[:, k], k] ** 2))) if seen[:, k].any() else 0.0
+        for k in range(off.shape[1])
+    ]
+
+
+def _fitted(
+    parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
+) -> Fitted:
+    low, high = np.quantile(draws, [0.05, 0.95])
+    return Fitted(
+        name=parameter.name,
+        estimate=estimate,
+        low=float(low),
+        high=float(high),
+        prior_low=parameter.prior.lowest,
+        prior_high=parameter.prior.highest,
+        identified=found.identified,
+        unit=parameter.unit,
+        advice="" if found.identified else advice_for(parameter.name, observe, found.partners),
+    )
+
+
+def _notes(problem: Problem, noises: Sequence[Parameter], scatters: Floats) -> tuple[str, ...]:
+    said = {parameter.name: float(np.median(scatters[:, k])) for k, parameter in enumerate(noises)}
+    notes = [
+        f"{len(problem.windows.trial)} windows of {problem.windows.step_s:g} s in {len(problem.windows.trials)} trials"
+    ]
+    if problem.windows.trials[0].observe == "track":
+        notes.append(
+            f"camera: about {1000 * said['camera.place']:.1f} mm and {said['camera.angle']:.4f} rad; "
+            f"skid sideways: {1000 * said['skid.per_m']:.1f} mm after a meter"
+        )
+    return tuple(notes)

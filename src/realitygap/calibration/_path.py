@@ -1,0 +1,265 @@
+"""The paper's calibration of the path, and what it forgot: the length of a full step, and its turn.
+
+The robot drives five steps straight ahead at full speed, and turns for five steps on the spot. A ruler tells where it
+ends. The paper drove straight only: 13.75 in against 19.7 in of its simulation, which are 70 steps for 100 of the
+robot's (it took 87, as if the simulated path had four steps).
+
+Source: Rosenzweig & Remy, section 2.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from realitygap.records import ObservedTrial
+from realitygap.trials import TrialPlan
+from realitygap.world import Arena, Fitted, Pose, RobotModel
+
+from ._ruler import EXACT, Moved, moved_in
+
+Array = NDArray[np.float64]
+
+PATH_STEPS = 5
+"""Full-speed commands of a trial (section 2.2)."""
+
+REPEATS = 5
+"""Of each of the two paths, where no budget says otherwise."""
+
+ROBOT_STEPS = 100
+"""Commands of a trial on the paper's robot."""
+
+JYRO_STEP = 0.1
+"""What a full step is in the paper's simulation [m] (19.7 in are five)."""
+
+ENDS = (0.05, 0.95)
+
+STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
+
+Simulate = Callable[[ObservedTrial], Moved]
+"""How the simulated robot moves, without noise, in a trial with the same start and commands."""
+
+
+@dataclass(frozen=True)
+class PathFit:
+    """What was fitted to straight paths and turns.
+
+    Attributes:
+        fitted: Parameters with intervals.
+        numbers: Of the robot, by dotted name.
+        draws: (n,) of each.
+        notes: What else there is to say.
+        evidence: What was measured.
+    """
+
+    fitted: tuple[Fitted, ...]
+    numbers: Mapping[str, float]
+    draws: Mapping[str, Array]
+    notes: tuple[str, ...]
+    evidence: dict[str, list[float]] = field(default_factory=dict)
+
+
+def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
+    """Straight paths and turns on the spot, by turns, n in all, at least 2."""
+    xs = [x for wall in arena.walls for x in wall[::2]] or [0.0, 1.0]
+    ys = [y for wall in arena.walls for y in wall[1::2]] or [0.0, 1.0]
+    middle = (min(ys) + max(ys)) / 2
+    starts = {
+        STRAIGHT: Pose(arena.start.x, middle, 0.0),
+        TURNING: Pose((min(xs) + max(xs)) / 2, middle, 0.0),
+    }
+    kinds = [STRAIGHT, TURNING]
+    return [
+        TrialPlan(
+            start=starts[kinds[k % 2]],
+            commands=np.tile(kinds[k % 2], (PATH_STEPS, 1)),
+            number=k,
+            purpose="path",
+        )
+        for k in range(n)
+    ]
+
+
+def fit_path(
+    trials: Sequence[ObservedTrial],
+    simulate: Simulate,
+    robot: RobotModel,
+    rng: np.random.Generator,
+    *,
+    n_draws: int = 500,
+) -> PathFit:
+    """Gains of the wheels and the track, from where paths end.
+
+    Args:
+        trials: Of `path_plans`, with poses, the pose of their end, or encoders.
+        simulate: The robot on whose numbers the fit builds.
+        robot: The same as a description.
+        rng: Random numbers.
+        n_draws: From the posterior.
+
+    Returns:
+        The fit: wheels' gains and track as scale factors of the simulated way and turn, so that lag and delay stay what
+        the robot's file says of them. Intervals are Student's, from the spread of repeats and the step to which was
+        read.
+
+    Raises:
+        ValueError: No trial drove straight at full speed.
+    """
+    straight = _Measured.of(trials, STRAIGHT, robot)
+    turning = _Measured.of(trials, TURNING, robot)
+    if not straight.moved:
+        raise ValueError(
+            "There is no straight path: expected trials of full-speed commands straight ahead, move = 1 and turn = 0, "
+            "whose end was measured."
+        )
+    way = _mean([moved.way for moved in straight.moved], straight.length_step, n_draws, rng)
+    veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, n_draws, rng)
+    expected, base = simulate(straight.trials[0]), (robot.drive.gain_left + robot.drive.gain_right) / 2
+    gain = base * way / expected.way
+    track, turn = np.full(n_draws + 1, robot.drive.track), None
+    if turning.moved and not straight.by_encoders:
+        turn = _mean([moved.turned for moved in turning.moved], turning.angle_step, n_draws, rng)
+        track = robot.drive.track * (gain / base) * simulate(turning.trials[0]).turned / turn
+    uneven = robot.drive.gain_right - robot.drive.gain_left
+    uneven = uneven + (veer - expected.turned) * track * base / expected.way
+    numbers = {"drive.gain_left": gain - uneven / 2, "drive.gain_right": gain + uneven / 2}
+    rows = _rows(straight, way, expected.way, gain, uneven)
+    notes = [_in_jyro_steps(rows[1])]
+    if turn is None:
+        rows.append(_unknown_track(robot))
+        notes.append("Encoders tell how far wheels went, and not how far the robot turned.")
+    else:
+        numbers["drive.track"] = track
+        rows += _rows_of_turning(turning, turn, track, robot)
+    return PathFit(
+        tuple(rows),
+        {name: float(values[0]) for name, values in numbers.items()},
+        {name: values[1:] for name, values in numbers.items()},
+        tuple(notes),
+        {
+            "straight_m": [moved.way for moved in straight.moved],
+            "straight_turned_rad": [moved.turned for moved in straight.moved],
+            "turned_rad": [moved.turned for moved in turning.moved],
+        },
+    )
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """The trials of one kind, and how each moved."""
+
+    trials: list[ObservedTrial]
+    moved: list[Moved]
+
+    @classmethod
+    def of(
+        cls, trials: Sequence[ObservedTrial], command: tuple[float, float], robot: RobotModel
+    ) -> _Measured:
+        alike = [trial for trial in trials if len(trial.commands) and bool(np.all(trial.commands == command))]
+        measured = [(trial, moved_in(trial) or _by_encoders(trial, robot)) for trial in alike]
+        kept = [(trial, moved) for trial, moved in measured if moved is not None]
+        return cls([trial for trial, _ in kept], [moved for _, moved in kept])
+
+    @property
+    def by_encoders(self) -> bool:
+        """Whether nobody but encoders saw it."""
+        return any(trial.end_pose is None and not len(trial.poses) for trial in self.trials)
+
+    @property
+    def length_step(self) -> float:
+        return max((moved.length_step for moved in self.moved), default=EXACT)
+
+    @property
+    def angle_step(self) -> float:
+        return max((moved.angle_step for moved in self.moved), default=EXACT)
+
+
+def _by_encoders(trial: ObservedTrial, robot: RobotModel) -> Moved | None:
+    """By the ways of the wheels, with the track that the robot's file has; None without encoders."""
+    if not len(trial.wheels):
+        return None
+    left, right = trial.wheels[-1] - trial.wheels[0]
+    turned = float(right - left) / robot.drive.track
+    half = turned / 2
+    chord = float(left + right) / 2 * (np.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    return Moved(float(chord * np.cos(half)), float(chord * np.sin(half)), turned)
+
+
+def _mean(values: Sequence[float], step: float, n_draws: int, rng: np.random.Generator) -> Array:
+    """(1 + n,) the mean, and draws of where it may be.
+
+    Repeats that all read the same are as uncertain as what they were read to.
+    """
+    n = len(values)
+    variance = max(float(np.var(values, ddof=1)) if n > 1 else 0.0, step**2 / 12)
+    spread = student.rvs(max(n - 1, 1), size=n_draws, random_state=rng) * np.sqrt(variance / n)
+    mean: Array = np.mean(values) + np.concatenate([[0.0], spread])
+    return mean
+
+
+def _rows(straight: _Measured, way: Array, expected: float, gain: Array, uneven: Array) -> list[Fitted]:
+    """What straight paths tell."""
+    repeats, step = len(straight.moved), way / len(straight.trials[0].commands)
+    return [
+        _row("path.step_length", step, "m", (0.01, 0.2), repeats),
+        _row("path.jyro_steps", ROBOT_STEPS * step / JYRO_STEP, "", (10.0, 200.0), repeats),
+        _row("path.sim_steps", ROBOT_STEPS * way / expected, "", (50.0, 150.0), repeats),
+        _row("drive.gain", gain, "", (0.5, 1.5), repeats),
+        _row("drive.asymmetry", uneven, "", (-0.2, 0.2), repeats),
+    ]
+
+
+def _rows_of_turning(turning: _Measured, turn: Array, track: Array, robot: RobotModel) -> list[Fitted]:
+    """What turns on the spot tell."""
+    repeats, step = len(turning.moved), turn / len(turning.trials[0].commands)
+    return [
+        _row("path.step_turn", step, "rad", (0.0, 3.2), repeats),
+        _row("drive.track", track, "m", _track_prior(robot), repeats),
+    ]
+
+
+def _track_prior(robot: RobotModel) -> tuple[float, float]:
+    return 0.7 * robot.drive.track, 1.3 * robot.drive.track
+
+
+def _in_jyro_steps(steps: Fitted) -> str:
+    return (
+        f"{ROBOT_STEPS} steps of the robot are as long as {steps.estimate:.1f} ({steps.low:.1f} to {steps.high:.1f}) "
+        f"of {JYRO_STEP:g} m each, a full step of the paper's simulation. The paper took 87; its own lengths make it "
+        "70."
+    )
+
+
+def _row(name: str, values: Array, unit: str, prior: tuple[float, float], repeats: int) -> Fitted:
+    low, high = np.quantile(values[1:], ENDS)
+    identified = repeats > 1 and high - low < 0.5 * (ENDS[1] - ENDS[0]) * (prior[1] - prior[0])
+    return Fitted(
+        name=name,
+        estimate=float(values[0]),
+        low=float(low),
+        high=float(high),
+        prior_low=prior[0],
+        prior_high=prior[1],
+        identified=bool(identified),
+        unit=unit,
+        advice="" if identified else "Drive the path at least three times more: repeats tell how sure it is.",
+    )
+
+
+def _unknown_track(robot: RobotModel) -> Fitted:
+    low, high = _track_prior(robot)
+    return Fitted(
+        name="drive.track",
+        estimate=robot.drive.track,
+        low=low,
+        high=high,
+        prior_low=low,
+        prior_high=high,
+        identified=False,
+        unit="m",
+        advice="Turn on the spot at full speed, and measure by how much.",
+    )

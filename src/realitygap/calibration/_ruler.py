@@ -1,0 +1,92 @@
+"""What a ruler and a protractor tell of where a robot stands at the end of a trial."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from realitygap.records import ObservedTrial
+from realitygap.world import INCH
+
+RULER = INCH / 8
+"""Lengths are read to the eighth of an inch [m]."""
+
+PROTRACTOR = math.radians(1.0)
+"""Angles are read to the degree [rad]."""
+
+EXACT = 1e-6
+"""What a camera or an encoder is taken to tell lengths and angles to [m, rad]."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """From the start of a trial to its end.
+
+    Attributes:
+        ahead, left: As seen from the start [m].
+        turned: To the left, with all full turns [rad].
+        length_step, angle_step: To what they were read [m, rad].
+    """
+
+    ahead: float
+    left: float
+    turned: float
+    length_step: float = EXACT
+    angle_step: float = EXACT
+
+    @property
+    def way(self) -> float:
+        """Length of the arc that leads there; below 0 where that is behind the start [m]."""
+        chord, half = math.hypot(self.ahead, self.left), self.turned / 2
+        arc = chord * (half / math.sin(half) if 1e-9 < abs(half) < math.pi / 2 else 1.0)
+        return math.copysign(arc, self.ahead)
+
+
+def ruled(trial: ObservedTrial) -> ObservedTrial:
+    """What a person with a ruler has of a trial that a camera saw: the rounded pose of its end, and no other."""
+    moved = moved_by_camera(trial)
+    return replace(
+        trial,
+        poses=np.empty((0, 3)),
+        end_pose=end_pose_of(
+            trial,
+            round(moved.ahead / RULER) * RULER,
+            round(moved.left / RULER) * RULER,
+            round(moved.turned / PROTRACTOR) * PROTRACTOR,
+        ),
+    )
+
+
+def end_pose_of(trial: ObservedTrial, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
+    """The pose at the end of a trial, from what was measured as seen from its start [m, rad]."""
+    x, y, heading = trial.start
+    sine, cosine = math.sin(heading), math.cos(heading)
+    return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine, heading + turned
+
+
+def moved_by_camera(trial: ObservedTrial) -> Moved:
+    """From a camera's poses; turns are counted where no command turns by half a turn or more."""
+    headings = np.unwrap(trial.poses[:, 2])
+    x, y = trial.poses[-1, :2].tolist()
+    return _seen_from(trial, x, y, float(headings[-1] - headings[0]), EXACT, EXACT)
+
+
+def moved_in(trial: ObservedTrial) -> Moved | None:
+    """From the start of a trial to its end, by a camera or else by a ruler; None where neither was there."""
+    if len(trial.poses):
+        return moved_by_camera(trial)
+    if trial.end_pose is None:
+        return None
+    x, y, heading = trial.end_pose
+    return _seen_from(trial, x, y, heading - trial.start[2], RULER, PROTRACTOR)
+
+
+def _seen_from(
+    trial: ObservedTrial, x: float, y: float, turned: float, length_step: float, angle_step: float
+) -> Moved:
+    x0, y0, heading = trial.start
+    sine, cosine = math.sin(heading), math.cos(heading)
+    east, north = x - x0, y - y0
+    return Moved(east * cosine + north * sine, north * cosine - east * sine, turned, length_step, angle_step)

@@ -1,0 +1,183 @@
+"""Short windows of trials: what was observed of each, what a simulator has happen in it, and how the two differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from realitygap.records import ObservedTrial
+from realitygap.world import Arena, RobotModel
+
+from ._handles import Known, robot_numbers
+from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, plain_numbers, starts_of
+
+CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
+CHANNELS = ("along", "across", "turn", "left", "right")
+"""Of a window: where the axle's middle ended, along and across the way [m]; turn [rad]; way of the wheels [m]."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """w windows of some commands each, in k trials.
+
+    Attributes:
+        trials: In which they are.
+        trial: (w,) which.
+        first, last: (w,) rows of poses at its ends.
+        touching: (w,) whether the robot was near a wall at any row of it, or stalled.
+        seen: What was observed: (w, 3) poses before and after, (w, 2) way of the wheels [m]; not a number where
+            nothing was.
+        commands: (k, t, 2).
+        anchors: (k, t + 1, 3) poses where windows begin.
+        step_s: [s].
+    """
+
+    trials: tuple[ObservedTrial, ...]
+    trial: Ints
+    first: Ints
+    last: Ints
+    touching: Bools
+    seen: tuple[Floats, Floats, Floats]
+    commands: Floats
+    anchors: Floats
+    step_s: float
+
+    def only(self, which: Bools) -> Windows:
+        """Some of the windows; all trials are still carried out."""
+        before, after, wheels = self.seen
+        return Windows(
+            self.trials, self.trial[which], self.first[which], self.last[which], self.touching[which],
+            (before[which], after[which], wheels[which]), self.commands, self.anchors, self.step_s,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What m simulated robots did in w windows: (m, w, 3) poses at their ends, (m, w, 2) way of the wheels [m]."""
+
+    after: Floats
+    wheels: Floats
+
+
+def wrapped(angle: Floats) -> Floats:
+    """The same angles from -pi to pi [rad]."""
+    return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
+
+
+def make_windows(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, length: int = 1
+) -> Windows:
+    """All windows of `length` commands, end to end.
+
+    Raises:
+        ValueError: No trial, or steps of different lengths.
+    """
+    if not trials:
+        raise ValueError("There are no trials to fit to, expected at least one.")
+    lengths = sorted({trial.step_s for trial in trials})
+    if len(lengths) > 1:
+        raise ValueError(
+            f"Commands last {', '.join(f'{length:g}' for length in lengths)} s in different trials, expected one "
+            "length. Fit them apart."
+        )
+    commands = padded_commands(trials)
+    anchors = np.full((len(trials), commands.shape[1] + 1, 3), np.nan)
+    parts = []
+    outline = _outline(robot)
+    for k, trial in enumerate(trials):
+        t = len(trial.commands)
+        first = np.arange(0, t - length + 1, length)
+        poses = trial.poses if len(trial.poses) else np.full((t + 1, 3), np.nan)
+        wheels = trial.wheels if len(trial.wheels) else np.full((t + 1, 2), np.nan)
+        anchors[k, first] = poses[first]
+        near = _is_near(poses, outline, arena)
+        near[:t] |= trial.stalled
+        near[1 : t + 1] |= trial.stalled
+        touching = np.array([near[at : at + length + 1].any() for at in first], np.bool_)
+        parts.append((np.full(len(first), k), first, touching, poses[first], poses[first + length],
+                      wheels[first + length] - wheels[first]))  # fmt: skip
+    trial_of, first, touching, before, after, way = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
+    )
+    return Windows(
+        tuple(trials), trial_of.astype(np.int64), first.astype(np.int64), first.astype(np.int64) + length,
+        touching, (before, after, way), commands, anchors, lengths[0],
+    )  # fmt: skip
+
+
+def _outline(robot: RobotModel) -> Floats:
+    """(p, 2) points around the body [m]."""
+    return np.array([point for part in robot.body for point in part.outline()])
+
+
+def _is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
+    """(n,) whether the body at each pose is near a wall; False where the pose is not known."""
+    cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
+    x = poses[:, :1] + outline[:, 0] * cos - outline[:, 1] * sin
+    y = poses[:, 1:2] + outline[:, 0] * sin + outline[:, 1] * cos
+    near = np.zeros(len(poses), np.bool_)
+    for x1, y1, x2, y2 in arena.segments:
+        along, beside = x2 - x1, y2 - y1
+        size = max(along * along + beside * beside, 1e-12)
+        at = np.clip(((x - x1) * along + (y - y1) * beside) / size, 0.0, 1.0)
+        away = np.hypot(x - x1 - at * along, y - y1 - at * beside)
+        near |= np.nanmin(np.where(np.isnan(away), np.inf, away), axis=1) < CLEAR_M
+    return near
+
+
+def simulate_windows(
+    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
+) -> Simulated:
+    """Each window from where the robot was seen at its beginning, without noise, with each of m sets of parameters."""
+    m = len(next(iter(values.values())))
+    numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | robot_numbers(known, robot, values)
+    has_poses = bool(np.isfinite(windows.anchors).any())
+    done = simulate(
+        starts_of(windows.trials),
+        windows.commands,
+        numbers,
+        0,
+        anchors=windows.anchors if has_poses else None,
+        keep=("poses", "wheels"),
+    )
+    wheels = np.asarray(done.wheels, np.float64)
+    return Simulated(
+        np.asarray(done.poses[:, windows.trial, windows.last], np.float64),
+        wheels[:, windows.trial, windows.last] - wheels[:, windows.trial, windows.first],
+    )
+
+
+def differences(
+    robot: RobotModel, windows: Windows, simulated: Simulated, values: Mapping[str, Floats]
+) -> Floats:
+    """(m, w, 5) what was observed less what was simulated, by `CHANNELS`; not a number where nothing was observed.
+
+    Of the middle of the axle, which is where wheels put it whatever the heading does; half of an error of the turn is
+    taken out of the direction of the way, as that much of it is expected.
+    """
+    before, after, way = windows.seen
+    axle = values.get("drive.axle", np.full(len(simulated.after), plain_numbers(robot)["drive.axle"]))
+    seen = _moved(before, after, axle)
+    made = _moved(before, simulated.after, axle)
+    turn_off = wrapped(seen[..., 2] - made[..., 2])
+    half = -turn_off / 2
+    x = seen[..., 0] * np.cos(half) - seen[..., 1] * np.sin(half) - made[..., 0]
+    y = seen[..., 0] * np.sin(half) + seen[..., 1] * np.cos(half) - made[..., 1]
+    ahead = made[..., 2] / 2
+    along = x * np.cos(ahead) + y * np.sin(ahead)
+    across = y * np.cos(ahead) - x * np.sin(ahead)
+    wheels = way - simulated.wheels
+    return np.stack([along, across, turn_off, wheels[..., 0], wheels[..., 1]], axis=-1)
+
+
+def _moved(before: Floats, after: Floats, axle: Floats) -> Floats:
+    """(m, w, 3) how the middle of the axle moved in the body's frame before, and the turn."""
+    turn = wrapped(after[..., 2] - before[:, 2])
+    offset = axle[:, None]
+    dx, dy = after[..., 0] - before[:, 0], after[..., 1] - before[:, 1]
+    cos, sin = np.cos(before[:, 2]), np.sin(before[:, 2])
+    x = dx * cos + dy * sin + offset * (np.cos(turn) - 1.0)
+    y = dy * cos - dx * sin + offset * np.sin(turn)
+    return np.stack(np.broadcast_arrays(x, y, turn), axis=-1)

@@ -1,0 +1,125 @@
+"""`realitygap transfer`: what evolved in simulation, on a target, by strategy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from realitygap.study import TransferResult
+
+
+def transfer(
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="A study's name or file; see --condition.")],
+    to: Annotated[
+        str,
+        typer.Option("--to", metavar="PLATFORM", help="The target: sim:FILE, twin:FILE, scribbler:PORT, ..."),
+    ],
+    budget: Annotated[
+        list[int] | None,
+        typer.Option(
+            min=0, help="Trials on the target that a strategy may spend; may be given again. [default: 20]"
+        ),
+    ] = None,
+    strategy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="plain, select, halving, noise, randomized, calibrated, posterior, transferability, direct or all; "
+            "may be given again. [default: all]"
+        ),
+    ] = None,
+    condition: Annotated[
+        str | None, typer.Option(help="Of the study. [default: its first for coverage, best on sim]")
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Made before; its trials count as spent. [default: makes one]"),
+    ] = None,
+    observe: Annotated[
+        str, typer.Option(help="What calibrating sees of a trial: cells, encoders or track.")
+    ] = "cells",
+    replicates: Annotated[
+        int, typer.Option(min=1, max=1000, help="Times that everything is done, each evolving anew.")
+    ] = 1,
+    fresh_trials: Annotated[
+        int, typer.Option(min=1, help="By which each champion is judged; not of the budget.")
+    ] = 20,
+    runs: Annotated[int, typer.Option(min=1, help="Evolutions in simulation of each replicate.")] = 100,
+    repeats: Annotated[int, typer.Option(min=1, help="Trials of each individual in simulation.")] = 8,
+    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Of all random numbers.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--out", metavar="DIR", help="Folder for trials and result. [default: results/transfer]"
+        ),
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Of a twin: trials at once. [default: all processors]")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Evolve in simulation, spend a few trials on a target, and see which strategy makes the most of them.
+
+    Each strategy has the same evolution in simulation and may spend the same trials. What it chose is judged by fresh
+    trials. Every trial on the target is kept as it comes: the same command goes on where it was interrupted.
+
+    plain: the best champion in simulation. select: the N best, tried once each. halving: the same in rounds. noise:
+    evolved under the paper's three levels. randomized: with numbers drawn by hand. calibrated: in the fitted simulator.
+    posterior: with a robot of the posterior in each trial. transferability: Koos, Mouret & Doncieux (2013). direct:
+    evolved on the target.
+
+    Example: realitygap transfer sim-paper --to twin:worn-1.toml --budget 20
+
+    Example: realitygap transfer sim-paper --to jyro --budget 10 --strategy plain --strategy select --json
+
+    In Python: realitygap.study.transfer("sim-paper", target, "all", 20, out="results/transfer")
+    """
+    from realitygap.study import choose_condition, open_target, strategy_names
+    from realitygap.study import transfer as carry_out
+
+    names = strategy_names(strategy or "all")
+    arena = choose_condition(study, condition, seed).arena.arena()
+    folder = out or Path("results/transfer")
+    try:
+        with open_target(to, arena, processes=processes) as target:
+            result = carry_out(
+                study,
+                target,
+                names,
+                budget or [20],
+                out=folder,
+                condition=condition,
+                replicates=replicates,
+                fresh_trials=fresh_trials,
+                runs=runs,
+                repeats=repeats,
+                observe=observe,  # type: ignore[arg-type]  # checked there
+                calibration=calibration,
+                seed=seed,
+                tell=lambda text: typer.echo(text, err=True),
+            )
+    except KeyboardInterrupt:
+        typer.echo("Interrupted. Every trial is kept; the same command goes on where it stopped.", err=True)
+        raise typer.Exit(130) from None
+    if as_json:
+        typer.echo(json.dumps(result.to_dict(), indent=2))
+        return
+    _print(result)
+    typer.echo(f"Results: {folder}   champions: {folder / 'champions'}")
+
+
+def _print(result: TransferResult) -> None:
+    typer.echo(
+        f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
+        f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials each"
+    )
+    typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>9}{'in simulation':>15}")
+    for row in result.strategies:
+        quality = f"{row.quality.estimate:.3f} ({row.quality.low:.3f} to {row.quality.high:.3f})"
+        simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
+        typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{row.regret.estimate:>9.3f}{simulated:>15}")
+    if result.replicates == 1:
+        typer.echo("Intervals are of the fresh trials of one champion; --replicates says more of a strategy.")

@@ -1,0 +1,153 @@
+"""Controllers and trials resampled hierarchically, with as much noise as the trials have and no more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from ._estimate import CONFIDENCE
+from ._side import GapSide, Values
+
+Statistic = Callable[[Values, Values], Values]
+"""Of (b, c, r) trials in simulation and (b, c, q) on the target: (b,)."""
+
+SMALLEST_N = 5
+"""Fewer controllers give no interval: by the expansion for small n it would end beyond all resamples."""
+
+_BLOCK = 4_000_000
+"""Values of trials that are held at a time."""
+
+
+def resampled(
+    source: GapSide,
+    target: GapSide,
+    n_resamples: int,
+    rng: np.random.Generator,
+    *,
+    smooth: bool = False,
+) -> Iterator[tuple[Values, Values]]:
+    """Samples as they could have come out, in blocks: (b, c, r) of the source and (b, c, q) of the target.
+
+    Controllers are drawn, both their means together; then trials of each, by residuals. Means of few trials spread
+    more than controllers do, and drawing trials anew would add that noise a second time. So means are first drawn
+    towards the common mean until they spread, and go together on both sides, as controllers without noise do;
+    residuals are lengthened by sqrt(r / (r - 1)).
+
+    Args:
+        source: The simulator's trials.
+        target: The target's.
+        n_resamples: How many samples.
+        rng: Draws them.
+        smooth: Whether means drawn twice are moved a little apart, with the covariance kept: for statistics of ranks,
+            of which a controller drawn twice makes ties that no new sample has.
+
+    Source: Davison & Hinkley (1997), Bootstrap Methods and their Application, section 3.8, for two levels and the
+    need to shrink. Differs: the two sides are shrunk together, by the linear map that gives their covariance the
+    noise's diagonal less. Smoothing: Silverman & Young (1987), Biometrika 74(3), 469-479.
+    """
+    latent = shrunk_means(source, target)
+    residuals = [_residuals(side) for side in (source, target)]
+    n, size = source.n, source.values.size + target.values.size
+    block = max(1, _BLOCK // size)
+    for first in range(0, n_resamples, block):
+        b = min(block, n_resamples - first)
+        who = rng.integers(0, n, (b, n))
+        means = _smoothed(latent[who], latent, rng) if smooth else latent[who]
+        drawn = [_drawn(residual, who, rng) for residual in residuals]
+        yield means[:, :, :1] + drawn[0], means[:, :, 1:] + drawn[1]
+
+
+def _smoothed(means: Values, latent: Values, rng: np.random.Generator) -> Values:
+    """(b, c, 2) means moved by normal numbers, and drawn towards the center so that their covariance stays."""
+    width = len(latent) ** (-1 / 6)  # of the normal reference for two dimensions
+    root = _power(np.cov(latent.T), 0.5)
+    center = latent.mean(axis=0)
+    moved = means - center + width * rng.normal(size=means.shape) @ root
+    return np.asarray(center + moved / math.sqrt(1 + width**2))
+
+
+def shrunk_means(source: GapSide, target: GapSide) -> Values:
+    """(c, 2) means of controllers on both sides, with the covariance that they would have without noise."""
+    means = np.stack([source.means, target.means], axis=1)
+    if source.n < 2:
+        return means
+    center = means.mean(axis=0)
+    seen = np.cov(means.T)
+    wanted = seen - np.diag([source.noise.mean(), target.noise.mean()])
+    return np.asarray(center + (means - center) @ _map_between(seen, wanted))
+
+
+def _map_between(seen: Values, wanted: Values) -> Values:
+    """(2, 2) the symmetric map that turns one covariance into the other, its part below 0 left out."""
+    root = _power(seen, 0.5)
+    inverse = _power(seen, -0.5)
+    return inverse @ _power(root @ _power(wanted, 1.0) @ root, 0.5) @ inverse
+
+
+def _power(matrix: Values, exponent: float) -> Values:
+    """A power of the part of a symmetric matrix above 0."""
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    there = values > 1e-12 * max(float(values.max()), 1e-300)
+    powers = np.where(there, np.where(there, values, 1.0) ** exponent, 0.0)
+    return np.asarray((vectors * powers) @ vectors.T)
+
+
+def _residuals(side: GapSide) -> Values:
+    """(c, r) what trials differ from their controller's mean, with the variance of trials; 0 where there is one."""
+    if side.trials < 2:
+        return np.zeros_like(side.values)
+    return (side.values - side.means[:, None]) * math.sqrt(side.trials / (side.trials - 1))
+
+
+def _drawn(residuals: Values, who: NDArray[np.int64], rng: np.random.Generator) -> Values:
+    r = residuals.shape[1]
+    which = rng.integers(0, r, (*who.shape, r))
+    return residuals[who[:, :, None], which]
+
+
+def bootstrap(
+    statistics: Mapping[str, Statistic],
+    source: GapSide,
+    target: GapSide,
+    n_resamples: int,
+    rng: np.random.Generator,
+    *,
+    smooth: bool = False,
+) -> dict[str, Values]:
+    """(b,) each statistic of the same resamples; arguments as in `resampled`."""
+    found: dict[str, list[Values]] = {name: [] for name in statistics}
+    for one, other in resampled(source, target, n_resamples, rng, smooth=smooth):
+        for name, statistic in statistics.items():
+            found[name].append(statistic(one, other))
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def bootstrap_mean(values: Values, n_resamples: int, rng: np.random.Generator) -> Values:
+    """(b,) mean of (n,) values, one a controller, of which n are drawn again."""
+    return np.asarray(values[rng.integers(0, len(values), (n_resamples, len(values)))].mean(axis=1))
+
+
+def interval(
+    resamples: Values, n: int, confidence: float = CONFIDENCE
+) -> tuple[float, float] | tuple[None, None]:
+    """The percentiles of resamples, expanded for few controllers; none below 5.
+
+    Args:
+        resamples: (b,) a statistic of resamples; nan is left out.
+        n: Controllers.
+        confidence: Between 0 and 1.
+
+    Source: Hesterberg (2015), The American Statistician 69(4), 371-386: percentiles are too narrow as if t were
+    normal and n were n - 1, and are taken farther out by as much.
+    """
+    there = resamples[np.isfinite(resamples)]
+    if n < SMALLEST_N or len(there) < len(resamples) / 2:
+        return None, None
+    reach = math.sqrt(n / (n - 1)) * float(special.stdtrit(n - 1, (1 + confidence) / 2))
+    tail = float(special.ndtr(-reach))
+    low, high = np.quantile(there, [tail, 1 - tail])
+    return float(low), float(high)

@@ -1,0 +1,72 @@
+"""Whether the simulator keeps the order of controllers, and how much of it noise hides."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import stats
+
+from ._side import Values
+
+SPLITS = 100
+"""Random halves behind a split-half number."""
+
+Rng = np.random.Generator
+
+
+def spearman(one: Values, other: Values) -> Values:
+    """(b,) Spearman's rank correlation of b pairs of samples; nan where one of the two has all values alike.
+
+    Args:
+        one: (b, c) and
+        other: (b, c); ties get their mean rank.
+    """
+    ranks = [stats.rankdata(each, axis=1) for each in (one, other)]
+    a, b = (each - each.mean(axis=1, keepdims=True) for each in ranks)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found = (a * b).sum(axis=1) / np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1))
+    return np.asarray(found)
+
+
+def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
+    """(b, c) means of one random half of the trials and of another, floor(r / 2) each.
+
+    Args:
+        values: (b, c, r), r at least 2.
+        rng: Draws the halves, the same ones for all samples.
+    """
+    order = rng.permutation(values.shape[2])
+    size = values.shape[2] // 2
+    one, other = order[:size], order[size : 2 * size]
+    return np.asarray(values[:, :, one].mean(axis=2)), np.asarray(values[:, :, other].mean(axis=2))
+
+
+def lengthened(correlation: Values, times: float) -> Values:
+    """Reliability of a test so many times as long.
+
+    Source: Spearman (1910) and Brown (1910), British Journal of Psychology 3. Differs: 0 for a correlation below 0,
+    for which the formula means nothing.
+    """
+    positive = np.maximum(correlation, 0.0)
+    return np.asarray(times * positive / (1 + (times - 1) * positive))
+
+
+def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
+    """(b,) how well the means of r trials keep the order of controllers when all trials are made again [0..1].
+
+    The rank correlation between halves, mean of `splits` random ones, lengthened to r trials.
+
+    Args:
+        values: (b, c, r), r at least 2.
+        rng: Draws the halves.
+        splits: How many.
+    """
+    between = [spearman(*halves(values, rng)) for _ in range(splits)]
+    size = values.shape[2] // 2
+    return lengthened(np.nan_to_num(np.mean(between, axis=0)), values.shape[2] / size)
+
+
+def trials_for_reliability(found: float, trials: int, wanted: float) -> int | None:
+    """Trials of each controller that would give the wanted reliability, by Spearman & Brown; None where none would."""
+    if found <= 0:
+        return None
+    return int(np.ceil(trials * wanted * (1 - found) / (found * (1 - wanted)) - 1e-9))

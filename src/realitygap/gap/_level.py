@@ -1,0 +1,56 @@
+"""How large the difference in quality is: mean, root mean square without noise, and A12."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._side import Values
+
+
+def mean_difference(source: Values, target: Values) -> Values:
+    """(b,) mean over controllers of the difference of means, target less source.
+
+    Args:
+        source: (b, c, r) and
+        target: (b, c, q) quality of each trial of b samples.
+    """
+    return np.asarray((target.mean(axis=2) - source.mean(axis=2)).mean(axis=1))
+
+
+def square_differences(source: Values, target: Values) -> Values:
+    """(b, c) unbiased estimate of the square of each controller's true difference; below 0 where noise has it so.
+
+    The square of a difference of means is too large by the variance of both means, which is taken out:
+    d² - s²/r - t²/q. A controller without a gap gives 0 on average.
+
+    Args:
+        source: (b, c, r) and
+        target: (b, c, q), r and q at least 2.
+
+    Raises:
+        ValueError: Some side has one trial a controller, which says nothing of noise.
+    """
+    if min(source.shape[2], target.shape[2]) < 2:
+        raise ValueError("The noise of trials needs at least 2 of each controller on both sides.")
+    difference = target.mean(axis=2) - source.mean(axis=2)
+    noise = source.var(axis=2, ddof=1) / source.shape[2] + target.var(axis=2, ddof=1) / target.shape[2]
+    return np.asarray(difference**2 - noise)
+
+
+def rms_of(squares: Values) -> Values:
+    """Root of a mean square; 0 where it is below: an unbiased mean square may be, a distance may not."""
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+def shares_above(source: Values, target: Values) -> Values:
+    """(c,) how likely a trial of each controller on the target is above one in simulation; ties count half.
+
+    Args:
+        source: (c, r) and
+        target: (c, q).
+
+    Source: A12 of Vargha & Delaney (2000), Journal of Educational and Behavioral Statistics 25(2), 101-132, within
+    each controller.
+    """
+    one, other = target[:, :, None], source[:, None, :]
+    return np.asarray(((one > other).mean(axis=(1, 2)) + (one >= other).mean(axis=(1, 2))) / 2)

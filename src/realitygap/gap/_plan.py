@@ -1,0 +1,191 @@
+"""How many controllers and trials it takes to see an effect, to show equivalence, or to tell a correlation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from ._correlation import spearman
+from ._equivalence import controllers_for_margin
+from ._side import Values
+
+ALPHA = 0.05
+MOST = 100_000
+SIMULATED = 2_000
+"""Studies that are simulated to check a number: the interval of a power of 0.8 is then ±0.02."""
+
+
+@dataclass(frozen=True)
+class Needed:
+    """Controllers that it takes, with so many trials of each on each platform.
+
+    Attributes:
+        trials: Of each controller on each platform.
+        controllers: None where 100,000 would not do.
+        power: How often simulated studies of this size find it.
+        low, high: Its interval of 95 %.
+    """
+
+    trials: int
+    controllers: int | None
+    power: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def on_target(self) -> int | None:
+        """Trials on the target in all."""
+        return None if self.controllers is None else self.controllers * self.trials
+
+
+def spread_of_differences(spread: float, noise: float, trials: int) -> float:
+    """Standard deviation over controllers of the difference of means.
+
+    Args:
+        spread: Of the true differences.
+        noise: Standard deviation of one trial about its controller's mean, on both platforms.
+        trials: Of each controller on each platform.
+    """
+    return math.sqrt(spread**2 + 2 * noise**2 / trials)
+
+
+def plan_effect(
+    effect: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
+) -> Needed:
+    """Controllers with which a paired t test at 5 % finds a mean difference.
+
+    Args:
+        effect: Mean difference to find, in units of quality.
+        spread, noise, trials: As in `spread_of_differences`.
+        power: How often it shall be found.
+        seed: Of the simulated studies.
+
+    Source: Cohen (1988), chapter 2, by the noncentral t distribution.
+    """
+    _check(effect=effect, noise=noise + spread, power=power)
+    sd = spread_of_differences(spread, noise, trials)
+    n = _fewest(lambda n: _t_power(effect / sd, n), power)
+    if n is None:
+        return Needed(trials, None)
+    means, errors = _simulated(effect, sd, n, seed)
+    found = np.abs(means) > float(special.stdtrit(n - 1, 1 - ALPHA / 2)) * errors
+    return Needed(trials, n, *_share(found))
+
+
+def plan_margin(
+    margin: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
+) -> Needed:
+    """Controllers with which TOST at 5 % shows equivalence where there is no difference; as `plan_effect`."""
+    _check(margin=margin, noise=noise + spread, power=power)
+    sd = spread_of_differences(spread, noise, trials)
+    n = controllers_for_margin(margin, sd, power=power)
+    if n is None:
+        return Needed(trials, None)
+    means, errors = _simulated(0.0, sd, n, seed)
+    reach = float(special.stdtrit(n - 1, 1 - ALPHA)) * errors
+    return Needed(trials, n, *_share(np.abs(means) + reach < margin))
+
+
+def plan_correlation(
+    correlation: float, *, least: float, reliability: float, trials: int, power: float = 0.8, seed: int = 1
+) -> Needed:
+    """Controllers with which a rank correlation is shown to be above a least one.
+
+    Args:
+        correlation: The true one, of controllers without noise.
+        least: Above which it shall be shown, one-sided at 5 %; below `correlation`.
+        reliability: Of the means of both platforms with so many trials [0..1]; both correlations are seen through it.
+        trials: Of each controller on each platform.
+        power: How often it shall be shown.
+        seed: Of the simulated studies.
+
+    Source: Fisher's transformation with the standard error of Bonett & Wright (2000), Psychometrika 65(1), 23-28,
+    for Spearman's correlation.
+    """
+    _check(correlation=correlation, power=power)
+    if not -1 < least < correlation < 1:
+        raise ValueError(
+            f"least is {least} and correlation {correlation}, expected -1 < least < correlation < 1."
+        )
+    seen, floor = correlation * reliability, least * reliability
+    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=5)
+    if n is None:
+        return Needed(trials, None)
+    return Needed(trials, n, *_share(_simulated_correlations(seen, floor, n, seed)))
+
+
+def trial_reliability(controllers_spread: float, noise: float, trials: int) -> float:
+    """Reliability of the mean of so many trials [0..1], of controllers that spread so much."""
+    between = controllers_spread**2
+    total = between + noise**2 / trials
+    return between / total if total > 0 else 0.0
+
+
+def _check(**values: float) -> None:
+    for name, value in values.items():
+        above = 1.0 if name in ("power", "correlation") else math.inf
+        if not (math.isfinite(value) and 0 < value < above):
+            limit = " and below 1" if above == 1.0 else ""
+            raise ValueError(f"{name} is {value}, expected a number above 0{limit}.")
+
+
+def _fewest(power_of: Callable[[int], float], power: float, smallest: int = 2) -> int | None:
+    low, high = smallest - 1, smallest
+    while power_of(high) < power:
+        low, high = high, 2 * high
+        if low > MOST:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if power_of(middle) < power else (low, middle)
+    return high
+
+
+def _t_power(effect: float, n: int) -> float:
+    critical = float(special.stdtrit(n - 1, 1 - ALPHA / 2))
+    center = abs(effect) * math.sqrt(n)
+    found = 1 - float(special.nctdtr(n - 1, center, critical))
+    return found if math.isfinite(found) else float(special.ndtr(center - critical))
+
+
+def _error(correlation: float, n: int) -> float:
+    return math.sqrt((1 + correlation**2 / 2) / (n - 3))
+
+
+def _z_power(seen: float, floor: float, n: int) -> float:
+    reach = (math.atanh(seen) - math.atanh(floor)) / _error(seen, n)
+    return float(special.ndtr(reach - special.ndtri(1 - ALPHA)))
+
+
+def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Values]:
+    """Means and standard errors of simulated studies of n controllers."""
+    rng = np.random.default_rng(seed)
+    means = rng.normal(mean, sd / math.sqrt(n), SIMULATED)
+    spreads = sd * np.sqrt(rng.chisquare(n - 1, SIMULATED) / (n - 1))
+    return means, spreads / math.sqrt(n)
+
+
+def _simulated_correlations(seen: float, floor: float, n: int, seed: int) -> NDArray[np.bool_]:
+    rng = np.random.default_rng(seed)
+    # of normal pairs with Pearson's 2 sin(pi rho / 6) Spearman's is rho
+    pearson = 2 * math.sin(math.pi * seen / 6)
+    studies = max(200, min(SIMULATED, 2_000_000 // n))
+    one = rng.normal(size=(studies, n))
+    other = pearson * one + math.sqrt(1 - pearson**2) * rng.normal(size=(studies, n))
+    found = np.clip(spearman(one, other), -1 + 1e-12, 1 - 1e-12)
+    errors = np.sqrt((1 + found**2 / 2) / (n - 3))
+    return np.asarray(np.arctanh(found) - special.ndtri(1 - ALPHA) * errors > math.atanh(floor))
+
+
+def _share(found: NDArray[np.bool_]) -> tuple[float, float, float]:
+    """A share with its interval of 95 %: Wilson (1927)."""
+    n, share = len(found), float(found.mean())
+    z = float(special.ndtri(0.975))
+    center = (share + z * z / (2 * n)) / (1 + z * z / n)
+    reach = z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    return share, center - reach, center + reach

@@ -1,0 +1,292 @@
+"""Controllers evolved in simulation, tried on a target: which strategy makes the most of few trials?"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
+from realitygap.evolution import Genome
+from realitygap.records import OBSERVATIONS, Observe, write_whole
+from realitygap.runs import Condition
+from realitygap.trials import Target
+
+from ._file import load_study
+from ._study import Study
+from ._transfer_attempt import Attempt, Simulation, plans_of
+from ._transfer_calibrated import Calibrating, calibrated, posterior
+from ._transfer_direct import direct
+from ._transfer_noise import noise, randomized
+from ._transfer_result import Transferred, TransferResult, summarize_transfer
+from ._transfer_select import halving, plain, select
+from ._transfer_simulated import Champion, refuse_other_tasks
+from ._transfer_target import KeptTarget, coverage_of
+from ._transferability import transferability
+
+STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
+    "plain": plain,
+    "select": select,
+    "halving": halving,
+    "noise": noise,
+    "randomized": randomized,
+    "calibrated": calibrated,
+    "posterior": posterior,
+    "transferability": transferability,
+    "direct": direct,
+}
+"""What each does is in the docstring of the function."""
+
+WITHOUT_TRIALS = ("plain",)
+"""Strategies that spend nothing: carried out once for all budgets."""
+
+NUMBERS = 10_000
+"""Trials of a replicate have numbers of their own, so many apart; the fresh ones are in the upper half."""
+
+
+@dataclass(frozen=True)
+class TransferPlan:
+    """What a transfer does; a folder belongs to one plan.
+
+    Attributes:
+        study: Name or file.
+        condition: Of the study.
+        settings: Of that condition, as resolved.
+        target: Its name.
+        budgets: Trials on the target, one transfer each.
+        replicates: Times that everything is done, each with evolution of its own.
+        fresh_trials: Of each champion.
+        runs: Evolutions in simulation that a replicate has.
+        repeats: Trials of each individual in simulation.
+        observe: How much calibrating sees of a trial.
+        calibration: File of one that was made before; empty to calibrate on the budget.
+        seed: Of all random numbers.
+    """
+
+    study: str
+    condition: str
+    settings: dict[str, Any]
+    target: str
+    budgets: tuple[int, ...]
+    replicates: int = 1
+    fresh_trials: int = 20
+    runs: int = 100
+    repeats: int = 8
+    observe: Observe = "cells"
+    calibration: str = ""
+    seed: int = 1
+
+
+def transfer(
+    study: Study | str | Path,
+    target: Target,
+    strategies: str | Sequence[str] = "all",
+    budget: int | Sequence[int] = 20,
+    *,
+    out: str | Path,
+    condition: str | None = None,
+    replicates: int = 1,
+    fresh_trials: int = 20,
+    runs: int = 100,
+    repeats: int = 8,
+    observe: Observe = "cells",
+    calibration: str | Path | None = None,
+    seed: int = 1,
+    tell: Callable[[str], None] | None = None,
+) -> TransferResult:
+    """Evolve in simulation, spend a budget of trials on a target, and try what each strategy chose on fresh trials.
+
+    All strategies have the same evolution in simulation: `runs` runs of the condition, every individual tried `repeats`
+    times. Every trial on the target is kept as it comes; the same call goes on where an interrupted one stopped.
+
+    Args:
+        study: A study, its name or its file.
+        target: Where trials cost.
+        strategies: Names in `STRATEGIES`; all of them when 'all'.
+        budget: Trials on the target that each strategy may spend; several are carried out one by one.
+        out: Folder for trials and result.
+        condition: Of the study; when not given, its first one that selects for coverage, best on `sim`.
+        replicates: Times that everything is done, each with evolution of its own.
+        fresh_trials: By which each champion is judged; they are not of the budget.
+        runs: Evolutions in simulation of each replicate, at least the largest budget.
+        repeats: Trials of each individual in simulation.
+        observe: How much calibrating sees of a trial.
+        calibration: File of a calibration; its trials count as spent. Without one, calibrating spends of the budget.
+        seed: Of all random numbers.
+        tell: Told what is going on, in words.
+
+    Raises:
+        StudyError: No such study, condition or strategy, or a task whose worth nobody sees from outside.
+        RecordError: The folder belongs to another transfer.
+        RobotError: The target failed; what was tried is safe.
+        TypeError, ValueError: A number that is none, or out of its range.
+    """
+    budgets = _budgets(budget)
+    plan = TransferPlan(
+        study=study.about.name if isinstance(study, Study) else str(study),
+        condition="",
+        settings={},
+        target=target.name,
+        budgets=budgets,
+        replicates=whole_number("replicates", replicates, 1, 1000),
+        fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
+        runs=max(whole_number("runs", runs, 1), *budgets),
+        repeats=whole_number("repeats", repeats, 1),
+        observe=_known_observation(observe),
+        calibration="" if calibration is None else str(calibration),
+        seed=whole_number("seed", seed, 0, 2**63 - 1),
+    )
+    chosen = choose_condition(study, condition, plan.seed)
+    plan = _with(plan, condition=chosen.name, settings=chosen.settings())
+    names = strategy_names(strategies)
+    folder = Path(out)
+    _adopt(folder, plan)
+    work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
+    champions = [
+        work.carry_out(name, n, r) for name in names for n in budgets for r in range(plan.replicates)
+    ]
+    rows, best = summarize_transfer(champions)
+    result = TransferResult(
+        plan.study,
+        plan.condition,
+        target.name,
+        target.label,
+        plan.replicates,
+        plan.fresh_trials,
+        rows,
+        best,
+        tuple(champions),
+    )
+    write_whole(folder / "result.json", json.dumps(result.to_dict(), indent=2).encode())
+    return result
+
+
+def strategy_names(strategies: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of strategies, 'all' resolved.
+
+    Raises:
+        StudyError: One is unknown.
+    """
+    given = [strategies] if isinstance(strategies, str) else list(strategies)
+    names = tuple(STRATEGIES) if given == ["all"] else tuple(dict.fromkeys(given))
+    for name in names:
+        if name not in STRATEGIES:
+            raise StudyError(f"Unknown strategy {name!r}. {did_you_mean(name, [*STRATEGIES, 'all'])}")
+    return names
+
+
+def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> Condition:
+    """The condition of a study that is evolved, with a seed.
+
+    Raises:
+        StudyError: No such study or condition, or one that cannot be transferred.
+    """
+    resolved = study if isinstance(study, Study) else load_study(study)
+    conditions = {condition.name: condition for condition in resolved.conditions}
+    if name is None:
+        ranked = sorted(
+            resolved.conditions, key=lambda each: (each.selection != "coverage", each.platform != "sim")
+        )
+        chosen = ranked[0]
+    elif name in conditions:
+        chosen = conditions[name]
+    else:
+        raise StudyError(
+            f"Study {resolved.about.name!r} has no condition {name!r}. {did_you_mean(name, conditions)}"
+        )
+    refuse_other_tasks(chosen)
+    return chosen.model_copy(update={"seed": seed})
+
+
+@dataclass
+class _Work:
+    """A transfer under way."""
+
+    plan: TransferPlan
+    condition: Condition
+    target: Target
+    folder: Path
+    tell: Callable[[str], None]
+    simulation: Simulation = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.simulation = Simulation(self.plan.runs, self.plan.repeats)
+
+    def carry_out(self, strategy: str, budget: int, replicate: int) -> Transferred:
+        """The champion of a strategy, with its fresh trials."""
+        spends = strategy not in WITHOUT_TRIALS
+        name = f"{strategy}-{budget if spends else 0}-{replicate}"
+        self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
+        first = replicate * NUMBERS
+        path = self.folder / "trials" / f"{name}.jsonl"
+        with KeptTarget(self.target, path, budget, first) as kept:
+            attempt = Attempt(
+                condition=self.condition,
+                target=kept,
+                budget=budget,
+                replicate=replicate,
+                simulation=self.simulation,
+                calibration=self._calibration(replicate),
+            )
+            champion = STRATEGIES[strategy](attempt)
+        champion.genome.save(self.folder / "champions" / f"{name}.json")
+        coverage = self._fresh(champion.genome, name, first + NUMBERS // 2)
+        simulated = None if champion.simulated != champion.simulated else champion.simulated
+        genome = champion.genome.to_json()
+        return Transferred(strategy, budget, kept.spent, replicate, genome, simulated, coverage)
+
+    def _calibration(self, replicate: int) -> Calibrating:
+        """How the replicate's calibrations come about."""
+        file = Path(self.plan.calibration) if self.plan.calibration else None
+        first, observe = replicate * NUMBERS, self.plan.observe
+        return Calibrating(
+            self.target, self.folder / "calibrations", first, replicate, observe, file, self.tell
+        )
+
+    def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
+        """The share of cells that a champion visits in fresh trials."""
+        n = self.plan.fresh_trials
+        with KeptTarget(self.target, self.folder / "fresh" / f"{name}.jsonl", n, first) as fresh:
+            trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), "cells")
+        return tuple(coverage_of(trial, self.target) for trial in trials)
+
+
+def _adopt(folder: Path, plan: TransferPlan) -> None:
+    """Make the folder that of a plan, or see that it is; more replicates, budgets and fresh trials extend it."""
+    path = folder / "transfer.json"
+    if path.exists():
+        there = json.loads(path.read_text("utf-8"))
+        extends = ("replicates", "budgets", "fresh_trials")
+        now = json.loads(json.dumps(asdict(plan)))
+        different = [key for key in now if key not in extends and now[key] != there.get(key)]
+        if different:
+            shown = "; ".join(
+                f"{key} was {there.get(key)!r}, is {now[key]!r}" for key in different if key != "settings"
+            )
+            raise RecordError(
+                f"{folder} belongs to another transfer ({shown or 'the condition has other settings'}); nothing was "
+                "tried and nothing is lost. Name another folder with -o."
+            )
+    for part in ("trials", "fresh", "champions", "calibrations"):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    write_whole(path, json.dumps(asdict(plan), indent=2).encode())
+
+
+def _budgets(budget: int | Sequence[int]) -> tuple[int, ...]:
+    given = [budget] if isinstance(budget, int) else list(budget)
+    if not given:
+        raise ValueError("No budget is given, expected at least one number of trials.")
+    return tuple(whole_number("budget", each, 0, NUMBERS // 2 - 1) for each in given)
+
+
+def _known_observation(observe: str) -> Observe:
+    for known in OBSERVATIONS:
+        if observe == known:
+            return known
+    raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
+
+
+def _with(plan: TransferPlan, **changes: Any) -> TransferPlan:
+    return TransferPlan(**{**asdict(plan), **changes, "budgets": plan.budgets})

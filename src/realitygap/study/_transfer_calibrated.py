@@ -1,0 +1,114 @@
+"""Strategies that make the simulator agree with the target first: calibrated and posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from realitygap.errors import StudyError
+from realitygap.records import Observe, write_whole
+from realitygap.robots import SimPlatform
+from realitygap.runs import Condition
+from realitygap.trials import Target
+from realitygap.world import Calibration, load_calibration
+
+from ._transfer_attempt import Attempt
+from ._transfer_noise import needs_sim
+from ._transfer_select import best_on_target
+from ._transfer_simulated import Champion
+from ._transfer_target import KeptTarget
+
+SELECTING = 5
+"""One trial in so many is kept for choosing among champions where calibrating is on the budget."""
+
+
+def calibrated(attempt: Attempt) -> Champion:
+    """Evolved in the simulator with the numbers that were fitted; trials that are left choose as in select."""
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "no")))
+
+
+def posterior(attempt: Attempt) -> Champion:
+    """Evolved with a robot of the posterior drawn for each trial; trials that are left choose as in select."""
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "posterior")))
+
+
+def _fitted(attempt: Attempt, randomize: Literal["no", "posterior"]) -> Condition:
+    needs_sim(attempt.condition, "calibrated" if randomize == "no" else "posterior")
+    calibration = attempt.calibration(attempt.condition, attempt.left)
+    attempt.target.spent += calibration.trials
+    return fitted_condition(attempt.condition, calibration, randomize)
+
+
+def fitted_condition(
+    condition: Condition, calibration: Calibration, randomize: Literal["no", "posterior"]
+) -> Condition:
+    """The condition on a simulator that was calibrated.
+
+    Args:
+        condition: On platform `sim`; what it sets itself of the robot's numbers stays.
+        calibration: The fit.
+        randomize: `no`: the estimate; `posterior`: a draw for each trial.
+    """
+    keep = ("steps", "step_s", "contact", "noise", "noisy_reading", "precision", "set")
+    old = {name: getattr(condition.sim, name) for name in keep}
+    sim = SimPlatform(**{**old, "robot": calibration, "randomize": randomize})
+    name = "calibrated" if randomize == "no" else "posterior"
+    return condition.model_copy(update={"sim": sim, "name": name})
+
+
+@dataclass(frozen=True)
+class Calibrating:
+    """Reads the calibration that was given, or makes one on the budget; `calibrated` and `posterior` share it.
+
+    Attributes:
+        target: What is observed.
+        folder: Where calibrations and their trials are kept.
+        first_number: Of the trials.
+        seed: Of what is drawn while fitting.
+        observe: How much is seen.
+        file: The calibration that was given; None where there is none.
+        tell: Told what is going on.
+    """
+
+    target: Target
+    folder: Path
+    first_number: int
+    seed: int
+    observe: Observe
+    file: Path | None
+    tell: Callable[[str], None]
+
+    def __call__(self, condition: Condition, left: int) -> Calibration:
+        """The calibration for a budget of `left` trials.
+
+        Raises:
+            StudyError: The one that was given took more trials than that.
+        """
+        if self.file is None:
+            return self._on_budget(condition, left - left // SELECTING)
+        calibration = load_calibration(self.file)
+        if calibration.trials > left:
+            raise StudyError(
+                f"{self.file} took {calibration.trials} trials, more than a budget of {left}. Give a larger budget, or "
+                "a calibration of fewer trials."
+            )
+        return calibration
+
+    def _on_budget(self, condition: Condition, n: int) -> Calibration:
+        """A calibration by n trials, or the one that is there."""
+        name = f"{n}-{self.observe}-{self.seed}"
+        path = self.folder / f"{name}.toml"
+        if path.exists():
+            return load_calibration(path)
+        from ._calibrate_all import calibrate_all  # type: ignore[import-untyped]
+
+        self.tell(f"calibrating by {n} trials, {self.observe} observed")
+        trials = self.folder / f"{name}.jsonl"
+        with KeptTarget(self.target, trials, n, self.first_number, observe=self.observe) as kept:
+            calibration = calibrate_all(
+                kept, robot=condition.sim.robot, observe=self.observe, budget=n, seed=self.seed
+            )
+        write_whole(path, calibration.to_toml().encode())
+        return calibration

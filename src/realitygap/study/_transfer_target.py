@@ -1,0 +1,101 @@
+"""A target whose trials are kept as they come: what is there already is not carried out again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from realitygap.errors import RecordError
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.trials import Target, TrialPlan
+
+from ._targets import observations_head
+
+
+class KeptTarget:
+    """A target with a file beside it, and a number of trials that it allows.
+
+    A trial is known by its number: who asks for the same trials in the same order, after whatever interruption, gets
+    what is in the file, and the rest is carried out.
+
+    Args:
+        target: What carries out trials.
+        path: The file; its folder is there.
+        budget: How many trials it allows.
+        first_number: Added to the number of each plan, so that parts of a study draw other random numbers.
+        observe: The most that is looked at.
+    """
+
+    def __init__(
+        self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
+    ) -> None:
+        self.name, self.label, self.arena = target.name, target.label, target.arena
+        self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
+        self.budget = budget
+        self.spent = 0
+        self._target = target
+        self._first_number = first_number
+        self._file = ObservationsFile(path, observations_head(target, observe))
+        self._kept = {trial.number: trial for trial in self._file.trials}
+
+    def carry_out(
+        self,
+        plans: Sequence[TrialPlan],
+        observe: Observe,
+        tell: Callable[[int, ObservedTrial], None] | None = None,
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`.
+
+        Raises:
+            ValueError: More trials than the budget has.
+            RecordError: The file has another trial of this number.
+        """
+        if self.spent + len(plans) > self.budget:
+            raise ValueError(
+                f"There are {len(plans)} trials to carry out after {self.spent}, expected at most {self.budget} in all."
+            )
+        self.spent += len(plans)
+        numbered = [replace(plan, number=self._first_number + plan.number) for plan in plans]
+        missing = [k for k, plan in enumerate(numbered) if plan.number not in self._kept]
+
+        def keep(k: int, trial: ObservedTrial) -> None:
+            self._file.append(trial)
+            self._kept[trial.number] = trial
+            if tell is not None:
+                tell(missing[k], trial)
+
+        if missing:
+            self._target.carry_out([numbered[k] for k in missing], observe, keep)
+        return [self._checked(plan, observe) for plan in numbered]
+
+    def _checked(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:
+        """The trial of a plan, if it is that."""
+        trial = self._kept[plan.number]
+        genome = "" if plan.genome is None else plan.genome.to_json()
+        enough = OBSERVATIONS.index(trial.observe) >= OBSERVATIONS.index(observe)
+        if trial.genome != genome or not enough:
+            what = "another controller" if enough else f"only {trial.observe} observed"
+            raise RecordError(
+                f"{self._file.path}: trial {plan.number} there has {what}; nothing was lost. Name another folder."
+            )
+        return trial
+
+    def close(self) -> None:
+        """Let go of the file; whoever opened the target closes that."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def coverage_of(trial: ObservedTrial, target: Target) -> float:
+    """Visited share of the reachable cells, 0..1."""
+    return len(trial.cells) / target.arena.grid.n_cells

@@ -1,0 +1,105 @@
+"""All measures together, and what n cannot carry."""
+
+import json
+
+import numpy as np
+import pytest
+
+from realitygap.gap import MEASURES, GapSide, measure_gap
+
+
+def sides(c=12, r=8, gap=0.0, spread=0.0, noise=0.06, seed=1, cells=True):
+    rng = np.random.default_rng(seed)
+    quality = rng.uniform(0.1, 0.6, (c, 1))
+    apart = rng.normal(gap, spread, (c, 1)) if spread else gap
+    found = []
+    for name, label, level in (("sim", "SIM", quality), ("twin", "TWIN", quality + apart)):
+        values = level + rng.normal(0, noise, (c, r))
+        crossed = rng.random((c, r, 20)) < level[:, :, None] if cells else np.empty((0, 0, 0), bool)
+        found.append(GapSide(name, label, values, crossed))
+    return found
+
+
+def test_json_has_what_is_promised_each_with_estimate_low_high_and_n():
+    found = json.loads(measure_gap(*sides(), margin=0.1).to_json())
+    for name in MEASURES:
+        assert {"estimate", "low", "high", "n"} <= set(found[name]), name
+        assert found[name]["low"] <= found[name]["estimate"] <= found[name]["high"], name
+    assert found["misspecified"] is None
+    assert found["verdict"].endswith(".")
+
+
+def test_a_gap_is_found_and_its_size_and_side():
+    found = measure_gap(*sides(gap=-0.15), margin=0.05)
+    assert found.excludes_no_gap
+    assert found.rms.low < 0.15 < found.rms.high
+    assert found.level.high < 0
+    assert found.a12.high < 0.5
+    assert found.energy.more["p"] < 0.05
+    assert found.equivalence.more["equivalent"] is False
+    assert "the target does worse" in found.verdict
+
+
+def test_no_gap_is_equivalent_at_a_wide_margin_and_keeps_the_order():
+    found = measure_gap(*sides(), margin=0.1)
+    assert not found.excludes_no_gap
+    assert found.equivalence.more["equivalent"] is True
+    assert found.srcc_disattenuated.estimate > 0.9
+    assert found.mmrv.estimate <= 2 * found.mmrv_floor.estimate
+    assert "no gap is shown" in found.verdict
+
+
+def test_the_same_trials_give_the_same_numbers():
+    assert measure_gap(*sides()).to_json() == measure_gap(*sides()).to_json()
+
+
+def test_disattenuation_by_noise_is_refused_with_the_trials_that_would_do():
+    rng = np.random.default_rng(2)
+    quality = np.linspace(0.28, 0.32, 20)[:, None]
+    noisy = [GapSide(name, "SIM", quality + rng.normal(0, 0.1, (20, 4))) for name in ("one", "other")]
+    found = measure_gap(*noisy).srcc_disattenuated
+    assert found.estimate is None
+    assert "does not repeat its own order" in found.refused
+
+
+def test_one_trial_a_controller_carries_level_and_order_but_no_size():
+    found = measure_gap(*sides(r=1))
+    assert found.level.low is not None
+    assert found.srcc.estimate is not None
+    for name in ("rms", "noise_ceiling", "srcc_disattenuated", "mmrv_floor", "energy"):
+        assert getattr(found, name).estimate is None, name
+        assert "2" in getattr(found, name).refused, name
+    assert "cannot be told" in found.verdict
+
+
+def test_four_controllers_carry_no_order_and_no_interval():
+    found = measure_gap(*sides(c=4))
+    assert found.srcc.estimate is None
+    assert "1 of 24" in found.srcc.refused
+    assert found.level.estimate is not None
+    assert found.level.low is None
+    assert "5 would" in found.level.refused
+
+
+def test_equivalence_that_so_few_cannot_show_is_refused_with_the_number_that_can():
+    found = measure_gap(*sides(c=6, r=2, spread=0.1), margin=0.02).equivalence
+    assert found.more["equivalent"] is None
+    assert "would in 80 of 100" in found.refused
+
+
+def test_controllers_all_alike_have_no_order():
+    still = GapSide("sim", "SIM", np.full((6, 3), 0.1))
+    found = measure_gap(still, sides(c=6, r=3)[1])
+    assert "all controllers do equally well" in found.srcc.refused
+
+
+def test_other_controllers_on_both_sides_are_refused():
+    with pytest.raises(ValueError, match="expected the same ones"):
+        measure_gap(sides(c=6)[0], sides(c=7)[1])
+
+
+def test_a_side_must_be_finite_and_whole():
+    with pytest.raises(ValueError, match="not finite"):
+        GapSide("sim", "SIM", np.array([[np.nan]]))
+    with pytest.raises(ValueError, match="cells of sim"):
+        GapSide("sim", "SIM", np.zeros((2, 3)), np.zeros((2, 2, 5), bool))

@@ -1,0 +1,186 @@
+import json
+
+import numpy as np
+import pytest
+
+from realitygap.errors import RecordError, StudyError
+from realitygap.robots import SimPlatform
+from realitygap.study import STRATEGIES, transfer
+from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
+from realitygap.study._transfer_simulated import evolve_champions
+from realitygap.study._transferability import distances, nsga2_order
+from realitygap.trials import SimTarget
+from realitygap.world import Calibration, paper_arena
+
+# Far from `sim` as it is: wheels that are slow and hear late, and eyes that see less far.
+OTHER = {"drive.gain_left": 0.8, "drive.gain_right": 0.9, "drive.delay": 0.25, "drive.lag": 0.2}
+OTHER |= {f"range.{k}.decay": 0.1 for k in range(3)}
+SMALL = {"runs": 8, "repeats": 2, "fresh_trials": 4}
+
+
+class CountingTarget(SimTarget):
+    """Counts what it carries out, and stops when it has had enough."""
+
+    def __init__(self, enough=10**9):
+        super().__init__(SimPlatform(set=OTHER), paper_arena(), key=5, name="other")
+        self.n, self.enough = 0, enough
+
+    def carry_out(self, plans, observe, tell=None):
+        def count(k, trial):
+            self.n += 1
+            if tell is not None:
+                tell(k, trial)
+            if self.n >= self.enough:
+                raise KeyboardInterrupt
+
+        return super().carry_out(plans, observe, count)
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory):
+    """As if 6 trials had told all about the target."""
+    path = tmp_path_factory.mktemp("calibration") / "fit.toml"
+    found = Calibration(
+        kind="all", robot="scribbler-s2-fluke2", target="other", label="SIM", observe="cells", trials=6,
+        date="2026-01-01", method="told", numbers=OTHER, draws={name: (value, value) for name, value in OTHER.items()},
+    )  # fmt: skip
+    path.write_text(found.to_toml())
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory, calibration):
+    folder = tmp_path_factory.mktemp("transfer")
+    target = CountingTarget()
+    return (
+        transfer("sim-paper", target, "all", [8], out=folder, calibration=calibration, **SMALL),
+        target,
+        folder,
+    )
+
+
+def test_every_strategy_spends_exactly_its_budget(result):
+    found, _, _ = result
+    spent = {each.strategy: each.spent for each in found.champions}
+    assert spent == dict.fromkeys(STRATEGIES, 8) | {"plain": 0}
+
+
+def test_only_trials_of_budget_and_fresh_ones_are_carried_out(result):
+    found, target, _ = result
+    # a calibration that was made before costs no trial here, and counts as 6 of the 8
+    paid = sum(each.spent for each in found.champions) - 2 * 6
+    assert target.n == paid + len(found.champions) * SMALL["fresh_trials"]
+
+
+def test_quality_is_the_mean_of_fresh_trials_and_regret_what_is_missing_to_the_best(result):
+    found, _, folder = result
+    best = max(np.mean(each.coverage) for each in found.champions)
+    for row, champion in zip(found.strategies, found.champions, strict=True):
+        assert row.quality.estimate == pytest.approx(np.mean(champion.coverage))
+        assert row.regret.estimate == pytest.approx(best - np.mean(champion.coverage))
+        assert row.quality.low <= row.quality.estimate <= row.quality.high
+    assert json.loads((folder / "result.json").read_text())["best_known"] == pytest.approx(best)
+
+
+def test_an_interrupted_transfer_goes_on_and_ends_the_same(result, calibration, tmp_path):
+    whole, target, _ = result
+    arguments = ("all", [8])
+    first = CountingTarget(enough=30)
+    with pytest.raises(KeyboardInterrupt):
+        transfer("sim-paper", first, *arguments, out=tmp_path, calibration=calibration, **SMALL)
+    second = CountingTarget()
+    again = transfer("sim-paper", second, *arguments, out=tmp_path, calibration=calibration, **SMALL)
+    assert again == whole
+    assert first.n + second.n == target.n
+
+
+def test_a_folder_of_another_transfer_is_left_alone(result, calibration):
+    _, target, folder = result
+    before = target.n
+    with pytest.raises(RecordError, match="seed was 1, is 2"):
+        transfer("sim-paper", target, ["plain"], [8], out=folder, calibration=calibration, seed=2, **SMALL)
+    assert target.n == before
+
+
+def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):
+    with pytest.raises(StudyError, match="took 6 trials, more than a budget of 5"):
+        transfer(
+            "sim-paper", CountingTarget(), "posterior", 5, out=tmp_path, calibration=calibration, **SMALL
+        )
+
+
+@pytest.mark.parametrize(
+    ("study", "strategies", "text"),
+    [
+        ("sim-paper", ["plane"], "Did you mean 'plain'"),
+        ("wall", "plain", "expected coverage"),
+        ("paper", "randomized", "platform 'jyro', which has none"),
+    ],
+)
+def test_what_cannot_be_transferred_is_refused_in_words(study, strategies, text, tmp_path):
+    with pytest.raises(StudyError, match=text):
+        transfer(study, CountingTarget(), strategies, 3, out=tmp_path, **SMALL)
+
+
+def test_what_evolved_in_the_true_simulator_does_better_than_plain(calibration, tmp_path):
+    # over 4 replicates; seed fixed, and with these seeds far from chance: 0.1 of coverage and more
+    found = transfer(
+        "sim-paper", CountingTarget(), ["plain", "calibrated"], 6, out=tmp_path, calibration=calibration,
+        runs=40, repeats=4, fresh_trials=10, replicates=4,
+    )  # fmt: skip
+    plain, calibrated = (row.quality.estimate for row in found.strategies)
+    assert calibrated > plain + 0.03
+
+
+def test_champions_come_the_best_first_and_do_not_depend_on_the_other_runs():
+    from realitygap.study import choose_condition
+
+    condition = choose_condition("sim-paper", None, 3)
+    both = evolve_champions(condition, range(0, 4), repeats=2)
+    assert [each.simulated for each in both] == sorted((each.simulated for each in both), reverse=True)
+    alone = evolve_champions(condition, range(2, 3), repeats=2)
+    assert alone[0].genome.to_json() in [each.genome.to_json() for each in both]
+
+
+def test_interval_of_one_replicate_narrows_with_trials_and_holds_the_mean():
+    rng = np.random.default_rng(0)
+    few, many = (estimate_mean(rng.normal(0.5, 0.1, (1, n))) for n in (5, 500))
+    assert many.high - many.low < 0.3 * (few.high - few.low)
+    # replicates that differ count, however many trials each has
+    apart = estimate_mean(np.repeat([[0.2], [0.4], [0.6], [0.8]], 500, axis=1))
+    assert apart.high - apart.low > 0.3
+
+
+def test_summary_keeps_strategies_and_budgets_apart():
+    champions = [
+        Transferred(name, budget, 0, replicate, "", None, (value, value))
+        for name, budget, replicate, value in [
+            ("a", 1, 0, 0.1),
+            ("a", 1, 1, 0.3),
+            ("a", 2, 0, 0.5),
+            ("b", 1, 0, 0.7),
+        ]
+    ]
+    rows, best = summarize_transfer(champions)
+    assert [(row.strategy, row.budget, row.quality.n) for row in rows] == [
+        ("a", 1, 2),
+        ("a", 2, 1),
+        ("b", 1, 1),
+    ]
+    assert best == pytest.approx(0.7)
+    assert rows[0].regret.estimate == pytest.approx(0.5)
+
+
+def test_nsga2_puts_fronts_first_and_ends_of_a_front_before_its_middle():
+    #                    front 1: 0, 2, 4; front 2: 1; front 3: 3
+    objectives = np.array([[1.0, 0.0], [0.4, 0.4], [0.5, 0.5], [0.1, 0.1], [0.0, 1.0]])
+    order, front = nsga2_order(objectives)
+    assert front.tolist() == [0, 2, 4]
+    assert set(order[:2].tolist()) == {0, 4}
+    assert order[2:].tolist() == [2, 1, 3]
+
+
+def test_behavior_distance_is_jaccards_where_visits_are_sure():
+    one, other = np.array([[1.0, 1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 1.0, 0.0], [1.0, 1.0, 0.0, 0.0]])
+    assert distances(one, other).tolist() == [[1 - 1 / 3, 0.0]]
+    assert distances(np.zeros((1, 2)), np.zeros((1, 2))).tolist() == [[0.0]]

@@ -1,5 +1,7 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
+from ._contact import fit_contact
+from ._contact_plans import contact_plans
 from ._ir_checks import Independence, independence, predictive_p
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
@@ -19,8 +21,10 @@ __all__ = [
     "Placement",
     "SensorFit",
     "Simulate",
+    "contact_plans",
     "distance_of",
     "end_pose_of",
+    "fit_contact",
     "fit_motion",
     "fit_path",
     "fit_sensor",

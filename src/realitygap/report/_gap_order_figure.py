@@ -35,8 +35,8 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     size = min(width - 0.75, _MOST_ACROSS)
     order = _order_in_words(gap)
     caption = (
-        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}, across) "
-        f"and {target.trials} on {target.name} ({target.label}, up), with intervals of 95 % of each mean by t. On the "
+        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), across, "
+        f"and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. On the "
         f"line there is no gap. {order}"
     )
     alt = f"Scatter of {source.n} controllers: coverage on {source.name} against coverage on {target.name}. {order}"

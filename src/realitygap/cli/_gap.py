@@ -343,3 +343,7 @@ def _print_plan(found: GapPlan, least: float, power: float) -> None:
             f"Fewest trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} controllers with "
             f"{found.best.trials} each."
         )
+    if found.question == "effect":
+        typer.echo(
+            "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."
+        )

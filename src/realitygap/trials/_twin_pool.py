@@ -167,6 +167,8 @@ class TwinPool:
         Raises:
             RobotError: A process ended twice in the same trial; the others go on to the end of theirs.
         """
+        if self._closed.is_set():
+            raise RobotError(f"Twin {self.file} is closed: open it again.")
         asked: deque[Future[Any]] = deque(self._threads.submit(self._ask, each) for each in requests)
         try:
             while asked:
@@ -190,7 +192,7 @@ class TwinPool:
                     f"The process of twin {self.file} ended twice in the same trial (exit status {status}): {words}. "
                     "The trials before are not lost."
                 )
-            raise RobotError(f"Twin {self.file} is closed.")
+            raise RobotError(f"Twin {self.file} is closed: open it again.")
         finally:
             self._idle.put(process)
 

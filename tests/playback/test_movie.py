@@ -169,7 +169,7 @@ def test_what_stands_in_an_arena_is_shown(name):
 
 def test_an_mp4_plays_as_long_as_the_trial(tmp_path):
     path = save_movie(turning(4), tmp_path / "a.mp4", width=241, speed=2.0)
-    ffmpeg = _movie._find_ffmpeg()
+    ffmpeg = _movie.find_ffmpeg()
     said = subprocess.run([ffmpeg, "-i", str(path)], capture_output=True, text=True, check=False).stderr
     assert "Duration: 00:00:01.0" in said
     assert "h264" in said

@@ -9,7 +9,8 @@ import numpy as np
 
 from realitygap.records import OBSERVATIONS, Observe
 
-from ._handles import Handle
+from ._handles import Known, place_of
+from ._prior import Parameter
 from ._simulate import Floats
 
 TELLS = 0.5  # of the prior's interval: a posterior wider than this is said not to be identified
@@ -61,14 +62,14 @@ def collinear_groups(sensitivities: Floats, names: Sequence[str]) -> list[tuple[
 
 
 def identify_from(
-    draws: Mapping[str, Floats], handles: Mapping[str, Handle], sensitivities: Floats, free: Sequence[Handle]
+    draws: Mapping[str, Floats], known: Known, sensitivities: Floats, free: Sequence[Parameter]
 ) -> dict[str, Identified]:
     """What was learned of each parameter, from draws of its posterior."""
-    groups = collinear_groups(sensitivities.reshape(-1, len(free)), [handle.name for handle in free])
+    groups = collinear_groups(sensitivities.reshape(-1, len(free)), [parameter.name for parameter in free])
     found = {}
     for name, values in draws.items():
         low, high = np.quantile(values, [0.05, 0.95])
-        ratio = float((high - low) / (0.9 * handles[name].width))
+        ratio = (place_of(known[name], float(high)) - place_of(known[name], float(low))) / 0.9
         partners = sorted({other for group in groups if name in group for other in group} - {name})
         found[name] = Identified(ratio, ratio < TELLS, tuple(partners))
     return found

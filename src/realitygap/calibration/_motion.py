@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 from realitygap.records import Observe, ObservedTrial
 from realitygap.world import Arena, Fitted, RobotModel
 
-from ._handles import MOTION, MOTION_NOISE, Handle, handles_of, numbers_of, values_at
+from ._handles import MOTION, MOTION_NOISE, own_values, parameters_of, robot_numbers, values_at
 from ._identify import Identified, advice_for, identify_from
-from ._scatter import Scatter, scatter_handles
+from ._prior import Parameter
+from ._scatter import Scatter, scatter_parameters
 from ._shooting import (
     FIRST_NOISE,
     Problem,
@@ -75,7 +76,7 @@ def fit_motion(
     arena: Arena,
     *,
     observe: Observe | None = None,
-    prior: Mapping[str, tuple[float, float]] | None = None,
+    prior: Sequence[Parameter] | None = None,
     window: int = 1,
     seed: int = 0,
 ) -> MotionFit:
@@ -87,7 +88,7 @@ def fit_motion(
         robot: On whose numbers the fit builds.
         arena: Where it drove.
         observe: Use no more than this of the trials.
-        prior: What is thought possible, by name of the parameter, in place of `handles_of`.
+        prior: What is thought possible; `scribbler_prior` when not given.
         window: Commands from one observed pose to the next that is compared.
         seed: Of the draws.
 
@@ -108,11 +109,11 @@ def fit_motion(
             "In no trial a robot was seen to move away from walls, expected poses (observe = track) or the way of the "
             "wheels (observe = encoders). Record trials of motion_plans that way."
         )
-    handles = handles_of(robot, prior)
-    problem = make_problem(simulate, robot, windows, [handles[name] for name in MOTION])
-    place, dead_band, noise = _solve(problem, handles)
+    known = parameters_of(robot, prior)
+    problem = make_problem(simulate, robot, known, windows, MOTION)
+    place, dead_band, noise = _solve(problem)
     problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
-    return _report(problem, handles, place, noise, dead_band, np.random.default_rng(seed))
+    return _report(problem, place, noise, dead_band, np.random.default_rng(seed))
 
 
 @dataclass(frozen=True)
@@ -129,24 +130,24 @@ class DeadBand:
         return np.asarray(rng.uniform(self.edges[part], self.edges[part + 1]))
 
 
-def _solve(problem: Problem, handles: Mapping[str, Handle]) -> tuple[Floats, DeadBand, Floats]:
+def _solve(problem: Problem) -> tuple[Floats, DeadBand, Floats]:
     noise = FIRST_NOISE
     problem = problem.fixed_at(**{"drive.dead_band": plain_numbers(problem.robot)["drive.dead_band"]})
-    scatter = scatter_of(problem, problem.own, problem.slopes(problem.own))
+    scatter = scatter_of(problem, problem.own)
     place = _first_place(problem, scatter, noise)
     rng = np.random.default_rng(0)
     for _ in range(ROUNDS):
-        scatter = scatter_of(problem, place, problem.slopes(place))
-        dead_band = _dead_band(problem, handles["drive.dead_band"], scatter, noise, place)
+        scatter = scatter_of(problem, place)
+        dead_band = _dead_band(problem, scatter, noise, place)
         problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
         place, _ = best_place(problem, scatter, noise, place)
         off = np.nan_to_num(problem.off(place[None])[0])
-        noise = typical_noise(rng, scatter, off, scatter_handles(dict(handles)), noise)
+        noise = typical_noise(rng, scatter, off, scatter_parameters(problem.known), noise)
     return place, dead_band, noise
 
 
 def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
-    names = [handle.name for handle in problem.free]
+    names = [parameter.name for parameter in problem.free]
     found = []
     for delay in DELAYS if "drive.delay" in names else DELAYS[:1]:
         first = problem.own.copy()
@@ -156,20 +157,20 @@ def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
     return min(found, key=lambda pair: pair[1])[0]
 
 
-def _dead_band(problem: Problem, handle: Handle, scatter: Scatter, noise: Floats, place: Floats) -> DeadBand:
+def _dead_band(problem: Problem, scatter: Scatter, noise: Floats, place: Floats) -> DeadBand:
     """Nothing depends on it but which commands move a wheel: a number for each gap between those given."""
+    prior = problem.known["drive.dead_band"].prior
+    low, high = prior.lowest, prior.highest
     windows = problem.windows
     move, turn = windows.commands[windows.trial, windows.first].T
     wheels = np.abs(np.clip(np.concatenate([move - turn, move + turn]), -1, 1))
     given = np.unique(np.round(wheels, 6))
-    edges = np.unique(
-        np.concatenate([[handle.low], given[(given > handle.low) & (given < handle.high)], [handle.high]])
-    )
+    edges = np.unique(np.concatenate([[low], given[(given > low) & (given < high)], [high]]))
     middles = (edges[:-1] + edges[1:]) / 2
     logs = np.array([_log_likelihood(problem, scatter, noise, place, float(at)) for at in middles])
     weights = np.exp(np.maximum(logs - logs.max(), -500.0)) * np.diff(edges)
     weights /= weights.sum()
-    own = plain_numbers(problem.robot)["drive.dead_band"]
+    own = own_values(problem.robot)["drive.dead_band"]
     best = int(np.argmax(weights))
     inside = edges[best] <= own <= edges[best + 1]
     return DeadBand(float(own if inside else middles[best]), edges, weights)
@@ -184,33 +185,36 @@ def _log_likelihood(
 
 def _report(
     problem: Problem,
-    handles: Mapping[str, Handle],
     place: Floats,
     noise: Floats,
     dead_band: DeadBand,
     rng: np.random.Generator,
 ) -> MotionFit:
     slopes = problem.slopes(place)
-    scatter = scatter_of(problem, place, slopes)
+    scatter = scatter_of(problem, place)
     off = np.nan_to_num(problem.off(place[None])[0])
-    noises = scatter_handles(dict(handles))
+    noises = scatter_parameters(problem.known)
     places, scatters = draw_posterior(rng, scatter, place, slopes, off, noise, noises)
     wide = widening(scatter, slopes, off, problem.windows.trial, np.median(scatters, axis=0))
     places = np.clip(place + (places - place) * wide, 0.0, 1.0)
     draws = values_at(problem.free, places)
-    draws |= {handle.name: scatters[:, k] for k, handle in enumerate(noises[: len(MOTION_NOISE)])}
+    draws |= {parameter.name: scatters[:, k] for k, parameter in enumerate(noises[: len(MOTION_NOISE)])}
     draws["drive.dead_band"] = dead_band.draws(rng, len(places))
     best = {name: float(value[0]) for name, value in values_at(problem.free, place[None]).items()}
-    own = plain_numbers(problem.robot)
+    own = own_values(problem.robot)
     best["drive.dead_band"] = dead_band.estimate
     observe = problem.windows.trials[0].observe
-    found = identify_from(draws, handles, scatter.whitened(slopes, noise), problem.free)
+    found = identify_from(draws, problem.known, scatter.whitened(slopes, noise), problem.free)
     for name in MOTION_NOISE:
         best[name] = float(np.median(draws[name])) if found[name].identified else own[name]
-    fitted = tuple(_fitted(handles[name], best[name], draws[name], found[name], observe) for name in draws)
-    numbers = numbers_of(problem.robot, {name: np.array([value]) for name, value in best.items()})
+    fitted = tuple(
+        fitted_parameter(problem.known[name], best[name], draws[name], found[name], observe) for name in draws
+    )
+    numbers = robot_numbers(
+        problem.known, problem.robot, {name: np.array([value]) for name, value in best.items()}
+    )
     kept = rng.choice(len(places), N_DRAWS, replace=False)
-    drawn = numbers_of(problem.robot, {name: value[kept] for name, value in draws.items()})
+    drawn = robot_numbers(problem.known, problem.robot, {name: value[kept] for name, value in draws.items()})
     return MotionFit(
         fitted,
         {name: float(value[0]) for name, value in numbers.items()},
@@ -227,23 +231,26 @@ def _rms(off: Floats, seen: Bools) -> list[float]:
     ]
 
 
-def _fitted(handle: Handle, estimate: float, draws: Floats, found: Identified, observe: Observe) -> Fitted:
+def fitted_parameter(
+    parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
+) -> Fitted:
+    """A parameter with its 90 % interval, and advice where it is not identified."""
     low, high = np.quantile(draws, [0.05, 0.95])
     return Fitted(
-        name=handle.name,
+        name=parameter.name,
         estimate=estimate,
         low=float(low),
         high=float(high),
-        prior_low=handle.low,
-        prior_high=handle.high,
+        prior_low=parameter.prior.lowest,
+        prior_high=parameter.prior.highest,
         identified=found.identified,
-        unit=handle.unit,
-        advice="" if found.identified else advice_for(handle.name, observe, found.partners),
+        unit=parameter.unit,
+        advice="" if found.identified else advice_for(parameter.name, observe, found.partners),
     )
 
 
-def _notes(problem: Problem, noises: Sequence[Handle], scatters: Floats) -> tuple[str, ...]:
-    said = {handle.name: float(np.median(scatters[:, k])) for k, handle in enumerate(noises)}
+def _notes(problem: Problem, noises: Sequence[Parameter], scatters: Floats) -> tuple[str, ...]:
+    said = {parameter.name: float(np.median(scatters[:, k])) for k, parameter in enumerate(noises)}
     notes = [
         f"{len(problem.windows.trial)} windows of {problem.windows.step_s:g} s in {len(problem.windows.trials)} trials"
     ]

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from ._scatter import NoisePrior
 from ._simulate import Floats
 
 SWEEPS, BURN_IN = 600, 150
@@ -68,34 +69,72 @@ def _between(rng: np.random.Generator, a: float, b: float) -> float:
 def walk(
     rng: np.random.Generator,
     at: Floats,
-    high: Floats,
-    log_density: Callable[[Floats], float],
-    now: float,
+    prior: NoisePrior,
+    log_likelihood: Callable[[Floats], float],
     reach: Floats,
-    free: Floats,
-) -> tuple[Floats, float]:
-    """One round of Metropolis steps over numbers from 0 to `high`, one after the other; `reach` adapts.
+) -> Floats:
+    """The next draw of noise: a round of Metropolis steps, one number after the other, whose reach adapts.
 
     Args:
         rng: Random numbers.
         at: (q,) the draw before.
-        high: (q,) upper ends.
-        log_density: Of all numbers.
-        now: Its value at `at`.
+        prior: Of noise.
+        log_likelihood: Of all numbers.
         reach: (q,) standard deviations of proposals; changed.
-        free: (q,) indices of those that move.
     """
-    here = at.copy()
-    for k in free.astype(np.int64):
+    here, now = at.copy(), log_likelihood(at) + prior.log_density(at)
+    for k in range(len(at)):
         new = here.copy()
         new[k] = abs(here[k] + reach[k] * rng.standard_normal())
-        if new[k] > high[k]:
+        if not prior.low[k] <= new[k] <= prior.high[k]:
             reach[k] *= 0.95
             continue
-        value = log_density(new)
+        value = log_likelihood(new) + prior.log_density(new)
         if np.log(rng.uniform()) < value - now:
             here, now = new, value
-            reach[k] = min(reach[k] * 1.1, high[k])
+            reach[k] = min(reach[k] * 1.1, prior.high[k])
         else:
             reach[k] *= 0.94
-    return here, now
+    return here
+
+
+def sample_around(
+    rng: np.random.Generator,
+    center: Floats,
+    spread: Floats,
+    log_likelihoods: Callable[[Floats], Floats],
+    rounds: int = 3,
+    n: int = 300,
+) -> Floats:
+    """(n, p) draws from the posterior over places 0..1 of a model that need not be linear.
+
+    Importance sampling from a t distribution with 4 degrees of freedom, which each round fits anew to the draws that
+    the round before weighed (population Monte Carlo, Cappe et al. 2004).
+
+    Args:
+        rng: Random numbers.
+        center: (p,) where to begin.
+        spread: (p, p) covariance to begin with.
+        log_likelihoods: (m,) at places (m, p).
+        rounds, n: How often, and of how many draws.
+    """
+    p = len(center)
+    places, weights = np.tile(center, (n, 1)), np.full(n, 1.0 / n)
+    for _ in range(rounds):
+        root = np.linalg.cholesky(spread + 1e-10 * np.eye(p))
+        normal = rng.standard_normal((n, p))
+        tails = np.sqrt(4.0 / rng.chisquare(4.0, n))
+        places = center + (normal * tails[:, None]) @ root.T
+        inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
+        places = np.clip(places, 0.0, 1.0)
+        proposed = -0.5 * (4.0 + p) * np.log1p((normal**2).sum(axis=1) * tails**2 / 4.0)
+        logs = np.where(inside, log_likelihoods(places) - proposed, -np.inf)
+        if not np.isfinite(logs).any():
+            break
+        weights = np.exp(logs - logs.max())
+        weights /= weights.sum()
+        tempered = np.sqrt(weights) / np.sqrt(weights).sum()  # so that few heavy draws do not decide alone
+        center = tempered @ places
+        off = places - center
+        spread = (tempered[:, None] * off).T @ off
+    return np.asarray(places[rng.choice(n, n, p=weights)])

@@ -11,21 +11,24 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from realitygap.world import RobotModel
 
-from ._handles import Handle, place_of, values_at
+from ._handles import Known, own_values, place_of, values_at
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
-from ._scatter import Scatter
+from ._prior import Parameter
+from ._scatter import NoisePrior, Scatter
 from ._simulate import Bools, Floats, Ints, Simulate, plain_numbers
-from ._windows import Windows, differences, simulate_windows, ways_driven
+from ._wheel_ways import wheel_ways
+from ._windows import Windows, differences, simulate_windows, wrapped
 
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
 LEAST_WAY = 1e-4  # [m] of a wheel in a window in which it stands
 FIRST_NOISE = np.array([0.02, 0.03, 0.1, 0.05, 0.01, 0.001, 0.005, 0.005, 0.001])
 PRIOR_PRECISION = 12.0  # of an even prior over 0..1
+MOST_STEPS, MOST_DAMPING = 15, 1e4  # of least squares
+TUNING = 160  # rounds of Metropolis steps between two fits
 FEWEST_TRIALS = 4  # below which their disagreement says nothing
 
 
@@ -36,6 +39,7 @@ class Problem:
     Attributes:
         simulate: What carries out trials.
         robot: On whose numbers it builds.
+        known: What is thought possible of parameters.
         windows: What is to be met.
         free: Parameters that are fitted.
         fixed: Values of others.
@@ -44,8 +48,9 @@ class Problem:
 
     simulate: Simulate
     robot: RobotModel
+    known: Known
     windows: Windows
-    free: tuple[Handle, ...]
+    free: tuple[Parameter, ...]
     fixed: Mapping[str, float]
     own: Floats
 
@@ -53,7 +58,7 @@ class Problem:
         """(m, w, 5) observed less simulated at places (m, p)."""
         values = values_at(self.free, places)
         values |= {name: np.full(len(places), value) for name, value in self.fixed.items()}
-        simulated = simulate_windows(self.simulate, self.robot, self.windows, values)
+        simulated = simulate_windows(self.simulate, self.robot, self.known, self.windows, values)
         return differences(self.robot, self.windows, simulated, values)
 
     def slopes(self, place: Floats) -> Floats:
@@ -71,31 +76,50 @@ class Problem:
         return replace(self, fixed={**self.fixed, **values})
 
 
-def make_problem(simulate: Simulate, robot: RobotModel, windows: Windows, free: Sequence[Handle]) -> Problem:
-    now = plain_numbers(robot)
-    own = {**now, "drive.gain": (now["drive.gain_left"] + now["drive.gain_right"]) / 2,
-           "drive.asymmetry": now["drive.gain_left"] - now["drive.gain_right"]}  # fmt: skip
-    places = np.array([place_of(handle, own[handle.name]) for handle in free])
-    return Problem(simulate, robot, windows, tuple(free), {}, places)
+def make_problem(
+    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, names: Sequence[str]
+) -> Problem:
+    """Windows that are to be met by parameters of these names."""
+    own = own_values(robot)
+    places = np.array([place_of(known[name], own[name]) for name in names])
+    return Problem(simulate, robot, known, windows, tuple(known[name] for name in names), {}, places)
 
 
-def scatter_of(problem: Problem, place: Floats, slopes: Floats) -> Scatter:
+def scatter_of(problem: Problem, place: Floats) -> Scatter:
     """How windows scatter around what is simulated at a place."""
     values = values_at(problem.free, place[None])
     values |= {name: np.array([value]) for name, value in problem.fixed.items()}
     windows = problem.windows
-    way = ways_driven(problem.simulate, problem.robot, windows, values)
-    span = (windows.last - windows.first) * windows.step_s
-    names = [handle.name for handle in problem.free]
-    late = np.zeros((len(way), 5))
-    if "drive.delay" in names:
-        k = names.index("drive.delay")
-        late = slopes[:, :, k] / problem.free[k].width
-    _, after, wheels = windows.seen
+    ways = wheel_ways(problem.simulate, problem.robot, problem.known, windows, values)
+    made = simulate_windows(problem.simulate, problem.robot, problem.known, windows, values)
+    before, after, wheels = windows.seen
     seen = np.concatenate([np.repeat(np.isfinite(after[:, :1]), 3, axis=1), np.isfinite(wheels)], axis=1)
-    stands = way.max(axis=1) < LEAST_WAY
+    stands = ways.way.max(axis=1) < LEAST_WAY
     seen[stands & has_moved(windows), :3] = False
-    return Scatter(way.mean(axis=1), way, np.where(stands, 0.0, span), late, seen)
+    span = (windows.last - windows.first) * windows.step_s
+    turn = np.nan_to_num(wrapped(made.after[0, :, 2] - before[:, 2]))
+    own = plain_numbers(problem.robot)
+    slip, track = (
+        float(values[name][0]) if name in values else own[name] for name in ("drive.slip", "drive.track")
+    )
+    return Scatter(
+        way=ways.way.mean(axis=1),
+        chord=np.sinc(turn / (2 * np.pi)),
+        wheel_way=ways.way,
+        moving_s=np.where(stands, 0.0, span),
+        late=_in_channels(ways.late, slip, track),
+        carried=_in_channels(ways.carried, slip, track),
+        seen=seen,
+    )
+
+
+def _in_channels(wheels: Floats, slip: float, track: float) -> Floats:
+    """(w, 5) what ways (w, 2) of the wheels come to along, across, around and at each of them."""
+    left, right = wheels.T
+    grip = 1.0 - slip
+    return np.stack(
+        [grip * (left + right) / 2, np.zeros_like(left), grip * (right - left) / track, left, right], axis=1
+    )
 
 
 def has_moved(windows: Windows) -> Bools:
@@ -105,36 +129,55 @@ def has_moved(windows: Windows) -> Bools:
 
 
 def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats) -> tuple[Floats, float]:
-    """Where weighed squares are least from here, and their sum."""
+    """Where weighed squares are least from here, and half their sum (Levenberg-Marquardt within the ends)."""
 
     def off(place: Floats) -> Floats:
         rows = scatter.whitened(np.nan_to_num(problem.off(place[None])[0]), noise).ravel()
         return np.concatenate([rows, PULL * (place - problem.own)])
 
-    def slopes(place: Floats) -> Floats:
-        rows = scatter.whitened(problem.slopes(place), noise).reshape(-1, len(place))
-        return np.concatenate([rows, PULL * np.eye(len(place))])
+    here = np.clip(first, 0.0, 1.0)
+    left, damping = off(here), 1e-3
+    for _ in range(MOST_STEPS):
+        rows = scatter.whitened(problem.slopes(here), noise).reshape(-1, len(here))
+        slopes = np.concatenate([rows, PULL * np.eye(len(here))])
+        curvature, slope = slopes.T @ slopes, slopes.T @ left
+        while damping < MOST_DAMPING:
+            new = np.clip(here - _step(curvature, slope, here, damping), 0.0, 1.0)
+            then = off(new)
+            if then @ then < left @ left:
+                break
+            damping *= 5.0
+        else:
+            break
+        gained, moved = left @ left - then @ then, np.abs(new - here).max()
+        here, left, damping = new, then, max(damping / 5.0, 1e-6)
+        if gained < 1e-3 or moved < 1e-7:
+            break
+    return here, float(left @ left) / 2
 
-    inside = np.clip(first, 1e-3, 1.0 - 1e-3)
-    found = least_squares(
-        off, inside, jac=slopes, bounds=(0.0, 1.0), x_scale=1.0, max_nfev=25, xtol=1e-6, ftol=1e-6
-    )
-    return np.asarray(found.x), float(found.cost)
+
+def _step(curvature: Floats, slope: Floats, here: Floats, damping: float) -> Floats:
+    """Damped by each parameter's own curvature; one that would leave through an end that it is at, stays."""
+    stays = ((here <= 0.0) & (slope > 0)) | ((here >= 1.0) & (slope < 0))
+    goes = np.flatnonzero(~stays)
+    step = np.zeros_like(here)
+    part = curvature[np.ix_(goes, goes)]
+    step[goes] = np.linalg.solve(part + damping * np.diag(np.diag(part)), slope[goes])
+    return step
 
 
 def typical_noise(
-    rng: np.random.Generator, scatter: Scatter, off: Floats, handles: Sequence[Handle], first: Floats
+    rng: np.random.Generator, scatter: Scatter, off: Floats, parameters: Sequence[Parameter], first: Floats
 ) -> Floats:
     """The median of the noise's posterior where the motion is taken as known."""
-    high = np.array([handle.high for handle in handles])
-    here, reach, free = first, 0.3 * FIRST_NOISE, np.arange(len(handles), dtype=np.float64)
+    prior = NoisePrior.of(parameters)
+    here, reach = prior.inside(first), 0.3 * FIRST_NOISE
     density = partial(scatter.log_likelihood, off)
-    now = density(here)
     kept = []
-    for _ in range(250):
-        here, now = walk(rng, here, high, density, now, reach, free)
+    for _ in range(TUNING):
+        here = walk(rng, here, prior, density, reach)
         kept.append(here)
-    return np.asarray(np.median(kept[100:], axis=0))
+    return np.asarray(np.median(kept[TUNING // 2 :], axis=0))
 
 
 def draw_posterior(
@@ -144,21 +187,19 @@ def draw_posterior(
     slopes: Floats,
     off: Floats,
     noise: Floats,
-    noises: Sequence[Handle],
+    noises: Sequence[Parameter],
 ) -> tuple[Floats, Floats]:
     """Draws of places (d, p) and noise (d, q), in turn: the one where the other is known."""
-    high = np.array([handle.high for handle in noises])
+    prior = NoisePrior.of(noises)
     made = -slopes
     base = off + made @ place
-    at, scale = place.copy(), noise.copy()
-    reach, free = np.maximum(0.3 * noise, 1e-5), np.arange(len(noises), dtype=np.float64)
+    at, scale, reach = place.copy(), prior.inside(noise), np.maximum(0.3 * noise, 1e-5)
     places, scales = [], []
     for _ in range(SWEEPS + BURN_IN):
         jacobian = scatter.whitened(made, scale).reshape(-1, len(place))
         at = draw_linear(rng, at, jacobian, scatter.whitened(base, scale).ravel())
         left = base - made @ at
-        density = partial(scatter.log_likelihood, left)
-        scale, _ = walk(rng, scale, high, density, density(scale), reach, free)
+        scale = walk(rng, scale, prior, partial(scatter.log_likelihood, left), reach)
         places.append(at)
         scales.append(scale)
     return np.array(places[BURN_IN:]), np.array(scales[BURN_IN:])

@@ -10,7 +10,7 @@ import numpy as np
 from realitygap.records import ObservedTrial
 from realitygap.world import Arena, RobotModel
 
-from ._handles import numbers_of
+from ._handles import Known, robot_numbers
 from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, plain_numbers, starts_of
 
 CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
@@ -128,11 +128,11 @@ def _is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
 
 
 def simulate_windows(
-    simulate: Simulate, robot: RobotModel, windows: Windows, values: Mapping[str, Floats]
+    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
 ) -> Simulated:
     """Each window from where the robot was seen at its beginning, without noise, with each of m sets of parameters."""
     m = len(next(iter(values.values())))
-    numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | numbers_of(robot, values)
+    numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | robot_numbers(known, robot, values)
     has_poses = bool(np.isfinite(windows.anchors).any())
     done = simulate(
         starts_of(windows.trials),
@@ -181,26 +181,3 @@ def _moved(before: Floats, after: Floats, axle: Floats) -> Floats:
     x = dx * cos + dy * sin + offset * (np.cos(turn) - 1.0)
     y = dy * cos - dx * sin + offset * np.sin(turn)
     return np.stack(np.broadcast_arrays(x, y, turn), axis=-1)
-
-
-def ways_driven(
-    simulate: Simulate, robot: RobotModel, windows: Windows, values: Mapping[str, Floats]
-) -> Floats:
-    """(w, 2) how far each wheel drives in a window with one set of parameters, there and back added up [m].
-
-    As noise of `sim` counts it: the way until a command is heard, and the way after it. From what the wheel would
-    drive without delay and lag, of which lag still gives a part to the step after.
-    """
-    prompt = {**values, "drive.delay": np.zeros(1), "drive.lag": np.zeros(1)}
-    numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | numbers_of(robot, prompt)
-    done = simulate(starts_of(windows.trials), windows.commands, numbers, 0, keep=("wheels",))
-    asked = np.diff(np.asarray(done.wheels[0], np.float64), axis=1)
-    late = float(values["drive.delay"][0]) / windows.step_s
-    whole, part = int(late), late - int(late)
-    slow = min(float(values["drive.lag"][0]) / windows.step_s, 1.0 - part)
-    t = asked.shape[1]
-    padded = np.concatenate([np.zeros_like(asked[:, :1])] * (whole + 1) + [asked], axis=1)
-    before, now = padded[:, :t], padded[:, 1 : t + 1]
-    steps = part * np.abs(before) + np.abs((1.0 - part - slow) * now + slow * before)
-    total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-    return np.asarray(total[windows.trial, windows.last] - total[windows.trial, windows.first])

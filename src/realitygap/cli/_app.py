@@ -11,8 +11,10 @@ from realitygap._version import __version__
 from ._audit import audit_results
 from ._audit_distance import audit_distance
 from ._bench import bench
+from ._calibrate import calibrate
 from ._emulate import emulate
 from ._export import export
+from ._gap import gap, plan
 from ._results import digest, report
 from ._robot import robot
 from ._show import show
@@ -20,6 +22,7 @@ from ._simulate import simulate
 from ._study import new_study, run
 from ._transfer import transfer
 from ._trials import trials
+from ._twin import twin
 
 app = typer.Typer(
     name="realitygap",
@@ -57,9 +60,13 @@ app.command("export")(export)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("audit-distance")(audit_distance)
+app.command("calibrate")(calibrate)
 app.command("simulate")(simulate)
 app.command("emulate")(emulate)
 app.command("bench")(bench)
 app.add_typer(robot, name="robot")
+app.add_typer(twin, name="twin")
 app.command("trials")(trials)
+app.command("gap")(gap)
+app.command("plan")(plan)
 app.command("transfer")(transfer)

@@ -13,6 +13,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._browser import show_page
+from ._closing import CLOSING, closing_plan, refuse_options, run_closing
 from ._operator import Answers, choose_operator
 from ._results import written_report
 
@@ -29,7 +30,8 @@ def run(
     study: Annotated[
         str,
         typer.Argument(
-            metavar="STUDY", help="paper, paper-choices, paper-robot, distances, or a study file (.toml)."
+            metavar="STUDY",
+            help="paper, paper-choices, paper-robot, distances, closing-the-gap, or a study file (.toml).",
         ),
     ],
     replicates: Annotated[
@@ -98,6 +100,26 @@ def run(
     who: Annotated[
         str | None, typer.Option(metavar="NAME", help="Who counts cells. [default: your account's name]")
     ] = None,
+    twins: Annotated[
+        int | None, typer.Option(min=1, max=900, help="Of closing-the-gap: of each family. [default: 10]")
+    ] = None,
+    families: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Of closing-the-gap. [default: close,worn,slippery,delayed]"),
+    ] = None,
+    budgets: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST", help="Of closing-the-gap: trials to calibrate by. [default: 0,10,20,40]"
+        ),
+    ] = None,
+    observe: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Of closing-the-gap: what of them is seen. [default: cells,track]"),
+    ] = None,
+    small: Annotated[
+        bool, typer.Option("--small", help="Of closing-the-gap: minutes, to see that all of it works.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
@@ -111,14 +133,31 @@ def run(
     With --port, a robot drives the conditions on the platform scribbler: you are led through its trials, and nothing
     that was scored is lost. Without it they are left as they are.
 
+    closing-the-gap is a study of its own: twins of several families, each calibrated by a few trials and transferred to
+    (extra twin). --threads says how many twins go on at once.
+
     Example: realitygap run paper --replicates 1000
+
+    Example: realitygap run closing-the-gap --small
 
     Example: realitygap run paper-robot --port /dev/rfcomm0
 
     Example: realitygap run paper-robot --port "emulator://s2?fluke=2&speed=off"
 
     In Python: realitygap.run_study("paper", replicates=1000)
+
+    In Python: realitygap.study.closing_the_gap("results/closing-the-gap")
     """
+    if study == CLOSING:
+        others = {"replicates": replicates, "cluster": cluster, "chunk": chunk, "fresh": fresh, "port": port}
+        refuse_options(study, {**others, "randomize": randomize, "witness": witness, "in-flight": in_flight})
+        plan = closing_plan(
+            small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed
+        )
+        run_closing(plan, out, threads, as_json=as_json, open_page=open_page)
+        return
+    own = {"twins": twins, "families": families, "budgets": budgets, "observe": observe, "small": small}
+    refuse_options(study, own)
     from realitygap.study import load_study, refuse_port_without_robot, run_study
 
     if threads is not None and cluster is not None:

@@ -11,6 +11,8 @@ from rich.text import Text
 if TYPE_CHECKING:
     import polars as pl
 
+    from realitygap.world import Calibration
+
 
 def summary_table(summary: pl.DataFrame, title: str) -> Table:
     """Best coverage of a run: one row a condition, along the line and at the ends of steps."""
@@ -73,6 +75,27 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
         interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
         cells = [row["condition"], f"{row['n']:,}", first, last, f"{median} {interval}\n{q25} to {q75}"]
         table.add_row(*(Text(cell) for cell in cells))
+    return table
+
+
+def calibration_table(calibration: Calibration) -> Table:
+    """What was fitted: one row a parameter, with its interval and whether it is identified."""
+    table = Table(
+        title=Text(
+            f"Calibration of {calibration.kind}, {calibration.target} ({calibration.label}), {calibration.trials} "
+            f"trials, observed: {calibration.observe}"
+        ),
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+    )
+    table.add_column("parameter", overflow="fold")
+    table.add_column("estimate", justify="right", no_wrap=True)
+    table.add_column("90 % interval", no_wrap=True)
+    table.add_column("identified", no_wrap=True)
+    for each in calibration.fitted:
+        cells = [each.name, f"{each.estimate:.4g} {each.unit}".rstrip(), f"{each.low:.3g} to {each.high:.3g}"]
+        table.add_row(*(Text(cell) for cell in cells), Text("yes" if each.identified else "no"))
     return table
 
 

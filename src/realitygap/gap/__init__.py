@@ -10,6 +10,7 @@ from ._energy import energy_distances, energy_test, smallest_energy_p
 from ._equivalence import Equivalence, controllers_for_margin, equivalence_power, prove_equivalence
 from ._estimate import CONFIDENCE, Estimate
 from ._level import mean_difference, rms_of, shares_above, square_differences
+from ._means import difference_of_groups, mean_of
 from ._measure import measure_gap
 from ._plan import (
     Needed,
@@ -25,6 +26,7 @@ from ._result import MEASURES, GapResult
 from ._shapley import coalitions, shapley_values
 from ._side import GapSide
 from ._verdict import verdict_of
+from ._why import Why, explain_gap
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # all of it
@@ -65,6 +67,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "plan_correlation",
     "spread_of_differences",
     "trial_reliability",
+    # means of a few
+    "mean_of",
+    "difference_of_groups",
     # resampling
     "SMALLEST_N",
     "resampled",
@@ -72,6 +77,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "bootstrap",
     "interval",
     # why
+    "Why",
+    "explain_gap",
     "coalitions",
     "shapley_values",
 ]

@@ -23,7 +23,12 @@ _BLOCK = 4_000_000
 
 
 def resampled(
-    source: GapSide, target: GapSide, n_resamples: int, rng: np.random.Generator
+    source: GapSide,
+    target: GapSide,
+    n_resamples: int,
+    rng: np.random.Generator,
+    *,
+    smooth: bool = False,
 ) -> Iterator[tuple[Values, Values]]:
     """Samples as they could have come out, in blocks: (b, c, r) of the source and (b, c, q) of the target.
 
@@ -32,9 +37,17 @@ def resampled(
     towards the common mean until they spread, and go together on both sides, as controllers without noise do;
     residuals are lengthened by sqrt(r / (r - 1)).
 
+    Args:
+        source: The simulator's trials.
+        target: The target's.
+        n_resamples: How many samples.
+        rng: Draws them.
+        smooth: Whether means drawn twice are moved a little apart, with the covariance kept: for statistics of ranks,
+            of which a controller drawn twice makes ties that no new sample has.
+
     Source: Davison & Hinkley (1997), Bootstrap Methods and their Application, section 3.8, for two levels and the
     need to shrink. Differs: the two sides are shrunk together, by the linear map that gives their covariance the
-    noise's diagonal less.
+    noise's diagonal less. Smoothing: Silverman & Young (1987), Biometrika 74(3), 469-479.
     """
     latent = shrunk_means(source, target)
     residuals = [_residuals(side) for side in (source, target)]
@@ -43,8 +56,18 @@ def resampled(
     for first in range(0, n_resamples, block):
         b = min(block, n_resamples - first)
         who = rng.integers(0, n, (b, n))
+        means = _smoothed(latent[who], latent, rng) if smooth else latent[who]
         drawn = [_drawn(residual, who, rng) for residual in residuals]
-        yield latent[who, 0][:, :, None] + drawn[0], latent[who, 1][:, :, None] + drawn[1]
+        yield means[:, :, :1] + drawn[0], means[:, :, 1:] + drawn[1]
+
+
+def _smoothed(means: Values, latent: Values, rng: np.random.Generator) -> Values:
+    """(b, c, 2) means moved by normal numbers, and drawn towards the center so that their covariance stays."""
+    width = len(latent) ** (-1 / 6)  # of the normal reference for two dimensions
+    root = _power(np.cov(latent.T), 0.5)
+    center = latent.mean(axis=0)
+    moved = means - center + width * rng.normal(size=means.shape) @ root
+    return np.asarray(center + moved / math.sqrt(1 + width**2))
 
 
 def shrunk_means(source: GapSide, target: GapSide) -> Values:
@@ -92,10 +115,12 @@ def bootstrap(
     target: GapSide,
     n_resamples: int,
     rng: np.random.Generator,
+    *,
+    smooth: bool = False,
 ) -> dict[str, Values]:
-    """(b,) each statistic of the same resamples."""
+    """(b,) each statistic of the same resamples; arguments as in `resampled`."""
     found: dict[str, list[Values]] = {name: [] for name in statistics}
-    for one, other in resampled(source, target, n_resamples, rng):
+    for one, other in resampled(source, target, n_resamples, rng, smooth=smooth):
         for name, statistic in statistics.items():
             found[name].append(statistic(one, other))
     return {name: np.concatenate(parts) for name, parts in found.items()}

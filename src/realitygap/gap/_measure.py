@@ -97,34 +97,36 @@ class _Work:
         self.fewest = min(source.trials, target.trials)
         self.alike = [side.name for side in (source, target) if np.ptp(side.means) == 0]
         statistics: dict[str, _bootstrap.Statistic] = {"level": mean_difference}
-        if self.n >= 2 and not self.alike:
-            statistics |= {"srcc": _srcc, "mmrv": _mmrv}
         if self.fewest >= 2:
             statistics["square"] = lambda one, other: square_differences(one, other).mean(axis=1)
         self.drawn = bootstrap(statistics, source, target, n_resamples, rng)
-        if self.fewest >= 2 and not self.alike:
-            self._draw_reliabilities()
+        if self.n >= 2 and not self.alike:
+            self._draw_orders()
 
-    def _draw_reliabilities(self) -> None:
-        """Reliability of both sides, and what follows from it, of the same resamples."""
-        few = {
-            "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
-            "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
-            "raw": _srcc,
-            "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS),
-        }
-        self.drawn |= bootstrap(few, self.source, self.target, self.n_resamples, self.rng)
+    def _draw_orders(self) -> None:
+        """Statistics of ranks, and reliability of both sides of the same resamples."""
+        ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc, "mmrv": _mmrv}
+        if self.fewest >= 2:
+            ranks |= {
+                "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
+                "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
+                "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS),
+            }
+        self.drawn |= bootstrap(ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True)
+        if self.fewest < 2:
+            return
         self.reliabilities = tuple(float(reliability(values, self.rng)[0]) for values in self.pair)
 
     def _estimate(
         self, value: float, drawn: Values, change: Callable[[Values], Values] | None = None
     ) -> Estimate:
         low, high = interval(drawn, self.n)
-        if low is None:
+        if low is None or high is None:
             return Estimate(value, None, None, self.n, _no_interval(self.n))
         if change is not None:
             low, high = (float(change(np.array(end))) for end in (low, high))
-        return Estimate(value, low, high, self.n)
+        # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
+        return Estimate(value, min(low, value), max(high, value), self.n)
 
     # --- level ----------------------------------------------------------------------------------------------
 
@@ -185,7 +187,7 @@ class _Work:
             return refused
         drawn = self.drawn
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = drawn["raw"] / np.sqrt(drawn["source"] * drawn["target"])
+            ratios = drawn["srcc"] / np.sqrt(drawn["source"] * drawn["target"])
         value = float(_srcc(*self.pair)[0] / np.sqrt(np.prod(self.reliabilities)))
         found = self._estimate(_within_one(value), ratios, lambda end: np.clip(end, -1.0, 1.0))
         return Estimate(found.estimate, found.low, found.high, found.n, found.refused, {"unclipped": value})

@@ -8,12 +8,14 @@ from ._live import WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion
 from ._player import play
+from ._twin import TwinDrive, save_twin_trial, wander
 
 __all__ = [
     "WIDTH",
     "Divergence",
     "MovingTrial",
     "RobotShape",
+    "TwinDrive",
     "WatchedRobot",
     "first_visits",
     "in_motion",
@@ -21,4 +23,6 @@ __all__ = [
     "own_divergence",
     "play",
     "save_movie",
+    "save_twin_trial",
+    "wander",
 ]

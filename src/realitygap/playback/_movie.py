@@ -105,7 +105,7 @@ def save_movie(
             f"{path} ends in {ending}, expected .gif or .mp4. {did_you_mean(path.suffix, list(ENDINGS))}"
         )
     is_video = path.suffix.lower() == ".mp4"
-    encoder = _find_ffmpeg() if is_video else ""
+    encoder = find_ffmpeg() if is_video else ""
     step_s = min(trial.step_s for trial in listed)
     duration_s = max(trial.duration_s for trial in listed)
     period_s = 1 / VIDEO_RATE if is_video else picture_period(step_s / speed, duration_s / speed)
@@ -115,11 +115,11 @@ def save_movie(
         screen = Screen(listed, width, title)
         pictures = [screen.picture(float(time)) for time in times]
     if is_video:
-        write_whole(path, _video(encoder, pictures))
+        write_whole(path, video_of(encoder, pictures))
     else:
         labels = ", ".join(dict.fromkeys(trial.label for trial in listed))
         named = title or "; ".join(trial.title for trial in listed)
-        write_whole(path, _gif(pictures, duration_s / speed, f"realitygap: {labels}, {named}"))
+        write_whole(path, gif_of(pictures, duration_s / speed, f"realitygap: {labels}, {named}"))
     return path
 
 
@@ -136,14 +136,14 @@ def picture_period(step_s: float, duration_s: float) -> float:
     return max(step_s / math.ceil(step_s / MOST_S - 1e-9), min(least, step_s))
 
 
-def _gif(pictures: Sequence[Image], duration_s: float, comment: str) -> bytes:
+def gif_of(pictures: Sequence[Image], duration_s: float, comment: str) -> bytes:
     """Pictures as a GIF that lasts so long, and then rests."""
     ends = np.rint(np.linspace(0, 100 * duration_s, len(pictures))).astype(int)
     shown = [*np.diff(ends).tolist(), round(100 * HOLD_S)]
     return gif_bytes(pictures, shown, _COLORS, comment)
 
 
-def _find_ffmpeg() -> str:
+def find_ffmpeg() -> str:
     """The program that makes video: on the PATH, or the one that a package brings.
 
     Raises:
@@ -160,7 +160,7 @@ def _find_ffmpeg() -> str:
     )
 
 
-def _video(encoder: str, pictures: Sequence[Image]) -> bytes:
+def video_of(encoder: str, pictures: Sequence[Image]) -> bytes:
     """Pictures as H.264 in an MP4 that every browser plays.
 
     Raises:

@@ -18,6 +18,20 @@ from realitygap.report._audit import (
 )
 from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
+from realitygap.report._closing import (
+    FAMILY_HEAD,
+    GOAL_HEAD,
+    STRATEGY_HEAD,
+    TWIN_HEAD,
+    WHY_HEAD,
+    family_table,
+    goal_table,
+    strategy_table,
+    twin_table,
+    why_table,
+    write_closing_page,
+)
+from realitygap.report._closing_figures import draw_closing
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
@@ -40,6 +54,11 @@ from realitygap.report._effects import (
 )
 from realitygap.report._formats import save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
+from realitygap.report._gap_maps_figure import draw_gap_maps
+from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
+from realitygap.report._gap_page import refuse_gap_page, write_gap_report
+from realitygap.report._gap_replay_figure import draw_gap_replay
+from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
@@ -48,15 +67,10 @@ from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import REPORT_NAME, write_report
 from realitygap.report._paper_audit import Finding, audit_paper
 from realitygap.report._path_figure import draw_paths
-from realitygap.report._permutation import (
-    holm,
-    permutation_p,
-    runs_for_a_claim,
-    sign_flip_p,
-    smallest_p,
-)
+from realitygap.report._permutation import holm, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
-from realitygap.report._show import save_arena, save_robot, save_view
+from realitygap.report._sensor_figure import draw_sensors, save_sensor_figure
+from realitygap.report._show import save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
 from realitygap.report._statistics import (
     IntervalRanks,
@@ -70,92 +84,103 @@ from realitygap.report._summary import SUMMARY_SCHEMA, summarize
 from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
 from realitygap.report._trial_figure import draw_trial
 
-__all__ = [  # noqa: RUF022 - grouped by subject
-    # the page
-    "write_report",
+__all__ = [
+    "FAMILY_HEAD",
+    "GOAL_HEAD",
+    "NARROW",
     "REPORT_NAME",
-    # numbers
-    "summarize",
-    "summarize_tasks",
+    "STRATEGY_HEAD",
     "SUMMARY_SCHEMA",
     "TASK_SCHEMA",
-    "compare_choices",
-    "Choice",
-    "compare_conditions",
-    "Comparison",
-    "retry_champions",
-    "Champions",
-    "measure_variety",
-    "Variety",
-    "measure_agreement",
+    "TWIN_HEAD",
+    "WHY_HEAD",
+    "WIDE",
     "Agreement",
-    # small tables of anyone's
-    "audit_results",
-    "audit_notes",
     "Audit",
+    "AuditProgress",
     "AuditedCondition",
     "AuditedPair",
-    "AuditProgress",
-    "DoubtfulValue",
-    "audit_paper",
-    "Finding",
-    # distances of behaviors
-    "audit_distance",
-    "distance_notes",
-    "DistanceAudit",
+    "Champions",
+    "Choice",
+    "Comparison",
     "Confound",
-    "Estimate",
-    "draw_distance",
-    "save_distance",
-    # figures
-    "draw_coverage",
-    "draw_paths",
-    "draw_arena_and_robot",
-    "draw_individuals",
-    "draw_better_individuals",
-    "draw_networks",
-    "draw_species",
-    "draw_lineage",
-    "draw_trial",
-    "draw_choices",
+    "DistanceAudit",
+    "DoubtfulValue",
     "Drawing",
+    "Each",
+    "Estimate",
+    "Finding",
+    "Interval",
+    "IntervalRanks",
+    "MedianInterval",
+    "Quartiles",
+    "Side",
+    "Variety",
+    "a12",
+    "audit_distance",
+    "audit_notes",
+    "audit_paper",
+    "audit_results",
+    "bca_interval",
+    "chance_of_best",
+    "choose_moving",
+    "compare_choices",
+    "compare_conditions",
+    "compare_trials",
+    "detectable_effect",
+    "distance_notes",
+    "draw_arena_and_robot",
+    "draw_better_individuals",
+    "draw_choices",
+    "draw_closing",
+    "draw_coverage",
+    "draw_distance",
+    "draw_divergence",
+    "draw_gap_differences",
+    "draw_gap_maps",
+    "draw_gap_pairs",
+    "draw_gap_replay",
+    "draw_gap_why",
+    "draw_individuals",
+    "draw_lineage",
+    "draw_networks",
+    "draw_paths",
+    "draw_sensors",
+    "draw_species",
+    "draw_trial",
+    "export_frame",
+    "export_individual",
+    "family_table",
+    "goal_table",
+    "holm",
+    "interval_ranks",
+    "measure_agreement",
+    "measure_variety",
+    "median_interval",
+    "newcombe_interval",
+    "permutation_p",
+    "quartiles",
+    "refuse_gap_page",
+    "retry_champions",
+    "runs_for_a_claim",
+    "runs_needed",
+    "save_arena",
+    "save_distance",
+    "save_divergence",
     "save_drawing",
     "save_picture",
-    "save_view",
-    "save_arena",
     "save_robot",
-    # two platforms
-    "compare_trials",
-    "Side",
-    "draw_divergence",
-    "save_divergence",
-    # in motion
-    "write_movie",
-    "watch",
-    "choose_moving",
-    "Each",
-    # for other programs
-    "export_individual",
-    "export_frame",
-    "WIDE",
-    "NARROW",
-    # statistics
-    "quartiles",
-    "Quartiles",
-    "median_interval",
-    "MedianInterval",
-    "interval_ranks",
-    "IntervalRanks",
+    "save_sensor_figure",
+    "save_twin",
+    "save_view",
     "sign_flip_p",
-    "permutation_p",
     "smallest_p",
-    "runs_for_a_claim",
-    "holm",
-    "a12",
-    "bca_interval",
-    "newcombe_interval",
-    "Interval",
-    "runs_needed",
-    "detectable_effect",
-    "chance_of_best",
+    "strategy_table",
+    "twin_table",
+    "watch",
+    "why_table",
+    "write_closing_page",
+    "write_gap_report",
+    "write_movie",
+    "write_report",
 ]

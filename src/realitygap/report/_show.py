@@ -19,6 +19,7 @@ from realitygap.report._species_figure import count_species, draw_tally_species
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial, draw_chosen_trial
 from realitygap.robots import JyroPlatform
+from realitygap.robots.twin import TwinModel, load_twin, twin_picture
 from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
 Subject = Literal["run", "network", "species", "lineage"]
@@ -126,6 +127,12 @@ def save_robot(out: str | Path, name: str | Path = "jyro") -> Path:
     """Draw a robot by name or from its file into a file, with its sensors and dimensions; see `save_arena`."""
     check_ending(Path(out), _STILL)
     return save_picture(model_picture(load_robot(name)), out)
+
+
+def save_twin(out: str | Path, twin: TwinModel | str | Path) -> Path:
+    """Draw a twin, or that of a file, from above into a file, with its dimensions; see `save_arena`."""
+    check_ending(Path(out), _STILL)
+    return save_picture(twin_picture(twin if isinstance(twin, TwinModel) else load_twin(twin)), out)
 
 
 def _check_name(what: str, name: str, known: list[str]) -> None:

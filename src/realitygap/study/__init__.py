@@ -1,8 +1,17 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
 from ._bench import measure_speed
+from ._calibrate import calibrate, calibrate_from, save_calibration
+from ._closing import ClosingProgress, closing_the_gap
+from ._closing_plan import NAME as CLOSING
+from ._closing_plan import SMALL, ClosingPlan
+from ._closing_summary import summarize_closing
+from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
+from ._gap import GapStudy, run_gap, study_gap
+from ._gap_between import GapBetween, gap_between
+from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy
 from ._realism import measure_realism
@@ -15,19 +24,32 @@ from ._template import study_template
 from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
+from ._why import PARTS, calibration_of, part_of, why_gap
+from ._wrapped_targets import Guide, StoppedByPerson
 
 __all__ = [
+    "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
+    "PARTS",
     "SECTIONS",
+    "SMALL",
     "STRATEGIES",
+    "ClosingPlan",
+    "ClosingProgress",
     "ConditionNotes",
+    "Controller",
     "Estimate",
+    "GapBetween",
+    "GapPlan",
+    "GapStudy",
+    "Guide",
     "KeptTarget",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
     "ReportSection",
+    "StoppedByPerson",
     "Strategist",
     "Study",
     "StudyResult",
@@ -36,10 +58,15 @@ __all__ = [
     "TransferResult",
     "Transferred",
     "TrialsSection",
+    "calibrate",
+    "calibrate_from",
+    "calibration_of",
     "choose_condition",
+    "closing_the_gap",
     "connect_robot",
     "drive_study",
     "estimate_mean",
+    "gap_between",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -50,11 +77,21 @@ __all__ = [
     "observations_head",
     "open_target",
     "parse_study",
+    "part_of",
+    "pilot_spreads",
+    "plan_gap",
+    "recorded_spreads",
     "refuse_port_without_robot",
+    "run_gap",
     "run_study",
+    "sample_controllers",
+    "save_calibration",
     "strategy_names",
+    "study_gap",
     "study_template",
+    "summarize_closing",
     "task_settings",
     "transfer",
     "usable_processors",
+    "why_gap",
 ]

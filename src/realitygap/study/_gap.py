@@ -3,12 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from realitygap.gap import GapResult
-from realitygap.trials import Target
+import numpy as np
+
+from realitygap.errors import StudyError, whole_number
+from realitygap.evolution import Genome
+from realitygap.gap import (
+    CoverageMaps,
+    Estimate,
+    GapResult,
+    GapSide,
+    ReplayError,
+    coverage_maps,
+    difference_of_groups,
+    mean_of,
+    measure_gap,
+    replay_error,
+)
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.trials import Target, TrialPlan
+from realitygap.world import Arena, Pose
 
 from ._controllers import Controller
+from ._targets import observations_head
+
+Tell = Callable[[str, int, int], None]
+"""Called with what is being done, the trials done, and the trials in all."""
+
+MOST_TRIALS = 4_096
+"""Of a controller: trial k of controller i has the number 4096 i + k, whatever the number of trials and controllers."""
+
+MOST_CONTROLLERS = 1_024
+TARGET_FROM = MOST_TRIALS * MOST_CONTROLLERS
+"""Numbers of the target's trials begin here: they never draw the noise of those in simulation."""
+
+REEVOLVED_FROM = 2 * TARGET_FROM
+REPLAYED_FROM = 3 * TARGET_FROM
+
+REPLAYS = 4
+"""How often the commands of a trial are replayed in simulation."""
+
+MOST_REPLAYED = 60
+"""Trials that are replayed: the first of each controller, then the second, and so on."""
+
+
+@dataclass(frozen=True)
+class GapStudy:
+    """A gap that was measured, and what figures of it are drawn from.
+
+    Attributes:
+        result: All measures.
+        source, target: Trials of both sides.
+        controllers: Row k of both is of controller k.
+        arena: Where.
+        source_trials, target_trials: Trial after trial of controller after controller.
+        maps: Where trials go on both sides.
+        replay: Open-loop replays; None where nobody saw the target's robot.
+        observe: How much was seen of the target.
+    """
+
+    result: GapResult
+    source: GapSide
+    target: GapSide
+    controllers: tuple[Controller, ...]
+    arena: Arena
+    source_trials: tuple[ObservedTrial, ...]
+    target_trials: tuple[ObservedTrial, ...]
+    maps: CoverageMaps | None
+    replay: ReplayError | None
+    observe: Observe
 
 
 def run_gap(
@@ -18,20 +83,233 @@ def run_gap(
     *,
     trials: int = 10,
     margin: float | None = None,
+    observe: Observe = "cells",
+    misspecified: bool | None = None,
+    reevolved: Sequence[Controller] = (),
     seed: int = 1,
-    tell: Callable[[int, int], None] | None = None,
+    tell: Tell | None = None,
     results: str | Path | None = None,
 ) -> GapResult:
+    """Try the same controllers on a simulator and on a target, and measure the gap; as `study_gap`, measures alone."""
+    return study_gap(
+        source,
+        target,
+        controllers,
+        trials=trials,
+        margin=margin,
+        observe=observe,
+        misspecified=misspecified,
+        reevolved=reevolved,
+        seed=seed,
+        tell=tell,
+        results=results,
+    ).result
+
+
+def study_gap(
+    source: Target,
+    target: Target,
+    controllers: Sequence[Controller],
+    *,
+    trials: int = 10,
+    margin: float | None = None,
+    observe: Observe = "cells",
+    misspecified: bool | None = None,
+    reevolved: Sequence[Controller] = (),
+    seed: int = 1,
+    tell: Tell | None = None,
+    results: str | Path | None = None,
+) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
     Args:
         source: The simulator.
-        target: Where trials are costly.
-        controllers: At least 2, see `sample_controllers`.
-        trials: Of each controller on each platform.
+        target: Where trials are costly. Its trials go round the controllers, so that what changes over time, such as
+            a battery, is no controller's alone.
+        controllers: At least 2, see `sample_controllers`; of champions it is said how much of their score was luck.
+        trials: Of each controller on each platform, 1 to 4096.
         margin: Of equivalence in level, in coverage.
-        seed: Of the noise of trials on simulated platforms and of the bootstrap.
-        tell: Called with the trials done and the trials in all.
-        results: A file where the target's trials are kept as they come; those in it are not repeated.
+        observe: How much is seen of the target; with `track` commands are replayed in simulation as well.
+        misspecified: Whether a check found that the simulator cannot make what was observed.
+        reevolved: Champions that were evolved on the target: tried there, too, and set beside the champions among
+            `controllers` in simulation.
+        seed: Of the bootstrap.
+        tell: Called as trials are done.
+        results: A file where the target's trials are kept as they come; those in it are not carried out again.
+
+    Raises:
+        ValueError: A number is out of range, or so much cannot be seen.
+        StudyError: The two platforms are in different arenas.
+        RecordError: The file has trials of something else, or cannot be written.
+        RobotError: The robot failed; what was kept is safe.
     """
-    raise NotImplementedError
+    trials = whole_number("trials", trials, 1, MOST_TRIALS)
+    whole_number("number of controllers", len(controllers), 2, MOST_CONTROLLERS)
+    if source.arena.grid != target.arena.grid:
+        raise StudyError(f"{source.name} and {target.name} have different grids, expected the same arena.")
+    seen = _as_much(observe, source)
+    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM)
+    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM)
+    on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
+    own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
+    in_source = _carry_out(source, own, seen, tell)
+    one = side_of(source, in_source, len(controllers))
+    other = side_of(target, on_target[: len(plans)], len(controllers))
+    result = measure_gap(one, other, margin=margin, misspecified=misspecified, seed=seed)
+    result = replace(
+        result,
+        luck=_luck(controllers),
+        reevolved=_reevolved(controllers, one, reevolved, on_target[len(plans) :], target),
+        notes=_notes([*in_source, *on_target]),
+    )
+    return GapStudy(
+        result,
+        one,
+        other,
+        tuple(controllers),
+        target.arena,
+        tuple(_by_controller(in_source, len(controllers))),
+        tuple(_by_controller(on_target[: len(plans)], len(controllers))),
+        coverage_maps(one, other),
+        _replay(source, on_target[: len(plans)], tell),
+        observe,
+    )
+
+
+# --- trials -------------------------------------------------------------------------------------------------
+
+
+def plans_of(genomes: Sequence[Genome], trials: int, first: int) -> list[TrialPlan]:
+    """Round the controllers, again and again."""
+    return [
+        TrialPlan(genome=genome, number=first + MOST_TRIALS * i + k)
+        for k in range(trials)
+        for i, genome in enumerate(genomes)
+    ]
+
+
+def _as_much(observe: Observe, platform: Target) -> Observe:
+    return OBSERVATIONS[min(OBSERVATIONS.index(observe), OBSERVATIONS.index(platform.observes))]
+
+
+def _carry_out(
+    platform: Target, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None
+) -> list[ObservedTrial]:
+    def told(k: int, _: ObservedTrial) -> None:
+        if tell is not None:
+            tell(platform.name, k + 1, len(plans))
+
+    return platform.carry_out(plans, observe, told)
+
+
+def _carry_out_kept(
+    target: Target,
+    plans: Sequence[TrialPlan],
+    observe: Observe,
+    results: str | Path | None,
+    tell: Tell | None,
+) -> list[ObservedTrial]:
+    """Trials of the target in the order of their plans: those in the file, and the others, kept as they come."""
+    if results is None:
+        return _carry_out(target, plans, observe, tell)
+    with ObservationsFile(results, observations_head(target, observe)) as file:
+        kept = {(trial.number, trial.genome): trial for trial in file.trials}
+        keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
+        missing = [k for k, key in enumerate(keys) if key not in kept]
+
+        def keep(k: int, trial: ObservedTrial) -> None:
+            file.append(trial)
+            kept[keys[missing[k]]] = trial
+            if tell is not None:
+                tell(target.name, len(plans) - len(missing) + k + 1, len(plans))
+
+        if missing:
+            target.carry_out([plans[k] for k in missing], observe, keep)
+    return [kept[key] for key in keys]
+
+
+def _by_controller(trials: Sequence[ObservedTrial], n: int) -> list[ObservedTrial]:
+    """Trials that went round n controllers, those of a controller together."""
+    return [trials[k] for i in range(n) for k in range(i, len(trials), n)]
+
+
+def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int) -> GapSide:
+    """Trials that went round n controllers, as a side of a gap."""
+    n_cells = platform.arena.grid.n_cells
+    ordered = _by_controller(trials, n)
+    cells = np.zeros((len(ordered), n_cells), np.bool_)
+    for row, trial in zip(cells, ordered, strict=True):
+        row[list(trial.cells)] = True
+    ends = np.empty((0, 0, 2))
+    if all(len(trial.poses) for trial in ordered):
+        ends = np.array([trial.poses[-1, :2] for trial in ordered]).reshape(n, -1, 2)
+    return GapSide(
+        platform.name, platform.label, cells.mean(axis=1).reshape(n, -1), cells.reshape(n, -1, n_cells), ends
+    )
+
+
+def _replay(source: Target, observed: Sequence[ObservedTrial], tell: Tell | None) -> ReplayError | None:
+    """The target's commands replayed in simulation from where its robot was."""
+    t = min((len(trial.commands) for trial in observed), default=0)
+    there = [trial for trial in observed if len(trial.poses) > t][:MOST_REPLAYED]
+    if not there or t == 0 or source.observes != "track":
+        return None
+    plans = [
+        TrialPlan(
+            start=Pose(*there[i].poses[0].tolist()),
+            commands=np.clip(there[i].commands[:t], -1, 1),
+            number=REPLAYED_FROM + MOST_TRIALS * i + k,
+            purpose="replay",
+        )
+        for k in range(REPLAYS)
+        for i in range(len(there))
+    ]
+    replayed = _carry_out(source, plans, "track", tell)
+    poses = np.array([trial.poses[: t + 1] for trial in replayed])
+    return replay_error(
+        np.array([trial.poses[: t + 1] for trial in there]),
+        poses.reshape(REPLAYS, len(there), t + 1, 3),
+    )
+
+
+# --- what is kept apart from the transfer gap ---------------------------------------------------------------
+
+
+def _luck(controllers: Sequence[Controller]) -> Estimate:
+    """What champions lose on fresh seeds, on the platform where they were selected."""
+    lost = [
+        each.selected_score - each.fresh_score
+        for each in controllers
+        if each.selected_score is not None and each.fresh_score is not None
+    ]
+    if not lost:
+        return Estimate.refusal(0, "No controller was selected for its score where it can be tried again.")
+    return mean_of(np.array(lost))
+
+
+def _reevolved(
+    controllers: Sequence[Controller],
+    in_source: GapSide,
+    reevolved: Sequence[Controller],
+    on_target: Sequence[ObservedTrial],
+    target: Target,
+) -> Estimate:
+    """Quality of what was evolved on the target, there, less that of what was evolved in simulation, in simulation."""
+    if not reevolved:
+        return Estimate.refusal(0, "Nothing was evolved on the target (--reevolved).")
+    here = in_source.means[[k for k, each in enumerate(controllers) if each.kind == "champion"]]
+    if not len(here):
+        return Estimate.refusal(
+            0,
+            "The controllers are no champions of a simulator (--controllers STUDY), so nothing was evolved there.",
+        )
+    there = side_of(target, on_target, len(reevolved)).means
+    return difference_of_groups(here, there)
+
+
+def _notes(trials: Sequence[ObservedTrial]) -> tuple[str, ...]:
+    ends: dict[str, int] = {}
+    for trial in trials:
+        ends[trial.end] = ends.get(trial.end, 0) + 1
+    others = [f"{count} ended by {end}" for end, count in ends.items() if end != "step limit"]
+    return (f"Of {len(trials)} trials {', '.join(others)}.",) if others else ()

@@ -131,13 +131,18 @@ def try_repeatedly(
     )
 
 
-def visited_share(batch: TrialBatch, repeats: int) -> NDArray[np.float64]:
-    """(n, c) share of the repeats in which each of n genomes visits each cell; repeats of one lie together."""
+def crossed_cells(batch: TrialBatch, repeats: int) -> NDArray[np.bool_]:
+    """(n, repeats, c) whether each of n genomes crosses each cell in each of its trials, which lie together."""
     n_trials, n_cells = batch.cells.shape
-    crossed = np.zeros((n_trials, n_cells), bool)
+    crossed = np.zeros((n_trials, n_cells), np.bool_)
     rows, places = np.nonzero(np.arange(n_cells) < batch.n_line[:, None])
     crossed[rows, batch.cells[rows, places]] = True
-    return np.asarray(crossed.reshape(-1, repeats, n_cells).mean(axis=1), np.float64)
+    return np.reshape(crossed, (-1, repeats, n_cells))
+
+
+def visited_share(batch: TrialBatch, repeats: int) -> NDArray[np.float64]:
+    """(n, c) share of the repeats in which each of n genomes visits each cell; repeats of one lie together."""
+    return np.asarray(crossed_cells(batch, repeats).mean(axis=1), np.float64)
 
 
 def _population(condition: Condition, run: int) -> Population:

@@ -1,6 +1,6 @@
 """One controller on one robot, or a population on a platform."""
 
-from ._attendant import Attendant, WitnessAttendant
+from ._attendant import Attendant, RobotsOwnSenses, WitnessAttendant
 from ._batch import (
     NoiseKey,
     PlatformTrials,
@@ -51,6 +51,7 @@ __all__ = [
     "Rehearsal",
     "RobotOnlooker",
     "RobotTarget",
+    "RobotsOwnSenses",
     "SceneTrack",
     "SimEnsemble",
     "SimRobot",

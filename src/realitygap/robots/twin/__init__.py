@@ -1,9 +1,29 @@
 """Twins: robots of real wheels, motors and sensors in MuJoCo, as pseudo-reality unlike `sim`."""
 
 from ._body import TwinBody
-from ._families import FAMILIES, sample_twin
+from ._camera import TwinCamera
+from ._families import EVERY, FAMILIES, Family, FamilyRow, Range, family_rows, sample_twin
 from ._file import load_twin
+from ._ir import places_of
 from ._model import TwinModel
+from ._picture import outline_of, twin_picture
 from ._robot import TwinClock, TwinRobot
 
-__all__ = ["FAMILIES", "TwinBody", "TwinClock", "TwinModel", "TwinRobot", "load_twin", "sample_twin"]
+__all__ = [
+    "EVERY",
+    "FAMILIES",
+    "Family",
+    "FamilyRow",
+    "Range",
+    "TwinBody",
+    "TwinCamera",
+    "TwinClock",
+    "TwinModel",
+    "TwinRobot",
+    "family_rows",
+    "load_twin",
+    "outline_of",
+    "places_of",
+    "sample_twin",
+    "twin_picture",
+]

@@ -172,6 +172,50 @@ FAMILIES: dict[str, Family] = {
 """By name; the numbers of each are drawn by `sample_twin`."""
 
 
+class FamilyRow(NamedTuple):
+    """A number that a family draws.
+
+    Attributes:
+        number: Its dotted name.
+        low, high: Between which it is drawn evenly; the same where it is set.
+        part: What it belongs to: the family itself, what every twin draws, or one of an alien's oddities.
+    """
+
+    number: str
+    low: Value
+    high: Value
+    part: str
+
+
+def family_rows(name: str) -> list[FamilyRow]:
+    """All numbers that a family draws.
+
+    Args:
+        name: One of `FAMILIES`, or every, for what twins of every family draw.
+
+    Raises:
+        ValueError: There is no such family.
+    """
+    if name == "every":
+        return _rows(EVERY, name)
+    kind = _family(name)
+    own = _rows(kind.numbers, name)
+    return own + [row for part, numbers in kind.oddities.items() for row in _rows(numbers, part)]
+
+
+def _rows(numbers: Mapping[str, Range | Value], part: str) -> list[FamilyRow]:
+    return [
+        FamilyRow(name, *(how if isinstance(how, Range) else (how, how)), part)
+        for name, how in numbers.items()
+    ]
+
+
+def _family(name: str) -> Family:
+    if name not in FAMILIES:
+        raise ValueError(f"Unknown family {name!r}. {did_you_mean(name, FAMILIES)}")
+    return FAMILIES[name]
+
+
 def sample_twin(family: str, seed: int) -> TwinModel:
     """A twin drawn from a family: the same for the same seed, everywhere.
 
@@ -182,10 +226,8 @@ def sample_twin(family: str, seed: int) -> TwinModel:
     Raises:
         ValueError: There is no such family, or the seed is negative.
     """
-    if family not in FAMILIES:
-        raise ValueError(f"Unknown family {family!r}. {did_you_mean(family, FAMILIES)}")
+    kind = _family(family)
     seed = whole_number("seed", seed, 0, 2**63 - 1)
-    kind = FAMILIES[family]
     random = numbers_for(seed, zlib.crc32(family.encode()), FAMILY)
     wanted = dict(kind.numbers) if "engine" in kind.numbers else {**EVERY, **kind.numbers}
     if kind.n_oddities:
@@ -204,7 +246,7 @@ def _drawn(how: Range | Value, random: np.random.Generator) -> Value:
         return how
     if isinstance(how.low, int) and isinstance(how.high, int):
         return int(random.integers(how.low, how.high + 1))
-    return float(f"{random.uniform(how.low, how.high):.4g}")
+    return float(f"{random.uniform(how.low, how.high):.5g}")
 
 
 def _put(values: dict[str, Any], path: list[str], value: Value) -> None:

@@ -14,6 +14,12 @@ from ._random import LIGHT, numbers_for
 DARK = 1e-12  # light below which no pulse is seen
 
 
+def places_of(model: TwinModel) -> list[tuple[float, float]]:
+    """Where each sensor is, x and y [m]: with the shell its place is scaled."""
+    body = model.body
+    return [(mount.x * body.length_scale, mount.y * body.width_scale) for mount in model.ir.mount]
+
+
 class IrSensors:
     """The infrared sensors of one twin in one trial.
 
@@ -30,6 +36,7 @@ class IrSensors:
         ir = self._ir = model.ir
         self._seed, self._number = model.seed, number
         self._full, self._odd = model.battery.full, model.oddities
+        self._places = places_of(model)
         parts = np.linspace(-1.0, 1.0, ir.rays) if ir.rays > 1 else np.zeros(1)
         self._spread = parts * ir.cone
         weights = 1 - 0.5 * parts**2
@@ -42,10 +49,10 @@ class IrSensors:
         ir = self._ir
         found: dict[tuple[float, float, float], float] = {}
         values = []
-        for mount in ir.mount:
-            where = (mount.x, mount.y, mount.direction)
+        for mount, (x, y) in zip(ir.mount, self._places, strict=True):
+            where = (x, y, mount.direction)
             if where not in found:
-                far, cosine = physics.look(mount.x, mount.y, mount.direction + self._spread, ir.reach)
+                far, cosine = physics.look(x, y, mount.direction + self._spread, ir.reach)
                 back = (ir.half / np.maximum(far, 1e-3)) ** 2 * cosine**ir.incidence
                 found[where] = float(self._weights @ np.where(far < ir.reach, back, 0.0))
             values.append(mount.gain * found[where])

@@ -155,8 +155,8 @@ class TwinBattery(Settings):
 class TwinMount(Settings):
     """Where an infrared sensor is."""
 
-    x: Offset = Field(0.089, description="Ahead of the pen [m].")
-    y: Offset = Field(0.0, description="To the left of it [m].")
+    x: Offset = Field(0.089, description="Ahead of the pen [m], before the shell is scaled.")
+    y: Offset = Field(0.0, description="To the left of it [m], likewise.")
     direction: Angle = Field(0.0, description="In which it looks, positive to the left [rad].")
     gain: Annotated[float, Field(ge=0, le=10)] = Field(
         1.0, description="By which its light is stronger than that of others."

@@ -107,6 +107,7 @@ class TwinRobot:
         self._steps = self._phase = 0
         self._turned = (0.0, 0.0)
         self._points = [tuple(self._start)]
+        self._times = [0.0]
         self._seen: Observation | None = None
         self.n_steps = 0
 
@@ -169,6 +170,7 @@ class TwinRobot:
         self._encoders.turn(turned[0] - before[0], turned[1] - before[1])
         self._turned = turned
         self._points.append(tuple(pose))
+        self._times.append(self._steps * STEP_S)
 
     def stop(self) -> None:
         """Stop the motors; safe to call at any moment, and twice."""
@@ -217,6 +219,10 @@ class TwinRobot:
     def path(self) -> NDArray[np.float64]:
         """(n, 3) x [m], y [m] and heading [rad] since the start, each 40 ms or more often: the line of the pen."""
         return np.array(self._points)
+
+    def times(self) -> NDArray[np.float64]:
+        """(n,) since the start of each point of `path` [s]."""
+        return np.array(self._times)
 
     @property
     def visited_cells(self) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 from realitygap.world import Arena, Obstacle
 from realitygap.world._obstacle import Segment
+from realitygap.world._part import rounded
 from realitygap.world._placing import enclosing_walls, is_inside
 
 from ._model import TwinModel
@@ -23,6 +24,8 @@ WALL_HEIGHT = 0.089  # of the paper's blocks, 3.5 in [m]
 THIN_HALF = 0.001  # half the thickness of a wall [m]
 THICK_HALVES = (0.02, 0.01, 0.005, 0.002)  # where there is room for it behind a wall that encloses the arena
 SHELL_ABOVE = 0.035  # of the floor, where the shell meets walls [m]
+SHELL_BOTTOM, SHELL_TOP = 0.0126, 0.063  # of what is drawn [m]
+WHEEL_WIDTH = 0.0095  # that is drawn [m]
 SUPPORT = 0.006  # radius of what touches the floor besides the wheels [m]
 TIPS = 0.0005  # by which the skid is above the floor [m]
 GRAVITY = 9.81
@@ -36,9 +39,11 @@ def mjcf_of(model: TwinModel, arena: Arena) -> str:
     gravity = along * math.cos(uphill), along * math.sin(uphill), -GRAVITY * math.cos(slope)
     return f"""<mujoco model="twin">
   <option timestep="{STEP_S}" cone="elliptic" impratio="10" integrator="implicitfast" gravity="{_row(*gravity)}"/>
-  <visual><headlight ambient=".5 .5 .5"/><global offwidth="1280" offheight="960"/></visual>
+  <visual><headlight ambient=".35 .35 .35" diffuse=".5 .5 .5"/><global offwidth="1920" offheight="1920"/></visual>
+  <asset><mesh name="shell" vertex="{_shell_points(model)}"/></asset>
   <default><geom solref="{CONTACT_S} 1" solimp=".95 .99 .001" condim="3" contype="0" conaffinity="0"/></default>
   <worldbody>
+    <light pos="{_row(*arena.start[:2], 2.5)}" dir="0.2 0.3 -1" directional="true" diffuse=".4 .4 .4"/>
     <geom name="floor" type="plane" size="100 100 1" group="{FLOOR}" contype="1" friction=".0001 .0001 .0001"
           rgba=".93 .91 .87 1"/>
     {_joined(_walls(arena, model.walls.friction))}
@@ -77,11 +82,25 @@ def _chassis(model: TwinModel) -> Iterator[str]:
             f'<geom type="capsule" size="{radius}" fromto="{_row(x1, y1, height, x2, y2, height)}" group="{ROBOT}" '
             f'contype="4" conaffinity="2" mass="0" friction="{model.walls.friction} .0001 .0001" rgba=".2 .35 .75 1"/>'
         )
+    yield f'<geom type="mesh" mesh="shell" group="{DRAWN}" mass="0" rgba=".75 .13 .12 1"/>'
+    board = _row(max(mount.x for mount in model.ir.mount) * body.length_scale - 0.006, 0, height + 0.035)
+    yield f'<geom type="box" size=".002 .03 .02" pos="{board}" group="{DRAWN}" mass="0" rgba=".1 .5 .2 1"/>'
     for x, lift, friction in ((wheels.caster, 0.0, wheels.caster_friction), (wheels.skid, TIPS, 0.1)):
         yield (
             f'<geom type="sphere" size="{SUPPORT}" pos="{_row(x, 0, floor + SUPPORT + lift)}" group="{ROBOT}" '
             f'conaffinity="1" mass="0" priority="1" friction="{friction} .0001 .0001" rgba=".3 .3 .3 1"/>'
         )
+
+
+def _shell_points(model: TwinModel) -> str:
+    """The shell that is drawn: its outline below and, drawn in a little, above."""
+    corners, radius = shell_of(model)
+    low, high = -model.wheels.diameter / 2 + SHELL_BOTTOM, -model.wheels.diameter / 2 + SHELL_TOP
+    return " ".join(
+        _row(x * part, y * part, z)
+        for x, y in rounded(corners, radius)
+        for z, part in ((low, 1.0), (SHELL_ABOVE - model.wheels.diameter / 2, 1.0), (high, 0.85))
+    )
 
 
 def _wheels(model: TwinModel) -> Iterator[str]:
@@ -92,7 +111,7 @@ def _wheels(model: TwinModel) -> Iterator[str]:
             f'<joint name="{side}" type="hinge" axis="0 1 0" armature="{_geared_inertia(model)}"/>'
             f'<geom type="sphere" size="{wheels.diameter / 2}" mass="{wheels.mass}" group="{ROBOT}" conaffinity="1" '
             f'priority="2" friction="{wheels.friction} .001 .0001" rgba="0 0 0 0"/>'
-            f'<geom type="cylinder" size="{_row(wheels.diameter / 2, 0.005)}" euler="90 0 0" mass="0" '
+            f'<geom type="cylinder" size="{_row(wheels.diameter / 2, WHEEL_WIDTH / 2)}" euler="90 0 0" mass="0" '
             f'group="{DRAWN}" rgba=".15 .15 .15 1"/></body>'
         )
 

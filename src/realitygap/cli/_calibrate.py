@@ -1,0 +1,235 @@
+"""`realitygap calibrate`."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import StudyError
+
+if TYPE_CHECKING:
+    from realitygap.world import Calibration
+
+_OBSERVE = ("cells", "encoders", "track")
+
+
+def calibrate(
+    what: Annotated[str, typer.Argument(metavar="WHAT", help="path, sensors, motion, contact or all.")],
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLATFORM",
+            help="What is calibrated: scribbler:PORT, twin:FILE, sim or sim:FILE.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="The calibration to write (.toml).")
+    ] = None,
+    observe: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOW",
+            help="How much is seen of it: cells (and a ruler), encoders, or track (a camera). [default: cells]",
+        ),
+    ] = None,
+    budget: Annotated[
+        int | None, typer.Option(min=1, metavar="TRIALS", help="Trials in all. [default: what it takes]")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="DATA", help="Fit trials that were recorded before, and carry out none."
+        ),
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="On whose numbers the fit builds: a robot, its file, or an earlier calibration. "
+            "[default: scribbler-s2-fluke2]",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of trials and draws.")] = 0,
+    arena: Annotated[str, typer.Option(metavar="ARENA", help="By name or file.")] = "paper",
+    witness: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT", help="Of an emulator: it places its robot and sees where it drives."
+        ),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Of sensors: also draw the readings (.svg, .pdf, .png), as Figure 3."
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Measure a robot, and fit a simulated one to it: `sim:FILE` is the robot as it was measured.
+
+    path and sensors are the paper's calibrations: five full steps ahead and five turning, and fifty readings at each
+    distance from a wall, 3 in apart. motion fits motors and drift, contact what happens at walls, all everything at
+    once. A twin, an emulator and sim are measured unattended; with a robot you are led through at the terminal. Trials
+    are kept beside FILE as they end, and the same command goes on where it was stopped.
+
+    Example: realitygap calibrate sensors --robot sim -o sensors.toml --figure sensors.svg
+
+    Example: realitygap calibrate path --robot scribbler:/dev/rfcomm0 -o path.toml
+
+    Example: realitygap calibrate all --robot twin:worn.toml --observe track --budget 20 -o worn-fit.toml
+
+    Example: realitygap calibrate sensors --from sensors.trials.jsonl -o sensors.toml
+
+    In Python: realitygap.study.calibrate("sensors", target)
+    """
+    from realitygap.study import calibrate_from, save_calibration
+
+    out = _checked(what, robot, out, observe, data, witness, figure)
+    if data is not None:
+        made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
+    else:
+        made = _measured(what, robot or "", out, observe, budget, base, seed, arena, witness, quiet=as_json)
+    save_calibration(out, made)
+    if figure is not None:
+        from realitygap.report import save_sensor_figure
+
+        save_sensor_figure(made, figure)
+    _print(made, out, figure, as_json=as_json)
+
+
+def _checked(
+    what: str,
+    robot: str | None,
+    out: Path | None,
+    observe: str | None,
+    data: Path | None,
+    witness: str | None,
+    figure: Path | None,
+) -> Path:
+    """Refuse what cannot be, before a trial is lost on it; where the calibration goes."""
+    if (robot is None) == (data is None):
+        raise StudyError(
+            "Name what is calibrated (--robot PLATFORM), or trials that were recorded before (--from DATA), and not "
+            "both."
+        )
+    if out is None:
+        raise StudyError("Name the file that the calibration goes to: -o FILE.toml")
+    if out.suffix != ".toml":
+        raise StudyError(
+            f"{out} does not end in .toml. Expected the name of a calibration, such as fit.toml."
+        )
+    for path in (out, figure):
+        if path is not None and not path.resolve().parent.is_dir():
+            raise StudyError(
+                f"There is no folder {path.parent} for {path.name}. Make it, or name another file."
+            )
+    if observe is not None and observe not in _OBSERVE:
+        raise StudyError(f"--observe is {observe!r}, expected cells, encoders or track.")
+    if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):
+        raise StudyError("--figure draws the readings of `calibrate sensors` into a .svg, .pdf or .png.")
+    if witness is not None and data is not None:
+        raise StudyError("--witness goes with --robot: --from drives nothing.")
+    return out
+
+
+def _seen(observe: str | None) -> Any:
+    return observe
+
+
+def _measured(
+    what: str,
+    robot: str,
+    out: Path,
+    observe: str | None,
+    budget: int | None,
+    base: str | None,
+    seed: int,
+    arena: str,
+    witness: str | None,
+    *,
+    quiet: bool,
+) -> Calibration:
+    """Carry out the trials, and fit."""
+    from realitygap.robots import DEFAULT_ROBOT
+    from realitygap.study import StoppedByPerson, calibrate, open_target
+    from realitygap.world import load_arena, load_robot
+
+    from ._calibrate_attendant import TerminalAttendant
+    from ._calibrate_guide import TerminalGuide
+
+    kept = out.with_suffix(".trials.jsonl")
+    base = base or DEFAULT_ROBOT
+    where, model = load_arena(arena), load_robot(base)
+    is_led = _is_led(robot, witness)
+    again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."
+    try:
+        attendant = TerminalAttendant(where) if is_led else None
+        guide = TerminalGuide(where, model) if is_led else None
+        with open_target(robot, where, key=seed, witness=witness, attendant=attendant) as target:
+            return calibrate(
+                what,
+                target,
+                robot=base,
+                observe=_seen(observe or "cells"),
+                budget=budget,
+                seed=seed,
+                trials_file=kept,
+                guide=guide,
+                tell=None if quiet or guide is not None else _tell,
+            )
+    except StoppedByPerson:
+        typer.echo(again, err=True)
+        raise typer.Exit(0) from None
+    except KeyboardInterrupt:
+        typer.echo(f"Interrupted. {again}", err=True)
+        raise typer.Exit(130) from None
+
+
+def _is_led(robot: str, witness: str | None) -> bool:
+    """Whether a person at the terminal has to put the robot where it is to stand."""
+    name, _, port = robot.partition(":")
+    if name != "scribbler" or witness is not None:
+        return False
+    from realitygap.robots.scribbler import is_in_this_program
+
+    return not is_in_this_program(port)
+
+
+def _tell(done: int, n: int) -> None:
+    if sys.stderr.isatty():
+        typer.echo(f"\r{done} of {n} trials", nl=done == n, err=True)
+
+
+def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) -> None:
+    if as_json:
+        found = made.model_dump(exclude={"draws", "evidence"})
+        typer.echo(json.dumps({"file": str(out), **found}, indent=2))
+        return
+    from rich.console import Console
+
+    from ._study import NARROWEST
+    from ._tables import calibration_table
+
+    console = Console()
+    if console.width < NARROWEST:
+        console = Console(width=NARROWEST)
+    console.print(calibration_table(made))
+    for note in made.notes:
+        console.print(note, highlight=False, markup=False)
+    if made.misspecified:
+        typer.echo(
+            f"The simulator cannot make what was observed (p {made.misspecification_p:.3f}): what was fitted is the "
+            "nearest that it can do."
+        )
+    for line in sorted(
+        {f"{each.name.rpartition('.')[2]}: {each.advice}" for each in made.fitted if each.advice}
+    ):
+        typer.echo(f"Not identified: {line}")
+    if figure is not None:
+        typer.echo(f"Figure: {figure}")
+    typer.echo(f"Written: {out}. Simulate it with platform sim:{shlex.quote(str(out))}")

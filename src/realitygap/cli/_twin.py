@@ -1,0 +1,151 @@
+"""`realitygap twin`: robots of real wheels, motors and sensors, as pseudo-reality: drawn, shown, filmed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from realitygap.errors import RealityGapError
+
+twin = typer.Typer(
+    name="twin",
+    help="Draw twins from families, and look at them: robots of real wheels, motors and sensors, as pseudo-reality.\n\n"
+    'In Python: realitygap.robots.twin.sample_twin("worn", 1)',
+    epilog="Example: realitygap twin sample --family worn --seed 1 -o worn-1.toml",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+File = Annotated[Path, typer.Argument(metavar="FILE", help="Of a twin, from `realitygap twin sample`.")]
+
+
+@twin.command("families")
+def families(
+    name: Annotated[
+        str | None, typer.Argument(metavar="FAMILY", help="One of them; or every, what all draw.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print data as JSON.")] = False,
+) -> None:
+    """Say which families of twins there are, or which numbers one of them draws, and between what limits.
+
+    Example: realitygap twin families worn
+
+    In Python: realitygap.robots.twin.FAMILIES
+    """
+    from realitygap.robots.twin import FAMILIES, family_rows
+
+    if name is None:
+        rows = [{"family": key, "meaning": family.meaning} for key, family in FAMILIES.items()]
+    else:
+        try:
+            rows = [row._asdict() for row in family_rows(name)]
+        except ValueError as error:
+            raise RealityGapError(str(error)) from error
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+    elif not rows:
+        typer.echo(f"{name} draws what every twin does: realitygap twin families every")
+    else:
+        _print_rows([{key: _text(value) for key, value in row.items()} for row in rows])
+
+
+def _text(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _print_rows(rows: list[dict[str, str]]) -> None:
+    """Columns as wide as they must be."""
+    widths = {key: max(len(key), *(len(row[key]) for row in rows)) for key in rows[0]}
+    for row in [{key: key for key in widths}, *rows]:
+        typer.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
+
+
+@twin.command("sample")
+def sample(
+    family: Annotated[
+        str, typer.Option(metavar="FAMILY", help="Of which kind; `realitygap twin families` names them.")
+    ],
+    seed: Annotated[int, typer.Option(min=0, help="Another twin for each; also of its noise.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Instead of printing it.")
+    ] = None,
+) -> None:
+    """Draw a twin from a family: a TOML file in which every number stands below what it means.
+
+    Example: realitygap twin sample --family worn --seed 1 -o worn-1.toml
+
+    In Python: realitygap.robots.twin.sample_twin("worn", 1).to_toml()
+    """
+    from realitygap.records import write_whole
+    from realitygap.robots.twin import sample_twin
+
+    try:
+        text = sample_twin(family, seed).to_toml()
+    except ValueError as error:
+        raise RealityGapError(str(error)) from error
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    write_whole(out, text.encode("utf-8"))
+    typer.echo(f"Written: {out}")
+
+
+@twin.command("show")
+def show_twin(
+    file: File,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="PICTURE", help="Ends in .svg, .pdf or .png.")],
+) -> None:
+    """Draw a twin from above, to scale, with its dimensions.
+
+    Example: realitygap twin show worn-1.toml -o worn-1.svg
+
+    In Python: realitygap.report.save_twin("worn-1.svg", "worn-1.toml")
+    """
+    from realitygap.report import save_twin
+
+    try:
+        path = save_twin(out, file)
+    except ValueError as error:
+        raise RealityGapError(str(error)) from error
+    typer.echo(f"Written: {path}")
+
+
+@twin.command("render")
+def render(
+    file: File,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="PICTURE", help="Ends in .gif, .mp4 or .png.")],
+    arena: Annotated[
+        str, typer.Option(metavar="NAME", help="Where it drives: an arena by name, or a TOML or SVG file.")
+    ] = "paper",
+    steps: Annotated[int, typer.Option(min=1, max=10_000, help="Commands.")] = 60,
+    number: Annotated[int, typer.Option(min=0, help="Of the trial: it chooses the noise.")] = 0,
+    view: Annotated[
+        str | None,
+        typer.Option(
+            metavar="mujoco|above",
+            help="In three dimensions, or from above with rays and cells. [default: mujoco where this machine can]",
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="4 is four times as fast as it was.")] = 4.0,
+) -> None:
+    """Let a twin wander through an arena, and film it; of a .png, where it ends.
+
+    Example: realitygap twin render worn-1.toml -o worn-1.mp4
+
+    Example: realitygap twin render worn-1.toml --view above --speed 2 -o worn-1.gif
+
+    In Python: realitygap.playback.save_twin_trial(realitygap.playback.TwinDrive(model, arena), "worn-1.mp4")
+    """
+    from realitygap.playback import TwinDrive, save_twin_trial
+    from realitygap.robots.twin import load_twin
+    from realitygap.world import load_arena
+
+    try:
+        trial = TwinDrive(load_twin(file), load_arena(arena), steps, number)
+        path = save_twin_trial(trial, out, view=view, speed=speed)  # type: ignore[arg-type]  # checked there
+    except ValueError as error:
+        raise RealityGapError(str(error)) from error
+    typer.echo(f"Written: {path}")

@@ -1,0 +1,123 @@
+"""How much of a gap each part of the model carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ._bootstrap import interval
+from ._estimate import Estimate
+from ._level import rms_of
+from ._shapley import shapley_values
+from ._side import Values
+
+RESAMPLES = 2_000
+
+
+@dataclass(frozen=True)
+class Why:
+    """What each part of the model carries of the fall of the RMS gap when the fit takes the default's place.
+
+    Attributes:
+        parts: Names of the parts.
+        falls: By how much each lets the RMS gap fall: its Shapley value. Below 0 where it makes the gap larger.
+        numbers: How many numbers of each part the fit changes; a part without any carries nothing.
+        before: RMS gap with the defaults.
+        after: With the whole fit.
+    """
+
+    parts: tuple[str, ...]
+    falls: tuple[Estimate, ...]
+    numbers: tuple[int, ...]
+    before: Estimate
+    after: Estimate
+
+    @property
+    def order(self) -> list[int]:
+        """Places of the parts, the one that carries most first."""
+        return sorted(range(len(self.parts)), key=lambda k: -(self.falls[k].estimate or 0.0))
+
+    @property
+    def advice(self) -> str:
+        """What to change next, in a sentence or two."""
+        shown = [k for k in self.order if (self.falls[k].low or 0.0) > 0]
+        left = (
+            f" What is left with the whole fit, {self.after} RMS, lies outside these numbers."
+            if (self.after.low or 0.0) > 0
+            else " With the whole fit no gap is shown."
+        )
+        if not shown:
+            return (
+                "Change this next: nothing that was fitted; no part is shown to carry any of the gap. More trials or "
+                f"controllers would show smaller parts.{left}"
+            )
+        first = shown[0]
+        return (
+            f"Change this next: {self.parts[first]}, which carries {self.falls[first]} of the RMS gap of "
+            f"{self.before.estimate:.3f}.{left}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values."""
+        falls = zip(self.parts, self.falls, self.numbers, strict=True)
+        return {
+            "before": self.before.to_dict(),
+            "after": self.after.to_dict(),
+            "parts": {name: {**fall.to_dict(), "numbers": numbers} for name, fall, numbers in falls},
+            "advice": self.advice,
+        }
+
+
+def explain_gap(
+    squares: Values,
+    parts: Sequence[str],
+    numbers: Sequence[int],
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = 7,
+) -> Why:
+    """Share out the fall of the RMS gap among parts of the model.
+
+    Args:
+        squares: (1 + d, 2^g, c) unbiased square of each controller's difference (`square_differences`), with each
+            choice of g parts taken from the fit, in the order of `coalitions`: row 0 for the estimate, the others
+            for draws from its posterior.
+        parts: Names of the g parts.
+        numbers: How many numbers the fit changes in each.
+        resamples: Of the bootstrap.
+        seed: Of its draws.
+
+    Returns:
+        Shapley values. Intervals have controllers drawn anew, and with each sample of them a draw from the posterior.
+    """
+    rng = np.random.default_rng(seed)
+    n_draws, _, c = squares.shape
+    worth = rms_of(squares[0].mean(axis=1))[None]
+    which = rng.integers(1, n_draws, resamples) if n_draws > 1 else np.zeros(resamples, np.int64)
+    drawn = np.empty((resamples, squares.shape[1]))
+    for k in range(resamples):
+        drawn[k] = squares[which[k]][:, rng.integers(0, c, c)].mean(axis=1)
+    drawn = rms_of(drawn)
+    falls, others = _falls(worth)[0], _falls(drawn)
+    return Why(
+        tuple(parts),
+        tuple(_estimate(falls[k], others[:, k], c) for k in range(len(parts))),
+        tuple(numbers),
+        _estimate(worth[0, 0], drawn[:, 0], c),
+        _estimate(worth[0, -1], drawn[:, -1], c),
+    )
+
+
+def _falls(worth: Values) -> Values:
+    """(b, g) by how much each part lets the gap fall; exactly 0 where only rounding is left."""
+    return np.asarray(np.round(-shapley_values(worth), 12) + 0.0)
+
+
+def _estimate(value: float, drawn: Values, n: int) -> Estimate:
+    low, high = interval(drawn, n)
+    if low is None or high is None:
+        return Estimate(float(value), None, None, n, f"{n} controllers give no interval; 5 would.")
+    return Estimate(float(value), min(low, float(value)), max(high, float(value)), n)

@@ -1,0 +1,176 @@
+"""The page of `closing-the-gap`, and its tables: goals, families, and where goals are missed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from realitygap._version import __version__
+from realitygap.records import write_whole
+from realitygap.report._closing_figures import draw_closing
+from realitygap.report._drawing import NARROW, WIDE, inline
+
+PAGE_NAME = "report.html"
+GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "met")
+FAMILY_HEAD = (
+    "family",
+    "observed",
+    "trials",
+    "twins",
+    "RMS gap",
+    "95 % interval",
+    "twins that count",
+    "fall",
+)
+WHY_HEAD = ("goal", "twin", "figure", "p", "not told", "at an end")
+TWIN_HEAD = ("twin", "RMS gap as it is", "standard error", "counts")
+STRATEGY_HEAD = ("strategy", "twins", "coverage on the twin", "95 % interval")
+_RATIOS = ("SRCC", "MMRV")
+
+Table = list[tuple[str, ...]]
+
+
+def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
+    """Write the page: one HTML file that needs no other file and no network.
+
+    Args:
+        summary: As `summarize_closing` gives it.
+        out: The file.
+
+    Raises:
+        RecordError: It cannot be written.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("realitygap.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    wide, narrow = draw_closing(summary, width=WIDE), draw_closing(summary, width=NARROW, name="narrow")
+    css = resources.files("realitygap.report").joinpath("templates/report.css").read_text(encoding="utf-8")
+    page = environment.get_template("closing.html.jinja").render(
+        version=__version__,
+        css=css,
+        n_done=summary["n_done"],
+        n_units=summary["n_units"],
+        n_counted=summary["n_counted"],
+        n_twins=len(summary["twins"]),
+        goal_head=GOAL_HEAD,
+        goals=goal_table(summary),
+        why_head=WHY_HEAD,
+        why=why_table(summary),
+        family_head=FAMILY_HEAD,
+        families=family_table(summary),
+        figures=[
+            {
+                "anchor": key,
+                "wide": inline(drawing.svg),
+                "narrow": inline(narrow[key].svg),
+                "caption": drawing.caption,
+            }
+            for key, drawing in wide.items()
+        ],
+    )
+    path = Path(out)
+    write_whole(path, page.encode())
+    return path
+
+
+def goal_table(summary: Mapping[str, Any]) -> Table:
+    """A row a goal, in the columns of `GOAL_HEAD`."""
+    met = {True: "met", False: "missed", None: "–"}
+    return [
+        (
+            goal["name"],
+            f"{goal['sense']} {_plain(goal, goal['goal'])}",
+            _plain(goal, goal["figure"]),
+            _span(goal, lambda value, goal=goal: _plain(goal, value)),
+            str(goal["n"]),
+            met[goal["met"]],
+        )
+        for goal in summary["goals"]
+    ]
+
+
+def why_table(summary: Mapping[str, Any]) -> Table:
+    """Twins that miss a goal, in the columns of `WHY_HEAD`."""
+    rows: Table = []
+    for goal in summary["goals"]:
+        if goal["met"] is False:
+            for each in goal["why"]:
+                p = each.get("misspecification_p")
+                rows.append(
+                    (
+                        goal["name"],
+                        each["twin"],
+                        _plain(goal, each["figure"]),
+                        "–" if p is None else f"{p:.3f}",
+                        ", ".join(each.get("unidentified", [])) or "–",
+                        ", ".join(each.get("at_prior_end", [])) or "–",
+                    )
+                )
+    return rows
+
+
+def family_table(summary: Mapping[str, Any]) -> Table:
+    """RMS gap by family, observation and budget, in the columns of `FAMILY_HEAD`."""
+    return [
+        (
+            row["family"],
+            "–" if row["observe"] == "none" else row["observe"],
+            str(row["budget"]),
+            str(row["n"]),
+            _number(row["rms"]["estimate"]),
+            _span(row["rms"], _number),
+            str(row["n_counted"]),
+            "–" if row["observe"] == "none" else _percent(row["fall"]["estimate"]),
+        )
+        for row in summary["families"]
+    ]
+
+
+def twin_table(summary: Mapping[str, Any]) -> Table:
+    """Twins and whether they count, in the columns of `TWIN_HEAD`."""
+    return [
+        (
+            twin["twin"],
+            _number(twin["rms"]["estimate"]),
+            _number(twin["standard_error"]),
+            "yes" if twin["counts"] else "no",
+        )
+        for twin in summary["twins"]
+    ]
+
+
+def strategy_table(summary: Mapping[str, Any]) -> Table:
+    """Quality on the twins by strategy, in the columns of `STRATEGY_HEAD`."""
+    return [
+        (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row, _number))
+        for row in summary["strategies"]
+    ]
+
+
+def _plain(goal: Mapping[str, Any], value: float | None) -> str:
+    """A figure of a goal: a share in percent, but correlations and ratios as they are."""
+    if any(word in goal["name"] for word in _RATIOS):
+        return "–" if value is None else f"{value:.2f}"
+    return _percent(value)
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{100 * value:.0f} %".replace("-", "−")
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}".replace("-", "−")
+
+
+def _span(estimate: Mapping[str, Any], form: Any) -> str:
+    if estimate["low"] is None or estimate["high"] is None:
+        return "–"
+    return f"{form(estimate['low'])} to {form(estimate['high'])}"

@@ -1,0 +1,289 @@
+"""The figures of `closing-the-gap`: the gap by budget, before and after, transfer by strategy, order of controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from realitygap.drawing import Ink
+from realitygap.report._drawing import (
+    NARROW,
+    WIDE,
+    Drawing,
+    draw_line,
+    house_style,
+    new_figure,
+    place_axes,
+    to_svg,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Summary = Mapping[str, Any]
+COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "track": Ink.OURS}
+"""By what calibrating saw."""
+
+MARKERS = {"none": "o", "cells": "s", "track": "D"}
+_HEAD, _FOOT, _LEFT, _RIGHT, _GAP = 0.52, 0.5, 0.55, 0.12, 0.34
+
+
+def draw_closing(summary: Summary, *, width: float = WIDE, name: str = "closing") -> dict[str, Drawing]:
+    """All figures that the summary of `closing-the-gap` has enough for, by name.
+
+    Args:
+        summary: As `summarize_closing` gives it.
+        width: Of each [in].
+        name: What ids in them begin with.
+    """
+    drawers = {
+        "budget": draw_budget,
+        "scatter": draw_scatter,
+        "strategies": draw_strategies,
+        "order": draw_order,
+    }
+    found = {}
+    for key, draw in drawers.items():
+        drawing = draw(summary, width=width, name=f"{name}-{key}")
+        if drawing is not None:
+            found[key] = drawing
+    return found
+
+
+def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") -> Drawing | None:
+    """RMS gap against budget, a panel a family: each twin thin, medians thick."""
+    families = [family for family in summary["plan"]["families"] if _of(summary, family)]
+    if not families:
+        return None
+    top = 1.08 * max(twin["rms"]["estimate"] or 0 for twin in summary["twins"]) or 1.0
+    budgets = sorted(summary["plan"]["budgets"])
+    caption = (
+        "Root mean square over the held-out controllers of the difference between mean coverage on the twin (TWIN) and "
+        "in simulation (SIM), noise taken out, against the trials that calibrating was given; by family, and by what "
+        "it saw of these trials. Thin lines: twins. Thick lines: medians."
+    )
+    alt = "RMS gap against budget of trials, a panel for each family of twins."
+
+    def draw(axes: Axes, family: str) -> None:
+        axes.set_xlim(-0.04 * budgets[-1], 1.04 * budgets[-1] or 1)
+        axes.set_ylim(0, top)
+        axes.set_xticks(budgets)
+        for observe in summary["plan"]["observations"]:
+            _budget_lines(axes, summary, family, observe)
+        axes.set_xlabel("trials for calibrating", labelpad=2)
+        _title(axes, family, f"{len(_of(summary, family))} twins")
+
+    with house_style():
+        figure, panels = _panels(width, len(families), 1.9)
+        for axes, family in zip(panels, families, strict=True):
+            draw(axes, family)
+        panels[0].set_ylabel("RMS gap, TWIN less SIM", labelpad=3)
+        _key(figure, [(observe, observe) for observe in summary["plan"]["observations"]])
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+
+
+def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> None:
+    color = COLORS.get(observe, Ink.PEN3)
+    for twin in _of(summary, family):
+        points = [(0, twin["rms"]["estimate"])]
+        points += [
+            (each["budget"], each["rms"]["estimate"])
+            for each in twin["calibrated"]
+            if each["observe"] == observe
+        ]
+        points = sorted((x, y) for x, y in points if y is not None)
+        if points:
+            draw_line(axes, *zip(*points, strict=True), color=color, linewidth=0.6, alpha=0.45)
+    rows = [
+        row
+        for row in summary["families"]
+        if row["family"] == family
+        and row["observe"] in ("none", observe)
+        and row["rms"]["estimate"] is not None
+    ]
+    points = sorted((row["budget"], row["rms"]["estimate"]) for row in rows)
+    if points:
+        marker = MARKERS.get(observe, "o")
+        draw_line(axes, *zip(*points, strict=True), color=color, linewidth=2.0, marker=marker, markersize=4.5)
+
+
+def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter") -> Drawing | None:
+    """Each held-out controller: mean coverage in simulation against that on the twin, before and after."""
+    budget = summary["budget"]
+    kinds = [
+        "none",
+        *(observe for observe in summary["plan"]["observations"] if _after(summary, observe, budget)),
+    ]
+    if not summary["twins"]:
+        return None
+    caption = (
+        "Each point is a held-out controller on a twin: its mean coverage in simulation (SIM) and on the twin (TWIN); "
+        f"before, and after calibrating by {budget} trials. On the diagonal the simulation is right."
+    )
+    alt = "Coverage in simulation against that on the twin, before and after calibrating."
+    with house_style():
+        figure, panels = _panels(width, len(kinds), 2.2)
+        for axes, kind in zip(panels, kinds, strict=True):
+            means = (
+                [twin["means"] for twin in summary["twins"]]
+                if kind == "none"
+                else [each["means"] for _, each in _after(summary, kind, budget)]
+            )
+            xs = np.concatenate([each["source"] for each in means])
+            ys = np.concatenate([each["target"] for each in means])
+            axes.set_xlim(0, 1)
+            axes.set_ylim(0, 1)
+            draw_line(axes, [0, 1], [0, 1], color=Ink.MUTED, linewidth=0.7)
+            draw_line(
+                axes, xs, ys, linestyle="none", marker="o", markersize=2.0, markeredgewidth=0,
+                color=COLORS.get(kind, Ink.PEN3), alpha=0.45,
+            )  # fmt: skip
+            axes.set_xlabel("coverage, SIM", labelpad=2)
+            title = "as it is" if kind == "none" else f"calibrated, {kind}"
+            _title(axes, title, f"{len(xs)} points, {len(means)} twins")
+        panels[0].set_ylabel("coverage, TWIN", labelpad=3)
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+
+
+def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strategies") -> Drawing | None:
+    """Quality on the twins by strategy: each twin, and the mean with its interval."""
+    rows = summary["strategies"]
+    if not rows:
+        return None
+    values = {
+        row["strategy"]: [
+            each["quality"]["estimate"]
+            for twin in summary["twins"]
+            for each in twin.get("transfer", [])
+            if each["strategy"] == row["strategy"]
+        ]
+        for row in rows
+    }
+    highest = 1.05 * max(max(each) for each in values.values())
+    caption = (
+        f"Mean coverage on the twin (TWIN) in fresh trials of what each strategy chose with "
+        f"{summary['plan']['transfer_budget']} trials on it. Small points: twins. Large points and bars: mean over "
+        "twins and its 95 % interval."
+    )
+    alt = "Coverage on the twins by strategy of transfer."
+    with house_style():
+        left = 1.35
+        height = 0.27 * len(rows)
+        figure = new_figure(width, _HEAD + height + _FOOT)
+        axes = place_axes(figure, left, _HEAD, width - left - _RIGHT, height)
+        axes.set_xlim(0, highest or 1)
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_yticks(range(len(rows)), [row["strategy"] for row in rows])
+        axes.tick_params(axis="y", length=0)
+        for place, row in enumerate(rows):
+            color = Ink.OURS if row["strategy"].startswith("posterior") else Ink.RUN
+            spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values[row["strategy"]]))
+            draw_line(
+                axes, values[row["strategy"]], place + spread, linestyle="none", marker="o", markersize=2.2,
+                markeredgewidth=0, color=color, alpha=0.45,
+            )  # fmt: skip
+            if row["low"] is not None:
+                draw_line(axes, [row["low"], row["high"]], [place, place], color=color, linewidth=2.0)
+            draw_line(axes, [row["estimate"]], [place], color=color, marker="o", markersize=6)
+        axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
+        _title(axes, "Transfer by strategy", f"{max(row['n'] for row in rows)} twins")
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+
+
+def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") -> Drawing | None:
+    """SRCC and MMRV of each twin, before and after, beside their goals."""
+    if not summary["twins"]:
+        return None
+    budget = summary["budget"]
+    groups = {"as it is": ("none", [twin["gap"] for twin in summary["twins"]])}
+    for observe in summary["plan"]["observations"]:
+        found = [each["gap"] for _, each in _after(summary, observe, budget)]
+        if found:
+            groups[f"calibrated, {observe}"] = (observe, found)
+    caption = (
+        "Left: Spearman’s correlation over the held-out controllers of coverage in simulation (SIM) and on the twin "
+        "(TWIN), disattenuated. Right: mean maximum rank violation over its floor, that of one half of the twin’s "
+        f"trials by the other. Points: twins; bars: medians; lines: goals. Calibrated by {budget} trials."
+    )
+    alt = "Disattenuated SRCC, and MMRV over its floor, of each twin before and after calibrating."
+    goals = {"srcc_disattenuated": 0.95, "mmrv_ratio": 2.0}
+    titles = {"srcc_disattenuated": "Disattenuated SRCC", "mmrv_ratio": "MMRV over its floor"}
+    with house_style():
+        figure, panels = _panels(width, 2, 0.32 * len(groups), left=1.35)
+        for axes, (measure, goal) in zip(panels, goals.items(), strict=True):
+            known = {
+                label: (kind, [each[measure] for each in found if each[measure] is not None])
+                for label, (kind, found) in groups.items()
+            }
+            largest = max((value for _, each in known.values() for value in each), default=goal)
+            lowest = min((value for _, each in known.values() for value in each), default=0.0)
+            axes.set_xlim(min(0.0, lowest), 1.05 * max(largest, goal))
+            axes.set_ylim(len(groups) - 0.5, -0.5)
+            draw_line(axes, [goal, goal], [-0.5, len(groups)], color=Ink.PUBLISHED, linewidth=1.0)
+            for place, (kind, values) in enumerate(known.values()):
+                if values:
+                    color = COLORS.get(kind, Ink.PEN3)
+                    spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values))
+                    draw_line(
+                        axes, values, place + spread, linestyle="none", marker="o", markersize=2.4,
+                        markeredgewidth=0, color=color, alpha=0.5,
+                    )  # fmt: skip
+                    middle = float(np.median(values))
+                    draw_line(axes, [middle, middle], [place - 0.3, place + 0.3], color=color, linewidth=2.4)
+            axes.set_yticks(range(len(groups)), list(groups) if axes is panels[0] else [""] * len(groups))
+            axes.tick_params(axis="y", length=0)
+            at_least = "at least" if measure.startswith("srcc") else "at most"
+            _title(axes, titles[measure], f"goal: {at_least} {goal:g}")
+        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+
+
+# --- parts --------------------------------------------------------------------------------------------------
+
+
+def _of(summary: Summary, family: str) -> list[Summary]:
+    return [
+        twin for twin in summary["twins"] if twin["family"] == family and twin["rms"]["estimate"] is not None
+    ]
+
+
+def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, Summary]]:
+    return [
+        (twin, each)
+        for twin in summary["twins"]
+        for each in twin["calibrated"]
+        if (each["observe"], each["budget"]) == (observe, budget)
+    ]
+
+
+def _panels(width: float, n: int, height: float, left: float = _LEFT) -> tuple[Figure, list[Axes]]:
+    """Axes beside each other where the figure is wide, below each other where it is narrow."""
+    wide = width > NARROW + 1
+    columns = n if wide else 1
+    each = (width - left - _RIGHT - (columns - 1) * _GAP) / columns
+    row = _HEAD + height + _FOOT
+    figure = new_figure(width, row * (1 if wide else n))
+    panels = []
+    for k in range(n):
+        column, line = (k, 0) if wide else (0, k)
+        panels.append(place_axes(figure, left + column * (each + _GAP), line * row + _HEAD, each, height))
+    return figure, panels
+
+
+def _title(axes: Axes, title: str, text: str) -> None:
+    place = {"xy": (0, 1), "xycoords": "axes fraction", "textcoords": "offset points"}
+    axes.annotate(title, xytext=(0, 16), fontsize=9, weight="bold", **place)  # type: ignore[arg-type]
+    axes.annotate(text, xytext=(0, 5.5), fontsize=7.5, color=Ink.MUTED, **place)  # type: ignore[arg-type]
+
+
+def _key(figure: Figure, entries: Sequence[tuple[str, str]]) -> None:
+    """What colors and markers mean, in the upper right corner."""
+    width = figure.get_size_inches()[0]
+    height = figure.get_size_inches()[1]
+    for k, (kind, text) in enumerate(reversed(entries)):
+        figure.text(
+            1 - (_RIGHT + 0.72 * k) / width, 1 - 0.12 / height, f"— {text}",
+            ha="right", va="top", fontsize=7.5, color=COLORS.get(kind, Ink.PEN3),
+        )  # fmt: skip

@@ -1,0 +1,302 @@
+"""A calibration: trials on a target, kept as they end, and the fit to them."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from realitygap.calibration import ruled
+from realitygap.errors import StudyError, did_you_mean
+from realitygap.records import (
+    OBSERVATIONS,
+    Observations,
+    ObservationsFile,
+    Observe,
+    ObservedTrial,
+    read_observations,
+    write_whole,
+)
+from realitygap.robots import DEFAULT_ROBOT, SimPlatform
+from realitygap.trials import Target, TrialPlan
+from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
+
+from ._calibrate_all import calibrate_all, calibration_of
+from ._calibrate_kinds import KINDS, Kind, Parts
+from ._targets import observations_head
+from ._wrapped_targets import (
+    PATH,
+    CountingTarget,
+    Guide,
+    GuidedTarget,
+    ResumableTarget,
+    RuledTarget,
+    is_whole,
+)
+
+SEED_STRIDE = 10_000
+"""Between the numbers of trials of calibrations with different seeds."""
+
+ALL = "all"
+"""The kind that fits everything at once."""
+
+BUDGET_OF_ALL = 20
+"""Trials where no budget is given."""
+
+Tell = Callable[[int, int], None]
+"""Told of how many of how many trials are there."""
+
+
+def calibrate(
+    kind: str,
+    target: Target,
+    *,
+    robot: str | Path = DEFAULT_ROBOT,
+    observe: Observe = "cells",
+    budget: int | None = None,
+    seed: int = 0,
+    trials_file: Path | None = None,
+    guide: Guide | None = None,
+    tell: Tell | None = None,
+) -> Calibration:
+    """Carry out the trials of a calibration on a target, and fit a simulated robot to what is observed.
+
+    Args:
+        kind: path, sensors, motion, contact or all.
+        target: What is calibrated.
+        robot: On whose numbers the fit builds: a name, a file, or an earlier calibration, whose numbers stay where this
+            one has none.
+        observe: How much to look at.
+        budget: Trials in all; what the kind needs when not given.
+        seed: Of trials and draws.
+        trials_file: Where trials are kept as they end, and taken up from; nowhere when not given.
+        guide: Who puts the robot where it has to stand; nobody has to where the target places itself.
+        tell: Called after each trial.
+
+    Raises:
+        StudyError: There is no such kind, or the target, the robot and the kind do not go together.
+        RobotError: The robot failed; what was recorded is kept.
+        StoppedByPerson: The guide was told to stop; what was recorded is kept.
+    """
+    _refuse(kind, target, robot, observe, budget)
+    around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
+    if trials_file is None:
+        return _calibrated(kind, around, robot, observe, budget, seed, tell)
+    with ObservationsFile(trials_file, observations_head(target, observe, str(robot))) as file:
+        return _calibrated(kind, ResumableTarget(around, file), robot, observe, budget, seed, tell)
+
+
+def _calibrated(
+    kind: str,
+    target: Target,
+    robot: str | Path,
+    observe: Observe,
+    budget: int | None,
+    seed: int,
+    tell: Tell | None,
+) -> Calibration:
+    if kind == ALL:
+        n = BUDGET_OF_ALL if budget is None else budget
+        counted = CountingTarget(target, n, tell)
+        try:
+            made = calibrate_all(counted, robot=load_robot(robot), observe=observe, budget=n, seed=seed)
+        except ValueError as error:
+            raise StudyError(str(error)) from error
+        return _calibration(kind, _parts_of(made), robot, target.name, target.label, observe, made.trials)
+    plans = _plans(KINDS[kind], target.arena, load_robot(robot), budget)
+    numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
+    trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
+    parts = _fit(kind, trials, robot, target.arena, observe, seed)
+    return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
+
+
+def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
+    """Return where a calibration can be carried out.
+
+    Raises:
+        StudyError: It cannot be.
+    """
+    _check_kind(kind)
+    base, made = load_robot(robot), KINDS.get(kind)
+    if made is not None and budget is not None and budget < made.least:
+        raise StudyError(
+            f"--budget is {budget}, and a calibration of {kind} takes at least {made.least} trials."
+        )
+    if made is not None and observe not in made.observes:
+        raise StudyError(
+            f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
+            f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
+        )
+    if len(base.range) != target.n_sensors:
+        raise StudyError(
+            f"{target.name} has {target.n_sensors} range sensors and robot {base.name!r} {len(base.range)}. Build on "
+            "the robot that it is (--base ROBOT)."
+        )
+
+
+def calibrate_from(
+    kind: str, data: Path, *, robot: str | Path | None = None, observe: Observe | None = None, seed: int = 0
+) -> Calibration:
+    """Fit a simulated robot to trials that were recorded before.
+
+    Args:
+        kind: As in `calibrate`.
+        data: A file of observed trials.
+        robot: On whose numbers the fit builds; the one that the file names when not given.
+        observe: To use less than was recorded.
+        seed: Of draws.
+
+    Raises:
+        StudyError: There is no such kind, or the file has nothing to fit it to.
+        RecordError: The file cannot be read.
+    """
+    _check_kind(kind)
+    found = read_observations(data)
+    robot = found.head.robot if robot is None else robot
+    arena = Arena.from_dict(dict(found.head.arena))
+    seen = observe or found.head.observe
+    if OBSERVATIONS.index(seen) > OBSERVATIONS.index(found.head.observe):
+        raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
+    trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
+    parts = _fit(kind, trials, robot, arena, seen, seed)
+    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, len(trials))
+    return made.model_copy(update={"notes": (*made.notes, found.problem)}) if found.problem else made
+
+
+def save_calibration(path: Path, calibration: Calibration) -> None:
+    """Write a calibration, whole: the file that was there or the new one, and nothing between.
+
+    A robot's file that it builds on is named as it is found from the folder of `path`.
+
+    Raises:
+        RecordError: It cannot be written.
+    """
+    robot = calibration.robot
+    if Path(robot).is_file():
+        robot = os.path.relpath(Path(robot).resolve(), path.resolve().parent)
+    write_whole(path, calibration.model_copy(update={"robot": robot}).to_toml().encode())
+
+
+def _check_kind(kind: str) -> None:
+    if kind not in (*KINDS, ALL):
+        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, (*KINDS, ALL))}")
+
+
+def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    try:
+        return kind.plans(arena, robot, budget)
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+
+
+def _fit(
+    kind: str,
+    trials: Sequence[ObservedTrial],
+    robot: str | Path,
+    arena: Arena,
+    observe: Observe,
+    seed: int,
+) -> Parts:
+    base = load_robot(robot)
+    try:
+        if kind != ALL:
+            return KINDS[kind].fit(trials, base, arena, observe, seed)
+        step_s = trials[0].step_s if trials else base.step_s
+        made = calibration_of(
+            trials, SimPlatform(robot=base, step_s=step_s), arena, robot_name=base.name, target="", label="SIM",
+            observe=observe, seed=seed,
+        )  # fmt: skip
+        return _parts_of(made)
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+
+
+def _parts_of(made: Calibration) -> Parts:
+    return Parts(
+        made.fitted,
+        made.numbers,
+        made.draws,
+        made.method,
+        made.notes,
+        made.misspecified,
+        made.misspecification_p,
+        made.evidence,
+    )
+
+
+def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:
+    """Trials that were cut off, and those of which a later one with the same number took the place, are left out."""
+    whole = [trial for trial in found.trials if is_whole(trial)]
+    return list({(trial.purpose, trial.number, trial.start): trial for trial in whole}.values())
+
+
+def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+    """A trial with no more than was to be observed."""
+    if observe != "track" and len(trial.poses):
+        trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
+    return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
+
+
+def _calibration(
+    kind: str,
+    parts: Parts,
+    robot: str | Path,
+    target: str,
+    label: str,
+    observe: Observe,
+    n_trials: int,
+) -> Calibration:
+    """The parts of a fit laid over an earlier calibration, where it builds on one."""
+    below = read_calibration(robot)
+    numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
+    fitted, notes = parts.fitted, parts.notes
+    name = str(robot)
+    if below is not None:
+        name = _beside(below.robot, Path(robot))
+        numbers = {**below.numbers, **numbers}
+        draws = _paired(below.draws, draws)
+        names = {each.name for each in fitted}
+        fitted = (*(each for each in below.fitted if each.name not in names), *fitted)
+        notes = (*notes, f"Builds on {Path(robot).name}: {below.kind} of {below.target}, {below.date}.")
+    return Calibration(
+        kind=kind,
+        robot=name,
+        target=target,
+        label=label,
+        observe=observe,
+        trials=n_trials,
+        date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        method=parts.method,
+        fitted=tuple(fitted),
+        numbers=numbers,
+        draws={key: tuple(values) for key, values in draws.items()},
+        misspecified=parts.misspecified,
+        misspecification_p=parts.misspecification_p,
+        notes=tuple(notes),
+        evidence=parts.evidence,
+    )
+
+
+def _beside(robot: str, calibration: Path) -> str:
+    """The robot that a calibration names, as it is found from here."""
+    beside = calibration.parent / robot
+    return str(beside) if beside.is_file() else robot
+
+
+def _paired(
+    below: Mapping[str, Sequence[float]], above: Mapping[str, Sequence[float]]
+) -> dict[str, list[float]]:
+    """Draws of two calibrations as draws of both, row by row at random: they were fitted apart."""
+    n = max((len(values) for values in (*below.values(), *above.values())), default=0)
+    rng = np.random.default_rng(0)
+
+    def spread(draws: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+        size = max((len(values) for values in draws.values()), default=1)
+        rows = np.concatenate([rng.permutation(size) for _ in range(-(-n // size))])[:n]
+        return {name: np.asarray(values)[rows].tolist() for name, values in draws.items()}
+
+    return {name: values for name, values in spread(below).items() if name not in above} | spread(above)

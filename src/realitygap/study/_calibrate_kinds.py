@@ -1,0 +1,232 @@
+"""What can be calibrated: the trials that it takes, and the fit to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.calibration import (
+    LEAST_PLACEMENTS,
+    MotionFit,
+    Moved,
+    Placement,
+    SensorFit,
+    Simulate,
+    fit_motion,
+    fit_path,
+    fit_sensor,
+    motion_plans,
+    path_plans,
+    placements_of,
+    sensor_plans,
+)
+from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
+from realitygap.robots import Command, SimPlatform
+from realitygap.trials import SimEnsemble, SimRobot, TrialPlan
+from realitygap.world import Arena, Fitted, Pose, RobotModel
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a fit adds to a calibration; attributes as there."""
+
+    fitted: tuple[Fitted, ...]
+    numbers: Mapping[str, float]
+    draws: Mapping[str, Sequence[float] | NDArray[np.float64]]
+    method: str
+    notes: tuple[str, ...] = ()
+    misspecified: bool = False
+    misspecification_p: float = 1.0
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What can be calibrated.
+
+    Attributes:
+        plans: Trials for an arena, a robot and a budget.
+        fit: From trials, the robot to build on, the arena, how much was observed, and the seed of draws.
+        least: Trials that it takes.
+        observes: How much has to be observed for anything to be told.
+    """
+
+    plans: Callable[[Arena, RobotModel, int | None], Sequence[TrialPlan]]
+    fit: Callable[[Sequence[ObservedTrial], RobotModel, Arena, Observe, int], Parts]
+    least: int = 1
+    observes: tuple[Observe, ...] = OBSERVATIONS
+
+
+# path
+
+_PATH_METHOD = (
+    "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
+    "simulated robot; Student's intervals from repeats and from the step to which was read."
+)
+
+
+def _path_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return path_plans(arena) if budget is None else path_plans(arena, budget)
+
+
+def _fit_path(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    def simulate(trial: ObservedTrial) -> Moved:
+        return _moved_in_sim(trial, robot, arena)
+
+    fit = fit_path(trials, simulate, robot, np.random.default_rng(seed))
+    return Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence})
+
+
+def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
+    """How the simulated robot moves in a trial, without noise."""
+    platform = SimPlatform(robot=robot, noise=False, step_s=trial.step_s, precision="double")
+    with SimRobot(platform, arena) as simulated:
+        simulated.reset(Pose(*trial.start))
+        headings = [trial.start[2]]
+        for move, turn in trial.commands:
+            simulated.drive(Command(float(move), float(turn)))
+            headings.append(simulated.pose.heading)
+        x, y, _ = simulated.pose
+    turned = float(np.ptp(np.unwrap(headings)[[0, -1]]) * np.sign(np.diff(np.unwrap(headings)[[0, -1]]))[0])
+    east, north = x - trial.start[0], y - trial.start[1]
+    sine, cosine = math.sin(trial.start[2]), math.cos(trial.start[2])
+    return Moved(east * cosine + north * sine, north * cosine - east * sine, turned)
+
+
+# sensors
+
+_SENSORS_METHOD = (
+    "Readings of a robot that stands before a wall (Rosenzweig & Remy, section 2.3): likelihood of the mixture of "
+    "`sim`, censored at 0 and 1, for each sensor; posterior under even priors by tempered particles (Del Moral, "
+    "Doucet & Jasra 2006); posterior predictive check (Gelman, Meng & Stern 1996); readings count less where "
+    "consecutive ones, or those of a placement, are alike."
+)
+
+MISFIT = 0.05
+"""A check's p below which the sensor's model does not make what was read, over all sensors."""
+
+
+def _sensor_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return sensor_plans(arena, robot, budget)
+
+
+def _fit_sensors(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    standing = [trial for trial in trials if len(trial.commands) and not np.any(trial.commands)]
+    if not standing:
+        raise ValueError(
+            "In no trial the robot stands still: expected readings before a wall, as `realitygap calibrate sensors` "
+            "records them."
+        )
+    found = {trial.readings.shape[1] for trial in standing}
+    if found != {len(robot.range)}:
+        raise ValueError(
+            f"The trials have {min(found)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on the "
+            "robot that it was (--base ROBOT)."
+        )
+    rng = np.random.default_rng(seed)
+    placements = placements_of(standing, _rays_in(robot, arena))
+    fits = [fit_sensor(robot, k, each, rng) for k, each in enumerate(placements)]
+    p = min(1.0, len(fits) * min(fit.p for fit in fits))
+    return Parts(
+        fitted=tuple(fitted for fit in fits for fitted in fit.fitted),
+        numbers={name: value for fit in fits for name, value in fit.numbers.items()},
+        draws={name: values for fit in fits for name, values in fit.draws.items()},
+        method=_SENSORS_METHOD,
+        notes=tuple(_said_of(fit) for fit in fits) + _said_of_placements(placements[0]),
+        misspecified=p < MISFIT,
+        misspecification_p=p,
+        evidence={"sensors": [_drawn_of(fit, each) for fit, each in zip(fits, placements, strict=True)]},
+    )
+
+
+def _rays_in(robot: RobotModel, arena: Arena) -> Callable[[Pose], list[NDArray[np.float64]]]:
+    """Distances along each sensor's rays at a pose, as the simulated robot sees them."""
+    simulated = SimRobot(SimPlatform(robot=robot, precision="double"), arena)
+    ends = np.cumsum([sensor.rays for sensor in robot.range])
+
+    def rays(pose: Pose) -> list[NDArray[np.float64]]:
+        simulated.reset(pose)
+        return [np.array(each) for each in np.split(simulated.distances[: ends[-1]], ends[:-1])]
+
+    return rays
+
+
+def _said_of(fit: SensorFit) -> str:
+    apart = fit.independence
+    return (
+        f"{fit.name}: {apart.readings} readings in {apart.placements} placements count as {apart.effective:.0f}; "
+        f"correlation of consecutive ones {apart.correlation:.2f} (p {apart.correlation_p:.3f}), share of the variance "
+        f"between placements {apart.between:.2f} (p {apart.between_p:.3f}); posterior predictive p {fit.p:.3f}."
+    )
+
+
+def _said_of_placements(placements: Sequence[Placement]) -> tuple[str, ...]:
+    at: dict[float, int] = {}
+    for placement in placements:
+        near = round(float(placement.distances.min()), 3)
+        at[near] = at.get(near, 0) + 1
+    if min(at.values()) >= LEAST_PLACEMENTS:
+        return ()
+    return (
+        f"Some distances have fewer than {LEAST_PLACEMENTS} placements: what lies between placements cannot be told "
+        "there, and intervals may be too narrow.",
+    )
+
+
+def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]:
+    """What Figure 3 draws of a sensor."""
+    return {
+        "name": fit.name,
+        "distances_m": [float(placement.distances.min()) for placement in placements],
+        "readings": [np.round(placement.readings, 5).tolist() for placement in placements],
+        "curve": {key: np.round(values, 5).tolist() for key, values in fit.curve.items()},
+        "p": fit.p,
+    }
+
+
+# motion
+
+
+def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return motion_plans(arena, robot) if budget is None else motion_plans(arena, robot, budget)
+
+
+def _fit_motion(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    moving = _of_purpose(trials, "motion")
+    fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
+    return _parts_of(fit)
+
+
+def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedTrial]:
+    """The trials that were carried out for it; all with commands where none was."""
+    return [trial for trial in trials if trial.purpose == purpose] or [
+        trial for trial in trials if len(trial.commands)
+    ]
+
+
+def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
+    step_s = trials[0].step_s if trials else robot.step_s
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena).replay
+
+
+def _parts_of(fit: MotionFit) -> Parts:
+    return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
+
+
+KINDS: dict[str, Kind] = {
+    "path": Kind(_path_plans, _fit_path, least=2),
+    "sensors": Kind(_sensor_plans, _fit_sensors),
+    "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
+}
+"""Those whose trials are known before the first of them; `all` chooses trials by what came before."""

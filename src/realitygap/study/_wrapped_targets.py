@@ -1,0 +1,208 @@
+"""Targets around targets: whose trials are kept, led through by hand, or measured with a ruler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from types import TracebackType
+from typing import Literal, Protocol, Self
+
+import numpy as np
+
+from realitygap.calibration import ruled
+from realitygap.errors import StudyError
+from realitygap.records import ObservationsFile, Observe, ObservedTrial
+from realitygap.trials import EndReason, Target, TrialPlan
+
+Tell = Callable[[int, ObservedTrial], None]
+
+PATH = "path"
+"""Purpose of trials whose end is measured with a ruler where no camera looks."""
+
+
+class StoppedByPerson(Exception):  # noqa: N818 - nothing is wrong
+    """Somebody wants to go on another time; what was recorded is kept."""
+
+
+class Guide(Protocol):
+    """Who puts a robot where a plan wants it, and measures where it ends."""
+
+    def place(self, plan: TrialPlan, number: int, n: int) -> Literal["go", "redo", "stop"]:
+        """Put the robot at the start of plan `number` of n: go on, take the one before back, or stop for today."""
+        ...
+
+    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+        """The trial with what a person measured of it; None: it is to be driven again."""
+        ...
+
+
+class _Around:
+    """A target that passes everything on."""
+
+    def __init__(self, target: Target) -> None:
+        self.target = target
+        self.name, self.label, self.arena = target.name, target.label, target.arena
+        self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`."""
+        return self.target.carry_out(plans, observe, tell)
+
+    def close(self) -> None:
+        """Let go of the platform."""
+        self.target.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class CountingTarget(_Around):
+    """Says after each trial how many of how many are there.
+
+    Args:
+        target: What carries out trials.
+        n: How many there will be.
+        count: Told of how many there are, and of n.
+    """
+
+    def __init__(self, target: Target, n: int, count: Callable[[int, int], None] | None) -> None:
+        super().__init__(target)
+        self._n, self._count, self._done = n, count, 0
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`."""
+
+        def one_more(k: int, trial: ObservedTrial) -> None:
+            self._done += 1
+            if self._count is not None:
+                self._count(min(self._done, self._n), self._n)
+            if tell is not None:
+                tell(k, trial)
+
+        return self.target.carry_out(plans, observe, one_more)
+
+
+class RuledTarget(_Around):
+    """The ends of paths are read with a ruler where less than a camera is to be observed."""
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`."""
+        if observe == "track" or not any(plan.purpose == PATH for plan in plans):
+            return self.target.carry_out(plans, observe, tell)
+        if self.target.observes != "track":
+            raise StudyError(
+                f"Nobody can measure where paths of {self.name} end. Name the emulator's witness (--witness "
+                "HOST:PORT), or be led through at a terminal."
+            )
+
+        def with_ruler(trial: ObservedTrial) -> ObservedTrial:
+            trial = ruled(trial)
+            return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
+
+        trials = []
+        for k, plan in enumerate(plans):
+            is_path = plan.purpose == PATH
+            (trial,) = self.target.carry_out([plan], "track" if is_path else observe)
+            trials.append(with_ruler(trial) if is_path else trial)
+            if tell is not None:
+                tell(k, trials[-1])
+        return trials
+
+
+class GuidedTarget(_Around):
+    """A person puts the robot at each start, and measures what no camera sees."""
+
+    def __init__(self, target: Target, guide: Guide) -> None:
+        super().__init__(target)
+        self._guide = guide
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`; a trial that is taken back is told of again.
+
+        Raises:
+            StoppedByPerson: What was told of is all that was recorded.
+        """
+        trials: dict[int, ObservedTrial] = {}
+        k = 0
+        while k < len(plans):
+            answer = self._guide.place(plans[k], k, len(plans))
+            if answer == "stop":
+                raise StoppedByPerson
+            if answer == "redo":
+                k = max(k - 1, 0)
+                continue
+            (trial,) = self.target.carry_out([plans[k]], observe)
+            measured = self._guide.measure(plans[k], trial)
+            if measured is None:
+                continue
+            trials[k] = measured
+            if tell is not None:
+                tell(k, measured)
+            k += 1
+        return [trials[k] for k in range(len(plans))]
+
+
+class ResumableTarget(_Around):
+    """Trials are kept as they end, and those that a file has already are not carried out again.
+
+    Of trials of one plan the last one counts.
+    """
+
+    def __init__(self, target: Target, file: ObservationsFile) -> None:
+        super().__init__(target)
+        self._file = file
+        self.trials = {_what(trial): trial for trial in file.trials if is_whole(trial)}
+        self.n_found = 0
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`."""
+        wanted = [_what_of(plan, self.arena.start) for plan in plans]
+        missing = [k for k, what in enumerate(wanted) if what not in self.trials]
+        self.n_found += len(plans) - len(missing)
+        if tell is not None:
+            for k in set(range(len(plans))) - set(missing):
+                tell(k, self.trials[wanted[k]])
+
+        def keep(k: int, trial: ObservedTrial) -> None:
+            self._file.append(trial)
+            if is_whole(trial):
+                self.trials[wanted[missing[k]]] = trial
+                if tell is not None:
+                    tell(missing[k], trial)
+
+        if missing:
+            self.target.carry_out([plans[k] for k in missing], observe, keep)
+        return [self.trials[what] for what in wanted]
+
+
+def is_whole(trial: ObservedTrial) -> bool:
+    """Whether a trial came to its own end, and was not cut off."""
+    return trial.end == EndReason.STEP_LIMIT
+
+
+def _what(trial: ObservedTrial) -> tuple[object, ...]:
+    """What makes a trial the one of a plan."""
+    start = tuple(round(value, 6) for value in trial.start)
+    driven = trial.genome or trial.commands.tobytes()
+    return trial.purpose, trial.number, start, driven
+
+
+def _what_of(plan: TrialPlan, start: tuple[float, float, float]) -> tuple[object, ...]:
+    begins = tuple(round(float(value), 6) for value in plan.start or start)
+    driven = np.asarray(plan.commands, np.float64).tobytes() if plan.genome is None else plan.genome.to_json()
+    return plan.purpose, plan.number, begins, driven

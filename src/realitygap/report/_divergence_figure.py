@@ -162,8 +162,15 @@ def _compare(
             raise refuse_replay(each.name)
     genome = genome_of(trial.condition, trial.row)
     own = trial.condition.platform if all(map(_is_platform, names)) else trial.condition.name
-    tried = zip((own, *names), (trial.condition, *others), strict=True)
+    called = [own, *map(_called, names)]
+    tried = zip(called, (trial.condition, *others), strict=True)
     return trial.title, tuple(_try_again(trial, on, name, genome, repeats) for name, on in tried)
+
+
+def _called(name: str) -> str:
+    """A condition or a platform without the folder of its file."""
+    platform, colon, file = name.partition(":")
+    return f"{platform}:{Path(file).name}" if colon else name
 
 
 def _is_platform(name: str) -> bool:
@@ -177,8 +184,9 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
     if _is_platform(against):
         fresh = Condition.model_validate({"name": own.name, "platform": against})
-        settings = {fresh.platform: getattr(fresh, fresh.platform)}
-        return own.model_copy(update={"platform": fresh.platform, "noise": fresh.noise, **settings})
+        changed: dict[str, Any] = {"platform": fresh.platform, "noise": fresh.noise}
+        changed[fresh.platform] = getattr(fresh, fresh.platform)
+        return own.model_copy(update=changed)
     raise ValueError(
         f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
     )

@@ -1,6 +1,8 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
 from ._abc import Effort, Posterior, fit_all
+from ._contact import fit_contact
+from ._contact_plans import contact_plans
 from ._evidence import Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
 from ._ir_checks import Independence, independence, predictive_p
@@ -29,11 +31,13 @@ __all__ = [
     "SensorFit",
     "Simulate",
     "Vectors",
+    "contact_plans",
     "distance_of",
     "end_pose_of",
     "evidence_of",
     "excitation",
     "fit_all",
+    "fit_contact",
     "fit_motion",
     "fit_path",
     "fit_sensor",

@@ -128,8 +128,8 @@ def roomiest_place(arena: Arena, robot: RobotModel) -> tuple[Pose, tuple[float, 
     across = float(away[best]) - robot.radius - ROOM_M
     if across <= 0:
         raise ValueError(
-            f"Arena {arena.name!r} has no place with {robot.radius + ROOM_M:.2f} m to each side, expected one: the robot "
-            "has to turn in place without touching anything."
+            f"Arena {arena.name!r} has no place with {robot.radius + ROOM_M:.2f} m to each side, expected one: the "
+            "robot has to turn in place without touching anything."
         )
     turns = (0.0, np.pi / 2)
     lengths = [_free_line(at, heading, lines, robot.radius + ROOM_M) for heading in turns]

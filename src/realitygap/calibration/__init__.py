@@ -5,7 +5,7 @@ from ._contact import fit_contact
 from ._contact_plans import contact_plans
 from ._evidence import Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
-from ._ir_checks import Independence, independence, predictive_p
+from ._ir_checks import Independence, independence, predictive_check
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
 from ._ir_readings import Placement
@@ -47,7 +47,7 @@ __all__ = [
     "numbers_of",
     "path_plans",
     "placements_of",
-    "predictive_p",
+    "predictive_check",
     "random_controllers",
     "random_start",
     "ranges_of",

@@ -187,7 +187,28 @@ def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]
     }
 
 
+# all
+
+
+def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    from ._calibrate_all import all_plans
+
+    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
+
+
+def _fit_all(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    from ._calibrate_all import fit_everything
+
+    return fit_everything(trials, robot, arena, seed)
+
+
+ALL_TRIALS = 20
+"""Of a calibration of everything, when nothing is said."""
+
 KINDS: dict[str, Kind] = {
     "path": Kind(_path_plans, _fit_path, 2),
     "sensors": Kind(_sensor_plans, _fit_sensors, 1),
+    "all": Kind(_all_plans, _fit_all, 1),
 }

@@ -11,8 +11,10 @@ from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plan
 from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
 from ._motion_plans import motion_plans
+from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
-from ._prior import Effect, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
+from ._predictive import Misfit, misfits
+from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 
@@ -21,7 +23,9 @@ __all__ = [
     "Effect",
     "Effort",
     "Evidence",
+    "Floats",
     "Independence",
+    "Misfit",
     "MotionFit",
     "Moved",
     "Parameter",
@@ -42,8 +46,11 @@ __all__ = [
     "fit_path",
     "fit_sensor",
     "independence",
+    "information_of",
+    "misfits",
     "motion_plans",
     "moved_in",
+    "next_trials",
     "numbers_of",
     "path_plans",
     "placements_of",

@@ -243,10 +243,30 @@ def _parts_of(fit: MotionFit) -> Parts:
     return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
 
 
+# all
+
+
+def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    from ._calibrate_all import all_plans
+
+    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
+
+
+def _fit_all(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    from ._calibrate_all import fit_everything
+
+    return fit_everything(trials, robot, arena, seed)
+
+
+ALL_TRIALS = 20
+"""Of a calibration of everything, when nothing is said."""
+
 KINDS: dict[str, Kind] = {
     "path": Kind(_path_plans, _fit_path, least=2),
     "sensors": Kind(_sensor_plans, _fit_sensors),
     "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
     "contact": Kind(_contact_plans, _fit_contact, observes=("track",)),
+    "all": Kind(_all_plans, _fit_all),
 }
-"""Those whose trials are known before the first of them; `all` chooses trials by what came before."""

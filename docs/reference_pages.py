@@ -28,7 +28,7 @@ from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.runs import MAZE_REWARDS, Condition
 from realitygap.settings import is_hidden
 from realitygap.study import (
@@ -68,6 +68,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
     "[platform.sim]": SimPlatform,
+    "[platform.twin]": TwinPlatform,
     "[platform.scribbler]": ScribblerPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,

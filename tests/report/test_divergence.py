@@ -9,6 +9,7 @@ from realitygap.playback import measure_divergence, own_divergence
 from realitygap.report import compare_trials, draw_divergence
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial
+from realitygap.robots.twin import sample_twin
 from realitygap.runs import replay
 
 
@@ -53,3 +54,21 @@ def test_its_caption_has_the_numbers_of_the_last_step(tiny_study):
     assert "n = 5" in drawing.caption
     assert "SIM" in drawing.caption
     assert drawing.svg == draw_divergence(*sides).svg
+
+
+def test_a_twin_can_stand_beside_two_simulators(tiny_study, tmp_path):
+    file = tmp_path / "same.toml"
+    file.write_text(sample_twin("same", 3).to_toml())
+    sides = compare_trials(tiny_study, against=f"sim, twin:{file}", condition="coverage", repeats=3)
+    assert [side.name for side in sides] == ["jyro", "sim", "twin:same.toml"]
+    assert [side.trials[0].label for side in sides] == ["SIM", "SIM", "TWIN"]
+    drawing = draw_divergence(*sides)
+    one, *others = (side.trials for side in sides)
+    assert "SIM and TWIN" in drawing.caption
+    for other, name in zip(others, ("sim", "twin"), strict=True):
+        apart = measure_divergence(one, [*other[1:], other[0]]).distance[:, -1].mean()
+        assert f"{apart:.2f} m apart (jyro and {name}" in drawing.caption
+    with pytest.raises(ValueError, match="against names 3, expected one or two"):
+        compare_trials(tiny_study, against="sim,turn,novelty", condition="coverage", repeats=3)
+    with pytest.raises(ValueError, match="expected twin:FILE"):
+        compare_trials(tiny_study, against="twin", condition="coverage", repeats=3)

@@ -109,12 +109,11 @@ def test_a_twin_behind_the_emulator_drives_by_itself(tmp_path: Path) -> None:
         emulator("--twin", str(file)) as (port, witness),
         open_target(port, ARENA, witness=witness) as target,
     ):
-        first = target.carry_out([FORWARD, controller()], "track")
-        again = target.carry_out([FORWARD, controller()], "track")
-    for one, other in zip(first, again, strict=True):
-        assert one.end == "step limit"
-        np.testing.assert_allclose(one.poses, other.poses, atol=0.01)
-    assert first[0].wheels[4] == pytest.approx(first[0].poses[4, 0] - first[0].poses[0, 0], rel=0.2)
+        trials = target.carry_out([FORWARD, controller()], "track")
+    assert [trial.end for trial in trials] == ["step limit"] * 2
+    ahead = trials[0].poses[4, 0] - trials[0].poses[0, 0]
+    assert 0.1 < ahead < 0.4
+    assert trials[0].wheels[4] == pytest.approx((ahead, ahead), rel=0.2)
 
 
 class Failing:

@@ -54,22 +54,23 @@ def show(
     against: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Of a divergence: another condition, or a platform, to try the network on."
+            metavar="NAME",
+            help="Of a divergence: another condition, or a platform (twin:FILE), to try the network on; or two, A,B.",
         ),
     ] = None,
     robot: Annotated[
         str | None, typer.Option(metavar="NAME", help="Of an arena: a robot's name or file, at the start.")
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(help="Of a divergence: trials on each of the two. [default: 30]")
+        int | None, typer.Option(help="Of a divergence: trials on each of them. [default: 30]")
     ] = None,
 ) -> None:
     """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file, or trials in motion.
 
     A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
     commands. FILE.gif and FILE.mp4 show a trial in motion (without --generation, the run's best), movie several of
-    them. divergence tries a trial's network on two platforms, and shows how far they come apart. Trials are recomputed
-    from their rows. A file that is there gives way once the new one is complete.
+    them. divergence tries a trial's network on two platforms or three, and shows how far they come apart. Trials are
+    recomputed from their rows. A file that is there gives way once the new one is complete.
 
     Example: realitygap show results/paper --condition coverage-50 --replicate 3 -o run.svg
 
@@ -84,6 +85,8 @@ def show(
     Example: realitygap show lineage results/paper --condition novelty-50 -o lineage.svg
 
     Example: realitygap show divergence results/paper --condition novelty-50 --against novelty-10 -o divergence.svg
+
+    Example: realitygap show divergence results/paper --against sim,twin:worn.toml -o divergence.svg
 
     Example: realitygap show arena maze-hard --robot khepera -o arena.svg
 

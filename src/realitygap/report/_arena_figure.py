@@ -78,6 +78,7 @@ def _caption(tally: Tally, condition: Condition, described: Mapping[str, Any]) -
     outline = {
         "jyro": "Jyro’s; the paper does not state the start and where the sensors are mounted",
         "sim": f"that of robot {condition.sim.model.name}",
+        "twin": "the box that holds a Scribbler’s, and the sensors are that robot’s: the twin’s own are in its file",
         "scribbler": "the box that holds the robot’s; the paper does not state the start and where the sensors are "
         "mounted",
     }[condition.platform]

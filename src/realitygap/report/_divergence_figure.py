@@ -1,4 +1,4 @@
-"""One network on two platforms, side by side, and how far they come apart."""
+"""One network on two platforms or more, side by side, and how far they come apart."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLORS = (Ink.OURS, Ink.PUBLISHED)
-_DASHES: tuple[Any, Any] = ("solid", (0, (5, 1.5)))
-"""Of the two platforms."""
+_COLORS = (Ink.OURS, Ink.PUBLISHED, Ink.PEN3)
+_DASHES: tuple[Any, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)))
+"""Of the platforms."""
 
 _GHOSTS = 7
 """Robots drawn along a path."""
@@ -48,13 +48,13 @@ _GHOSTS = 7
 _MOST_TRAILS = 30
 """Repeats whose paths are drawn; more would be a blot."""
 
-PLATFORMS = ("jyro", "sim")
-"""That a network can be tried on beside its own, with their defaults."""
+PLATFORMS = ("jyro", "sim", "twin")
+"""That a network can be tried on beside its own, with their defaults, such as twin:FILE."""
 
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two platforms.
+    """One of the platforms.
 
     Attributes:
         name: what to call it.
@@ -82,7 +82,7 @@ def save_divergence(
         results: the results of a study, or the path to them.
         path: ends in .svg, .pdf or .png; a file that is there gives way.
         against: what the network is tried on beside its own condition: another condition of the study, or a platform
-            with its defaults.
+            with its defaults (jyro, sim, sim:FILE, twin:FILE); two of them with a comma between.
         condition: whose network it is; the first one when not given.
         replicate: of which run; the typical one when not given.
         generation: of the run; that of its best trial when not given.
@@ -99,7 +99,7 @@ def save_divergence(
     path = Path(path)
     check_ending(path, (".pdf", ".png", ".svg"))
     refuse_results(path)
-    which, *sides = _compare(
+    which, sides = _compare(
         results,
         against=against,
         condition=condition,
@@ -108,8 +108,8 @@ def save_divergence(
         individual=individual,
         repeats=repeats,
     )
-    title = f"{sides[0].name} and {sides[1].name}"
-    drawing = draw_divergence(sides[0], sides[1], of=which)
+    title = " and ".join(side.name for side in sides)
+    drawing = draw_divergence(*sides, of=which)
     return save_drawing(captioned(drawing, "divergence"), path, title=title)
 
 
@@ -122,12 +122,12 @@ def compare_trials(
     generation: int | None = None,
     individual: int | None = None,
     repeats: int = 30,
-) -> tuple[Side, Side]:
+) -> tuple[Side, ...]:
     """One network tried again on its own platform and elsewhere, each time on noise of its own.
 
     Arguments and errors as in `save_divergence`.
     """
-    _, one, other = _compare(
+    _, sides = _compare(
         results,
         against=against,
         condition=condition,
@@ -136,7 +136,7 @@ def compare_trials(
         individual=individual,
         repeats=repeats,
     )
-    return one, other
+    return sides
 
 
 def _compare(
@@ -148,22 +148,33 @@ def _compare(
     generation: int | None,
     individual: int | None,
     repeats: int,
-) -> tuple[str, Side, Side]:
-    """Which network it is, and its trials on both sides."""
+) -> tuple[str, tuple[Side, ...]]:
+    """Which network it is, and its trials on all sides."""
     whole_number("repeats", repeats, 2, 1000)
+    names = [name.strip() for name in against.split(",")]
+    if not 1 <= len(names) < len(_COLORS):
+        raise ValueError(f"against names {len(names)}, expected one or two, with a comma between.")
     tally = read_tally(results)
     trial = choose_trial(tally, condition, replicate, generation, individual)
-    other = _beside(tally, trial.condition, against)
-    for each in (trial.condition, other):
+    others = [_beside(tally, trial.condition, name) for name in names]
+    for each in (trial.condition, *others):
         if each.is_physical:
             raise refuse_replay(each.name)
     genome = genome_of(trial.condition, trial.row)
-    own = trial.condition.platform if against in PLATFORMS else trial.condition.name
-    return (
-        trial.title,
-        _try_again(trial, trial.condition, own, genome, repeats),
-        _try_again(trial, other, against, genome, repeats),
-    )
+    own = trial.condition.platform if all(map(_is_platform, names)) else trial.condition.name
+    called = [own, *map(_called, names)]
+    tried = zip(called, (trial.condition, *others), strict=True)
+    return trial.title, tuple(_try_again(trial, on, name, genome, repeats) for name, on in tried)
+
+
+def _called(name: str) -> str:
+    """A condition or a platform without the folder of its file."""
+    platform, colon, file = name.partition(":")
+    return f"{platform}:{Path(file).name}" if colon else name
+
+
+def _is_platform(name: str) -> bool:
+    return name.partition(":")[0] in PLATFORMS
 
 
 def _beside(tally: Tally, own: Condition, against: str) -> Condition:
@@ -171,9 +182,10 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
     names = [condition["name"] for condition in tally.conditions]
     if against in names:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
-    if against in PLATFORMS:
-        fresh = Condition(name=own.name, platform=against)
-        changed = {"platform": against, against: getattr(fresh, against), "noise": fresh.noise}
+    if _is_platform(against):
+        fresh = Condition.model_validate({"name": own.name, "platform": against})
+        changed: dict[str, Any] = {"platform": fresh.platform, "noise": fresh.noise}
+        changed[fresh.platform] = getattr(fresh, fresh.platform)
         return own.model_copy(update=changed)
     raise ValueError(
         f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
@@ -202,71 +214,99 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
 # --- drawing ------------------------------------------------------------------------------------------------
 
 
-def draw_divergence(one: Side, other: Side, *, of: str = "", width: float = WIDE) -> Drawing:
-    """Trials of one network on two platforms, side by side, and how far they come apart step by step.
+def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE) -> Drawing:
+    """Trials of one network on two platforms or three, side by side, and how far they come apart step by step.
 
     Args:
-        one, other: as many repeats of both; repeat k of the one is compared with repeat k + 1 of the other, so that
+        one, others: as many repeats of each; repeat k of the one is compared with repeat k + 1 of another, so that
             the two never drew the same noise, and the comparison is fair to that of repeats on one platform.
         of: which network it is.
         width: of the figure [in].
 
     Raises:
-        ValueError: there are more repeats of the one than of the other, or fewer than two.
+        ValueError: there are more repeats of the one than of another, or fewer than two; or not one or two others.
     """
-    between = measure_divergence(one.trials, [*other.trials[1:], other.trials[0]])
-    within = tuple(own_divergence(side.trials) for side in (one, other))
-    n, last = between.n_pairs, between.n_steps
-    distance, turned = (values[:, last].mean() for values in (between.distance, between.heading))
-    own = [float(each.distance[:, last].mean()) for each in within]
-    labels = " and ".join(dict.fromkeys(side.trials[0].label for side in (one, other)))
-    steps = " and ".join(
-        f"{side.trials[0].n_steps} steps of {side.trials[0].step_s:g} s ({side.name})"
-        for side in (one, other)
-    )
-    shown = f" of the first {_MOST_TRAILS} repeats" if n > _MOST_TRAILS else ""
-    caption = (
-        f"One network{f' ({of})' if of else ''}, tried {n} times on {one.name} and {n} times on {other.name}, each on "
-        f"noise of its own; {labels}, {steps}. Above: all paths{shown}; the first "
-        "with its robot, what it sees and the cells that it visits. Below: how far repeat k on the one is from repeat "
-        f"k + 1 on the other after each step, mean and 10th to 90th percentile of n = {n}; thin lines: what noise "
-        f"alone does, the mean between repeat k and k + 1 on one platform. After {last} steps {distance:.2f} m apart, "
-        f"{own[0]:.2f} m on {one.name} alone and {own[1]:.2f} m on {other.name} alone; headings differ by "
-        f"{turned:.2f} rad (unrelated ones by 1.57 on average)."
-    )
-    alt = (
-        f"Paths of one network on {one.name} and on {other.name}, and curves of the distance and of the difference in "
-        f"heading between them, which rise to {distance:.2f} m and {turned:.2f} rad on average."
-    )
+    if not 1 <= len(others) < len(_COLORS):
+        raise ValueError(f"There are {len(others)} sides beside the first, expected one or two.")
+    sides = (one, *others)
+    between = tuple(measure_divergence(one.trials, [*other.trials[1:], other.trials[0]]) for other in others)
+    within = tuple(own_divergence(side.trials) for side in sides)
+    caption, alt = _words(sides, between, within, of)
     with house_style():
-        figure = _draw((one, other), between, within, width)
+        figure = _draw(sides, between, within, width)
         return Drawing(to_svg(figure, "divergence", alt), caption, alt, figure)
 
 
+def _words(
+    sides: tuple[Side, ...], between: tuple[Divergence, ...], within: tuple[Divergence, ...], of: str
+) -> tuple[str, str]:
+    """Caption and alternative text."""
+    one, *others = sides
+    n = between[0].n_pairs
+    ends = [
+        (each.n_steps, *(values[:, -1].mean() for values in (each.distance, each.heading)))
+        for each in between
+    ]
+    own = [
+        float(each.distance[:, min(each.n_steps, between[max(k - 1, 0)].n_steps)].mean())
+        for k, each in enumerate(within)
+    ]
+    labels = " and ".join(dict.fromkeys(side.trials[0].label for side in sides))
+    steps = " and ".join(
+        f"{side.trials[0].n_steps} steps of {side.trials[0].step_s:g} s ({side.name})" for side in sides
+    )
+    shown = f" of the first {_MOST_TRAILS} repeats" if n > _MOST_TRAILS else ""
+    tried = " and ".join(f"{n} times on {side.name}" for side in sides)
+    alone = " and ".join(f"{way:.2f} m on {side.name} alone" for way, side in zip(own, sides, strict=True))
+    apart = " ".join(
+        f"After {last} steps {distance:.2f} m apart{'' if len(others) == 1 else f' ({one.name} and {other.name})'}"
+        f"{f', {alone}' if len(others) == 1 else ''}; headings differ by {turned:.2f} rad "
+        "(unrelated ones by 1.57 on average)."
+        for (last, distance, turned), other in zip(ends, others, strict=True)
+    )
+    rest = "" if len(others) == 1 else f" Noise alone: {alone}."
+    caption = (
+        f"One network{f' ({of})' if of else ''}, tried {tried}, each on "
+        f"noise of its own; {labels}, {steps}. Above: all paths{shown}; the first "
+        "with its robot, what it sees and the cells that it visits. Below: how far repeat k on the one is from repeat "
+        f"k + 1 on {'the other' if len(others) == 1 else 'another'} after each step, mean and 10th to 90th percentile "
+        f"of n = {n}; thin lines: what noise alone does, the mean between repeat k and k + 1 on one platform. "
+        f"{apart}{rest}"
+    )
+    rise = " and ".join(f"{distance:.2f} m and {turned:.2f} rad" for _, distance, turned in ends)
+    alt = (
+        f"Paths of one network on {' and on '.join(side.name for side in sides)}, and curves of the distance and of "
+        f"the difference in heading between them, which rise to {rise} on average."
+    )
+    return caption, alt
+
+
 def _draw(
-    sides: tuple[Side, Side], between: Divergence, within: tuple[Divergence, ...], width: float
+    sides: tuple[Side, ...], between: tuple[Divergence, ...], within: tuple[Divergence, ...], width: float
 ) -> Figure:
     arena = sides[0].trials[0].arena
     x_range, y_range = arena_extent(arena)
     gap, head, foot = 0.3, 0.34, 0.42
-    across = (width - gap - 0.06) / 2
+    n = len(sides)
+    across = (width - (n - 1) * gap - 0.06) / n
+    half = (width - gap - 0.06) / 2
     up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
     curve = 1.35
     figure = new_figure(width, head + up + 0.46 + curve + foot)
     for k, side in enumerate(sides):
         axes = place_axes(figure, 0.03 + k * (across + gap), head, across, up)
         draw_arena(axes, side.trials[0].arena, x_range, y_range)
-        _draw_side(axes, side, _COLORS[k])
+        _draw_side(axes, side, _COLORS[k], is_narrow=n > 2)
     left = 0.52
-    wide = (width - 0.06 - gap) / 2 - left + 0.03
+    wide = half - left + 0.03
     for k, (name, unit) in enumerate((("distance", "apart [m]"), ("heading", "headings apart [rad]"))):
-        axes = place_axes(figure, left + k * (across + gap), head + up + 0.46, wide, curve)
+        axes = place_axes(figure, left + k * (half + gap), head + up + 0.46, wide, curve)
         _draw_curves(axes, sides, between, within, name)
         axes.set_ylabel(unit, labelpad=3)
     return figure
 
 
-def _draw_side(axes: Axes, side: Side, color: str) -> None:
+def _draw_side(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
     from matplotlib.patches import Rectangle
 
     first = side.trials[0]
@@ -304,7 +344,7 @@ def _draw_side(axes: Axes, side: Side, color: str) -> None:
         markeredgewidth=0,
         zorder=7,
     )
-    _write_head(axes, side, color)
+    _write_head(axes, side, color, is_narrow=is_narrow)
 
 
 def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong: bool) -> None:
@@ -330,14 +370,17 @@ def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong:
     draw_line(axes, nose[:, 0], nose[:, 1], color=color, linewidth=1.4, zorder=8)
 
 
-def _write_head(axes: Axes, side: Side, color: str) -> None:
+def _write_head(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
     n_cells = side.trials[0].arena.grid.n_cells
     mean = np.mean([len(trial.cells) for trial in side.trials]) / n_cells
+    facts = (
+        f"{side.trials[0].label}, n = {len(side.trials)}, {'' if is_narrow else 'mean '}coverage {mean:.2f}"
+    )
     for x, text, align, ink, weight in (
-        (0.0, shorten(side.name, 30), "left", color, "bold"),
+        (0.0, shorten(side.name, 14 if is_narrow else 30), "left", color, "bold"),
         (
             1.0,
-            f"{side.trials[0].label}, n = {len(side.trials)}, mean coverage {mean:.2f}",
+            facts,
             "right",
             Ink.MUTED,
             "normal",
@@ -359,17 +402,25 @@ def _write_head(axes: Axes, side: Side, color: str) -> None:
 
 
 def _draw_curves(
-    axes: Axes, sides: tuple[Side, Side], between: Divergence, within: tuple[Divergence, ...], name: str
+    axes: Axes,
+    sides: tuple[Side, ...],
+    between: tuple[Divergence, ...],
+    within: tuple[Divergence, ...],
+    name: str,
 ) -> None:
-    values: npt.NDArray[np.float64] = getattr(between, name)
-    steps = np.arange(values.shape[1])
-    low, high = np.percentile(values, [10, 90], axis=0)
-    axes.fill_between(steps, low, high, color=Ink.BAND, alpha=0.55, linewidth=0)
-    axes.plot(steps, values.mean(axis=0), color=Ink.TEXT, linewidth=1.8)
-    for own, color, dashes in zip(within, _COLORS, _DASHES, strict=True):
+    highest = 0.0
+    for divergence, color in zip(between, _between_colors(between), strict=True):
+        values: npt.NDArray[np.float64] = getattr(divergence, name)
+        steps = np.arange(values.shape[1])
+        low, high = np.percentile(values, [10, 90], axis=0)
+        axes.fill_between(steps, low, high, color=Ink.BAND, alpha=0.55, linewidth=0)
+        axes.plot(steps, values.mean(axis=0), color=color, linewidth=1.8)
+        highest = max(highest, float(high.max()))
+    steps = np.arange(max(each.n_steps for each in between) + 1)
+    for own, color, dashes in zip(within, _COLORS, _DASHES, strict=False):
         mean = getattr(own, name).mean(axis=0)
         axes.plot(np.arange(len(mean)), mean, color=color, linewidth=1.0, linestyle=dashes)
-    top = math.pi if name == "heading" else 1.08 * max(float(high.max()), 0.02)
+    top = math.pi if name == "heading" else 1.08 * max(highest, 0.02)
     axes.set_ylim(0, top)
     axes.set_xlim(0, steps[-1])
     if name == "heading":
@@ -380,12 +431,25 @@ def _draw_curves(
         _legend(axes, sides)
 
 
-def _legend(axes: Axes, sides: tuple[Side, Side]) -> None:
+def _between_colors(between: tuple[Divergence, ...]) -> tuple[str, ...]:
+    """Of the curves: one alone is black, several have the color of whom they compare with the first."""
+    return (Ink.TEXT,) if len(between) == 1 else _COLORS[1 : len(between) + 1]
+
+
+def _legend(axes: Axes, sides: tuple[Side, ...]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
+    one, *others = sides
+    if len(others) == 1:
+        curves = [Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="between the two")]
+    else:
+        curves = [
+            Line2D([], [], color=color, linewidth=1.8, label=f"{shorten(other.name, 12)} from {one.name}")
+            for other, color in zip(others, _COLORS[1:], strict=False)
+        ]
     handles: list[Any] = [
-        Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="between the two"),
+        *curves,
         Patch(facecolor=Ink.BAND, alpha=0.55, label="10th to 90th percentile"),
     ]
     handles += [
@@ -397,7 +461,7 @@ def _legend(axes: Axes, sides: tuple[Side, Side]) -> None:
             linewidth=1.0,
             label=f"{shorten(side.name, 16)}, noise alone",
         )
-        for side, color, dashes in zip(sides, _COLORS, _DASHES, strict=True)
+        for side, color, dashes in zip(sides, _COLORS, _DASHES, strict=False)
     ]
     axes.legend(
         handles=handles,

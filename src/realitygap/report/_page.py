@@ -56,6 +56,7 @@ LABELS = {
 _PLATFORMS = {
     "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
     "sim": "a robot simulated with its outline, contact, motors and sensors, as its file and the settings have them",
+    "twin": "pseudo-reality: a robot of real wheels, motors and sensors in MuJoCo, as its file has them",
     "scribbler": "the paper’s robot, driven over its own protocol",
 }
 

@@ -9,6 +9,7 @@ from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
 from ._scribbler_platform import ScribblerPlatform
 from ._sim import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform
+from ._twin_platform import TwinPlatform, hash_elsewhere
 
 __all__ = [
     "ARENA",
@@ -27,8 +28,10 @@ __all__ = [
     "ScribblerPlatform",
     "SimPlatform",
     "SystemClock",
+    "TwinPlatform",
     "check_command",
     "export_mcap",
+    "hash_elsewhere",
     "read_recording",
     "scribbler",
 ]

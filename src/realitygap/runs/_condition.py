@@ -15,7 +15,7 @@ from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
 from realitygap.kernels._genome import NeatRules
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, hash_elsewhere
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask, Task, as_task
 from realitygap.trials import Trajectory, paper_inputs, sim_scene
@@ -28,7 +28,11 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 MOST_TRIALS = 5_000_000
 
 Selection = Literal["coverage", "fitness", "novelty", "random"]
-Platform = Literal["jyro", "sim", "scribbler"]
+Platform = Literal["jyro", "sim", "twin", "scribbler"]
+
+
+# Platforms that may name a file, and the setting that this is.
+FILE_KEYS = {"sim": "robot", "twin": "file"}
 
 
 class Condition(Settings):
@@ -49,15 +53,16 @@ class Condition(Settings):
     platform: Platform = Field(
         "jyro",
         description="What the networks are tried on: jyro, the paper's simulation; sim, a robot simulated with its "
-        "outline, contact, motors and sensors (sim:FILE is one of a file); or scribbler, the robot.",
+        "outline, contact, motors and sensors (sim:FILE is one of a file); twin:FILE, pseudo-reality in MuJoCo; or "
+        "scribbler, the robot.",
     )
     noise: float = Field(
         0.1,
         ge=0,
         le=10,
         description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8). On a robot 0: its readings are noisy by themselves; on sim, 0 when not given, "
-        "it comes on top of the robot's own noise.",
+        "(section 2.3: 0.1, 0.5, 0.8). On a robot or a twin 0: its readings are noisy by themselves; on sim, 0 when "
+        "not given, it comes on top of the robot's own noise.",
     )
     seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
     pair: bool = Field(
@@ -71,6 +76,7 @@ class Condition(Settings):
     novelty: NoveltySettings = NoveltySettings()
     jyro: JyroPlatform = JyroPlatform()
     sim: SimPlatform = Field(default_factory=SimPlatform)
+    twin: TwinPlatform = TwinPlatform()
     scribbler: ScribblerPlatform = ScribblerPlatform()
 
     @model_validator(mode="before")
@@ -78,11 +84,13 @@ class Condition(Settings):
     def _platform_may_name_a_file(cls, values: Any) -> Any:
         if not isinstance(values, dict):
             return values
-        name, colon, robot = str(values.get("platform", "")).partition(":")
-        if name == "sim" and colon:
-            values = {**values, "platform": "sim", "sim": {**dict(values.get("sim", {})), "robot": robot}}
+        name, colon, file = str(values.get("platform", "")).partition(":")
+        if colon and name in FILE_KEYS:
+            values = {**values, "platform": name, name: {**dict(values.get(name, {})), FILE_KEYS[name]: file}}
+        if name == "twin":
+            values = {**values, "twin": _hashed(dict(values.get("twin", {})))}
         # a robot adds its own noise
-        return {"noise": 0.0, **values} if name in ("sim", "scribbler") else values
+        return {"noise": 0.0, **values} if name in ("sim", "twin", "scribbler") else values
 
     @model_validator(mode="before")
     @classmethod
@@ -110,6 +118,15 @@ class Condition(Settings):
             raise ValueError(
                 f"task.kind is {self.fitness_task.name!r}, expected coverage with platform 'scribbler': an operator "
                 "enters the visited squares, and nothing else is known of a trial."
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _a_twin_is_noisy_by_itself(self) -> Self:
+        if self.platform == "twin" and self.noise != 0:
+            raise ValueError(
+                f"noise is {self.noise:g}, expected none with platform 'twin': its readings are noisy by themselves. "
+                "Leave it out."
             )
         return self
 
@@ -152,8 +169,8 @@ class Condition(Settings):
         elif self.coverage is None and self.network_inputs != paper_inputs(self.neat_rules):
             raise ValueError(
                 f"the networks of task {self.fitness_task.name!r} see {', '.join(self.network_inputs)}, expected "
-                f"{', '.join(paper_inputs(self.neat_rules))} on platform 'jyro', the paper's simulation. Choose "
-                "platform 'sim', or give the task these inputs."
+                f"{', '.join(paper_inputs(self.neat_rules))} on platform {self.platform!r}. Choose platform 'sim', or "
+                "give the task these inputs."
             )
         return self
 
@@ -187,13 +204,15 @@ class Condition(Settings):
         return self.platform == "scribbler"
 
     @property
-    def tried_on(self) -> JyroPlatform | SimPlatform | ScribblerPlatform:
+    def tried_on(self) -> JyroPlatform | SimPlatform | TwinPlatform | ScribblerPlatform:
         """The settings of its platform."""
         return self.scribbler if self.platform == "scribbler" else self.simulated_on
 
     @property
-    def simulated_on(self) -> JyroPlatform | SimPlatform:
+    def simulated_on(self) -> JyroPlatform | SimPlatform | TwinPlatform:
         """The settings of the platform that computes its trials."""
+        if self.platform == "twin":
+            return self.twin
         return self.sim if self.platform == "sim" else self.jyro
 
     @property
@@ -269,7 +288,7 @@ class Condition(Settings):
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
-        unused = {"jyro", "sim", "scribbler"} - {self.platform}
+        unused = {"jyro", "sim", "twin", "scribbler"} - {self.platform}
         return self.model_dump(mode="json", exclude={"name", *unused})
 
     def hash(self) -> str:
@@ -312,6 +331,14 @@ def _at_the_ends(arena: Arena) -> Iterator[Arena]:
     ]
     for x, y in itertools.product(*ends):
         yield replace(arena, start=arena.start._replace(x=x, y=y))
+
+
+def _hashed(twin: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a twin with the hash of its file."""
+    file = twin.get("file")
+    if not file or not isinstance(file, str):
+        raise ValueError("platform is 'twin', expected twin:FILE, with the file of the twin")
+    return twin if twin.get("sha256") else {**twin, "sha256": hash_elsewhere(file)}
 
 
 def _missing(given: Mapping[str, Any], full: Mapping[str, Any], place: str = "") -> Iterator[str]:

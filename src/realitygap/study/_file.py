@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform
+from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.runs import Condition
 from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
@@ -26,6 +26,7 @@ DEFAULT_NEAT = "rosenzweig-remy"
 PLATFORMS: dict[str, type[BaseModel]] = {
     "jyro": JyroPlatform,
     "sim": SimPlatform,
+    "twin": TwinPlatform,
     "scribbler": ScribblerPlatform,
 }
 SECTIONS: dict[str, type[BaseModel]] = {

@@ -373,6 +373,8 @@ def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) ->
 
 
 def _chunk_size(condition: Condition, replicates: int) -> int:
+    if condition.platform == "twin":  # whose trials take a hundred times as long
+        return 1
     steps = condition.neat.generations * condition.neat.population * condition.simulated_on.steps
     by_time = CHUNK_STEPS // steps
     by_progress = -(-replicates // CHUNKS_PER_CONDITION)

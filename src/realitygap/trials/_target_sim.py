@@ -25,7 +25,9 @@ from ._onlooker import RobotOnlooker
 from ._physical import EndReason
 from ._sim_robot import SimRobot, placed
 from ._target import TrialPlan, check_plans
-from ._try import Platform, try_all
+from ._try import try_all
+
+Platform = JyroPlatform | SimPlatform
 
 # Trials in a call: so many that the call costs little beside them, so few that what is kept of each step stays small.
 TOGETHER = 256

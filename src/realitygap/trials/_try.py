@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from realitygap.evolution import Genome, decode_all
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._philox import MAX_INDIVIDUALS
-from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.robots import JyroPlatform, SimPlatform, TwinPlatform
 from realitygap.tasks import Trajectories
 from realitygap.world import Arena
 
@@ -27,8 +27,9 @@ from ._batch import (
 )
 from ._jyro import JyroTrials
 from ._sim import SimTrials
+from ._twin_trials import TwinTrials
 
-Platform = JyroPlatform | SimPlatform
+Platform = JyroPlatform | SimPlatform | TwinPlatform
 """A platform on which networks can be tried in one call."""
 
 
@@ -59,9 +60,15 @@ def open_trials(
         return SimTrials(platform, arena, rules, inputs=names, noise=noise, bias_value=bias_value)
     if names != paper_inputs(rules):
         raise ValueError(
-            f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform 'jyro', the "
-            "paper's simulation. Choose platform 'sim'."
+            f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform "
+            f"{'twin' if isinstance(platform, TwinPlatform) else 'jyro'!r}. Choose platform 'sim'."
         )
+    if isinstance(platform, TwinPlatform):
+        if noise:
+            raise ValueError(
+                f"noise is {noise:g}, expected none on platform 'twin': its readings are noisy already."
+            )
+        return TwinTrials(platform, arena, rules, bias_value=bias_value)
     return JyroTrials(platform, arena, rules, noise=noise, bias_value=bias_value)
 
 

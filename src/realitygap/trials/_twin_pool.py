@@ -157,6 +157,11 @@ class TwinPool:
             self._idle.put(process)
 
     @property
+    def is_closed(self) -> bool:
+        """Whether its processes have ended for good."""
+        return self._closed.is_set()
+
+    @property
     def pids(self) -> tuple[int, ...]:
         """Of the processes that run."""
         return tuple(pid for process in self._processes if (pid := process.pid) is not None)

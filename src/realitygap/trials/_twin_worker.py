@@ -83,7 +83,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             elif twin is None:
                 raise DescriptionError("No twin is open.")
             else:
-                result = {"carry_out": twin.carry_out, "evolve": twin.evolve}[do](**request)
+                result = twin.carry_out(**request) if do == "carry_out" else twin.evolve(**request)
         except (RealityGapError, ValueError) as error:
             reply: dict[str, Any] = {"error": str(error), "kind": type(error).__name__}
         else:

@@ -41,6 +41,7 @@ BLOCK = re.compile(
 # What differs from one run and machine to the next.
 VOLATILE = [
     (re.compile(r"\b[\d.]+ s \([\d,]+ runs/s\)"), "T s (R runs/s)"),
+    (re.compile(r"\b\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00"), "DATE"),
     (re.compile(r"(Written: .*report\.html) \([\d.]+ s\)"), r"\1 (T s)"),
 ]
 # What stands where a terminal would have the progress bar.

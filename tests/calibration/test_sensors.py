@@ -67,8 +67,8 @@ def test_intervals_cover_the_numbers_of_pulse_sensors_as_often_as_they_say():
         )
         own = {each.name.rpartition(".")[2]: each for each in fit.fitted}
         hits += [own[name].low <= value <= own[name].high for name, value in truth.items()]
-    # 84 intervals: 0.90 with a standard deviation of 0.033 if they were independent, so that chance alone fails some 1 in
-    # 300 keys; this key does not. 100 runs of 6 gave 0.913.
+    # 84 intervals: 0.90 with a standard deviation of 0.033 if they were independent, so that chance alone fails some 1
+    # in 300 keys; this key does not. 100 runs of 6 gave 0.913.
     assert 0.80 <= np.mean(hits) <= 0.99
 
 
@@ -181,8 +181,11 @@ def test_readings_that_the_model_cannot_make_are_flagged():
         Placement(each.distances, np.clip(each.readings + rng.choice([-0.2, 0.2], 50), 0, 1)) for each in read
     ]
     robot = load_robot("scribbler-s2-fluke2")
-    assert fit_sensor(robot, 1, read, rng).p > 0.05
-    assert fit_sensor(robot, 1, swung, rng).p < 0.01
+    right, wrong = (fit_sensor(robot, 1, rows, rng) for rows in (read, swung))
+    assert right.p > 0.05
+    assert right.misfit < 0.02
+    assert wrong.p < 0.01
+    assert wrong.misfit > 0.1
 
 
 def test_other_sensors_and_no_readings_are_refused():

@@ -222,3 +222,59 @@ def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):
     assert "There is no straight path" in refused("path", "--from", data, "-o", tmp_path / "x.toml")
     other = refused("sensors", "--from", data, "--base", "e-puck", "-o", tmp_path / "x.toml")
     assert "have 3 range sensors and robot 'e-puck' 8" in other
+
+
+def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, monkeypatch):
+    from realitygap.calibration import MotionFit
+    from realitygap.study import _calibrate_kinds
+
+    asked = {}
+
+    def fit(kind):
+        def fitted(trials, simulate, robot, arena, *, observe, seed):
+            asked[kind] = trials, observe, seed
+            poses = simulate([trials[0].start], trials[0].commands[None], {"drive.track": [0.15]}, 1).poses
+            assert poses.shape == (1, 1, len(trials[0].commands) + 1, 3)
+            return MotionFit((), {"drive.track": 0.15}, {"drive.track": (0.149, 0.151)}, method=kind)
+
+        return fitted
+
+    for kind in ("motion", "contact"):
+        monkeypatch.setattr(_calibrate_kinds, f"fit_{kind}", fit(kind))
+        out = tmp_path / f"{kind}.toml"
+        run(kind, "--robot", "sim", "--observe", "track", "--budget", 2, "-o", out, "--seed", 5)
+        made = load_calibration(out)
+        assert (made.kind, made.method, made.numbers) == (kind, kind, {"drive.track": 0.15})
+        trials, observe, seed = asked[kind]
+        assert ([trial.purpose for trial in trials], observe, seed) == ([kind] * 2, "track", 5)
+        assert all(len(trial.poses) for trial in trials)
+    said = refused("motion", "--robot", "sim", "-o", tmp_path / "x.toml")
+    assert "Of cells alone nothing is told of motion" in said
+    assert "--observe encoders or track" in said
+    said = refused("contact", "--robot", "sim", "--observe", "encoders", "-o", tmp_path / "x.toml")
+    assert "--observe track" in said
+
+
+def test_less_can_be_used_than_was_recorded_and_not_more(tmp_path):
+    run("path", "--robot", "sim", "--observe", "track", "--budget", 4, "-o", tmp_path / "path.toml")
+    data = tmp_path / "path.trials.jsonl"
+    run("path", "--from", data, "--observe", "cells", "-o", tmp_path / "ruled.toml")
+    made = [load_calibration(tmp_path / name) for name in ("path.toml", "ruled.toml")]
+    ways = [each.evidence["path"]["straight_m"] for each in made]
+    assert ways[0] != ways[1]
+    assert ways[0] == pytest.approx(ways[1], abs=0.0254 / 16 + 1e-3)
+    seen = tmp_path / "cells.toml"
+    run("path", "--robot", "sim", "--budget", 4, "-o", seen)
+    said = refused("path", "--from", tmp_path / "cells.trials.jsonl", "--observe", "track", "-o", seen)
+    assert "has no more than 'cells'" in said
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["motion", "all"])
+def test_every_number_of_sim_is_in_reach_of_its_calibration(kind, tmp_path):
+    run(kind, "--robot", "sim", "--observe", "track", "--budget", 4, "-o", tmp_path / "fit.toml")
+    made = load_calibration(tmp_path / "fit.toml")
+    own = {each.name: each for each in made.fitted}
+    assert own["drive.track"].identified
+    assert own["drive.track"].estimate == pytest.approx(0.153, rel=0.05)
+    assert made.n_draws > 50

@@ -5,14 +5,16 @@ from ._contact import fit_contact
 from ._contact_plans import contact_plans
 from ._evidence import Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
-from ._ir_checks import Independence, independence, predictive_p
+from ._ir_checks import Independence, independence, predictive_check
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
 from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
 from ._motion_plans import motion_plans
+from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
-from ._prior import Effect, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
+from ._predictive import Misfit, misfits
+from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 
@@ -21,7 +23,9 @@ __all__ = [
     "Effect",
     "Effort",
     "Evidence",
+    "Floats",
     "Independence",
+    "Misfit",
     "MotionFit",
     "Moved",
     "Parameter",
@@ -42,12 +46,15 @@ __all__ = [
     "fit_path",
     "fit_sensor",
     "independence",
+    "information_of",
+    "misfits",
     "motion_plans",
     "moved_in",
+    "next_trials",
     "numbers_of",
     "path_plans",
     "placements_of",
-    "predictive_p",
+    "predictive_check",
     "random_controllers",
     "random_start",
     "ranges_of",

@@ -115,8 +115,8 @@ def _intraclass(rows: list[Array]) -> float:
     return (between - within) / whole if whole > 0 else 0.0
 
 
-def predictive_p(probabilities: Array, counts: Array, rng: np.random.Generator) -> float:
-    """That readings drawn from the fit are as far from it as those that were read.
+def predictive_check(probabilities: Array, counts: Array, rng: np.random.Generator) -> tuple[float, float]:
+    """Whether readings drawn from the fit are as far from it as those that were read.
 
     Args:
         probabilities: (m, p, b) of each bin at each placement, for m draws from the posterior.
@@ -125,16 +125,19 @@ def predictive_p(probabilities: Array, counts: Array, rng: np.random.Generator) 
 
     Returns:
         The posterior predictive p value of the discrepancy of Freeman and Tukey, sum of (sqrt(seen) - sqrt(expected))^2
-        over bins and placements. Near 0: the sensor's model does not make such readings.
+        over bins and placements; near 0: the sensor's model does not make such readings. And the share of readings that
+        are in another bin than the fit has them (the total variation), less that of readings drawn from it.
 
     Source: Gelman, Meng & Stern (1996).
     """
     sizes = counts.sum(axis=1)
-    chosen = rng.integers(len(probabilities), size=REPLICATES)
-    larger = 0
-    for k in chosen:
+    larger, elsewhere = 0, 0.0
+    for k in rng.integers(len(probabilities), size=REPLICATES):
         chance = probabilities[k] / probabilities[k].sum(axis=1, keepdims=True)
-        root = np.sqrt(sizes[:, None] * chance)
+        expected = sizes[:, None] * chance
         drawn = rng.multinomial(sizes, chance)
+        root = np.sqrt(expected)
         larger += ((np.sqrt(drawn) - root) ** 2).sum() >= ((np.sqrt(counts) - root) ** 2).sum()
-    return (1 + larger) / (1 + REPLICATES)
+        elsewhere += (np.abs(counts - expected).sum() - np.abs(drawn - expected).sum()) / 2
+    p = (1 + larger) / (1 + REPLICATES)
+    return p, max(elsewhere / REPLICATES / max(sizes.sum(), 1), 0.0)

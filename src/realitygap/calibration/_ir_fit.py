@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.world import Fitted, RobotModel
 
-from ._ir_checks import Independence, independence, predictive_p
+from ._ir_checks import Independence, independence, predictive_check
 from ._ir_mixture import MixtureReadings
 from ._ir_pulses import PulseReadings
 from ._ir_readings import Array, Placement, refuse_response
@@ -42,6 +42,7 @@ class SensorFit:
         draws: (n,) of each, by dotted name.
         independence: Of its readings.
         p: Of the posterior predictive check.
+        misfit: Share of the readings that are not where the fit has them, beyond chance.
         curve: Distances to a wall ahead [m], mean, and ends of the 90 % band of readings.
     """
 
@@ -51,6 +52,7 @@ class SensorFit:
     draws: Mapping[str, Array]
     independence: Independence
     p: float
+    misfit: float
     curve: Mapping[str, Array]
 
 
@@ -100,7 +102,7 @@ def fit_sensor(
             if is_own[scale.name]
         },
         apart,
-        predictive_p(model.probabilities(values[chosen]), model.counts, rng),
+        *predictive_check(model.probabilities(values[chosen]), model.counts, rng),
         _curve(model, sensor.cone, sensor.rays, sensor.direction, values[chosen]),
     )
 

@@ -100,6 +100,9 @@ def fit_motion(
         and 12; White (1982), the sandwich. Differs: even priors between ends.
     """
     seen = observed_as(trials, observe)
+    known = parameters_of(robot, prior)
+    if seen and all(trial.observe == "cells" for trial in seen):
+        return nothing_known((*MOTION, *MOTION_NOISE, "drive.dead_band"), known, robot, METHOD)
     windows = make_windows(seen, robot, arena, window)
     windows = windows.only(
         ~windows.touching & np.isfinite(np.concatenate([windows.seen[1], windows.seen[2]], 1)).any(1)
@@ -109,7 +112,6 @@ def fit_motion(
             "In no trial a robot was seen to move away from walls, expected poses (observe = track) or the way of the "
             "wheels (observe = encoders). Record trials of motion_plans that way."
         )
-    known = parameters_of(robot, prior)
     problem = make_problem(simulate, robot, known, windows, MOTION)
     place, dead_band, noise = _solve(problem)
     problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
@@ -128,6 +130,23 @@ class DeadBand:
         """(n,) from its posterior."""
         part = rng.choice(len(self.weights), n, p=self.weights)
         return np.asarray(rng.uniform(self.edges[part], self.edges[part + 1]))
+
+
+def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method: str) -> MotionFit:
+    """Parameters of which cells alone tell nothing to a fit of windows, with what to record."""
+    own = own_values(robot)
+    fitted = tuple(
+        Fitted(
+            name=name, estimate=own[name], low=known[name].prior.lowest, high=known[name].prior.highest,
+            prior_low=known[name].prior.lowest, prior_high=known[name].prior.highest, identified=False,
+            unit=known[name].unit, advice=advice_for(name, "cells"),
+        )
+        for name in names
+    )  # fmt: skip
+    notes = (
+        "Cells, readings and stalls do not show where the robot was at each command: fit all parameters to whole trials.",
+    )
+    return MotionFit(fitted, {}, {}, method, notes)
 
 
 def _solve(problem: Problem) -> tuple[Floats, DeadBand, Floats]:

@@ -8,9 +8,11 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from ._scatter import NoisePrior
-from ._simulate import Floats
+from ._simulate import Floats, Ints
 
 SWEEPS, BURN_IN = 600, 150
+HEATS = (0.02, 0.06, 0.2, 0.5, 1.0, 1.0, 1.0)  # parts of the log likelihood that count, round by round
+WIDER = 2.0  # times the covariance found, to look around in
 FLAT = 1e-9  # precision of a direction in which nothing was learned
 
 
@@ -98,43 +100,51 @@ def walk(
     return here
 
 
-def sample_around(
+def sample_clusters(
     rng: np.random.Generator,
     center: Floats,
-    spread: Floats,
     log_likelihoods: Callable[[Floats], Floats],
-    rounds: int = 3,
+    n_draws: int,
+    reach: float = 0.12,
     n: int = 300,
 ) -> Floats:
-    """(n, p) draws from the posterior over places 0..1 of a model that need not be linear.
+    """(n_draws, p) places 0..1 that observations in clusters allow, for a model that is not smooth.
 
-    Importance sampling from a t distribution with 4 degrees of freedom, which each round fits anew to the draws that
-    the round before weighed (population Monte Carlo, Cappe et al. 2004).
+    Places are looked for around the best so far, with a t distribution that each round fits anew (population Monte
+    Carlo, Cappe et al. 2004). Each draw weighs the clusters anew (weighted likelihood bootstrap, Newton & Raftery
+    1994): where clusters disagree by more than noise, draws spread.
 
     Args:
         rng: Random numbers.
         center: (p,) where to begin.
-        spread: (p, p) covariance to begin with.
-        log_likelihoods: (m,) at places (m, p).
-        rounds, n: How often, and of how many draws.
+        log_likelihoods: (m, k) of each of k clusters at places (m, p).
+        n_draws: How many.
+        reach: Standard deviation to begin with.
+        n: At how many places in each round.
     """
     p = len(center)
-    places, weights = np.tile(center, (n, 1)), np.full(n, 1.0 / n)
-    for _ in range(rounds):
-        root = np.linalg.cholesky(spread + 1e-10 * np.eye(p))
-        normal = rng.standard_normal((n, p))
-        tails = np.sqrt(4.0 / rng.chisquare(4.0, n))
-        places = center + (normal * tails[:, None]) @ root.T
-        inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
-        places = np.clip(places, 0.0, 1.0)
-        proposed = -0.5 * (4.0 + p) * np.log1p((normal**2).sum(axis=1) * tails**2 / 4.0)
-        logs = np.where(inside, log_likelihoods(places) - proposed, -np.inf)
-        if not np.isfinite(logs).any():
-            break
-        weights = np.exp(logs - logs.max())
-        weights /= weights.sum()
-        tempered = np.sqrt(weights) / np.sqrt(weights).sum()  # so that few heavy draws do not decide alone
-        center = tempered @ places
-        off = places - center
-        spread = (tempered[:, None] * off).T @ off
-    return np.asarray(places[rng.choice(n, n, p=weights)])
+    spread = reach**2 * np.eye(p)
+    places, logs, proposed = np.empty((0, p)), np.empty((0, 0)), np.empty(0)
+    for heat in HEATS:
+        root = np.linalg.cholesky(spread + 1e-7 * np.eye(p))
+        normal, tails = rng.standard_normal((n, p)), np.sqrt(4.0 / rng.chisquare(4.0, n))
+        new = center + (normal * tails[:, None]) @ root.T
+        density = -0.5 * (4.0 + p) * np.log1p(((normal * tails[:, None]) ** 2).sum(axis=1) / 4.0)
+        density -= np.log(np.diag(root)).sum()
+        inside = ((new >= 0.0) & (new <= 1.0)).all(axis=1)
+        found = log_likelihoods(new[inside])
+        places = np.concatenate([places, new[inside]])
+        proposed = np.concatenate([proposed, density[inside]])
+        logs = np.concatenate([logs, found]) if logs.size else found
+        drawn = places[_weighed_anew(rng, heat * logs, proposed, n)]
+        center, spread = drawn.mean(axis=0), WIDER * np.cov(drawn.T).reshape(p, p)
+    return np.asarray(places[_weighed_anew(rng, logs, proposed, n_draws)])
+
+
+def _weighed_anew(rng: np.random.Generator, logs: Floats, proposed: Floats, n: int) -> Ints:
+    """(n,) which of the places, each with other weights (Dirichlet) of the clusters."""
+    k = logs.shape[1]
+    shares = k * rng.dirichlet(np.ones(k), n)
+    scores = shares @ logs.T - proposed
+    picks = scores + rng.gumbel(size=scores.shape)  # draws in proportion to the exponentials
+    return np.asarray(np.argmax(picks, axis=1), np.int64)

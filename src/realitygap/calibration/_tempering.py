@@ -1,8 +1,7 @@
 """Draws from a posterior over a unit cube: particles go from the prior to it by steps of temperature.
 
 Source: Del Moral, Doucet & Jasra (2006), sequential Monte Carlo samplers, with temperatures chosen so that the
-effective number of particles stays at a share of them. Differs: moves are random walks with the particles' own
-covariance.
+effective number of particles stays at a share of them. Moves: ter Braak (2006), differential evolution.
 """
 
 from __future__ import annotations
@@ -22,7 +21,10 @@ MOVES, LAST_MOVES = 5, 20
 """Moves of each particle after a step, and once the temperature is that of the posterior."""
 
 LEAST_SCALE, MOST_SCALE = 0.05, 4.0
-"""Of a move, against 2.38 / sqrt(d) standard deviations."""
+"""Of a move, against 2.38 / sqrt(2 d) differences."""
+
+FINEST = 3.0
+"""Powers of ten by which a short move is shorter, at most."""
 
 MOST_STAGES = 200
 
@@ -87,23 +89,24 @@ def _move(
     scale: float,
     rng: np.random.Generator,
 ) -> float:
-    """Move each particle once, in place; the share that moved.
+    """Move each particle once, in place; the share of long moves that were taken.
 
-    A third of the moves are along one axis: corners of a likelihood that is level inside are narrow.
+    A move is a difference of two other particles: where the posterior has parts of different widths, differences have
+    them, too. A third of the moves are along one axis, as corners of a likelihood that is level inside are narrow, and
+    half of them are shorter, for a part that few particles have found yet.
     """
     m, d = places.shape
-    spread: Array = np.cov(places.T).reshape(d, d) + 1e-12 * np.eye(d)
-    root = np.linalg.cholesky(spread)
-    jumps = (rng.standard_normal((m, d)) @ root.T) * (2.38 / np.sqrt(d))
-    alone = rng.random((m, 1)) < 1 / 3
-    axis = rng.integers(d, size=m)
-    single = np.zeros((m, d))
-    single[np.arange(m), axis] = rng.standard_normal(m) * np.sqrt(np.diag(spread))[axis] * 2.0
-    proposed = _reflected(places + scale * np.where(alone, single, jumps))
+    one, other = rng.integers(m, size=(2, m))
+    jumps = (places[one] - places[other]) * (2.38 / np.sqrt(2 * d)) + rng.normal(0, 1e-9, (m, d))
+    axes = rng.integers(d, size=m)[:, None] == np.arange(d)
+    jumps = np.where(rng.random((m, 1)) < 1 / 3, np.where(axes, jumps * np.sqrt(d), 0.0), jumps)
+    short = rng.random(m) < 1 / 2
+    jumps[short] *= 10.0 ** -rng.uniform(0, FINEST, (int(short.sum()), 1))
+    proposed = _reflected(places + scale * jumps)
     news = log_likelihood(proposed)
     accepted = np.log(rng.random(m)) < temperature * (news - values)
     places[accepted], values[accepted] = proposed[accepted], news[accepted]
-    return float(accepted.mean())
+    return float(accepted[~short].mean())
 
 
 def _reflected(places: Array) -> Array:

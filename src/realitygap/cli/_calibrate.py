@@ -40,6 +40,12 @@ def calibrate(
     budget: Annotated[
         int | None, typer.Option(min=1, metavar="TRIALS", help="Trials in all. [default: what it takes]")
     ] = None,
+    choose: Annotated[
+        bool,
+        typer.Option(
+            "--choose", help="Of all: choose the last trials after a first fit, as those that tell most."
+        ),
+    ] = False,
     data: Annotated[
         Path | None,
         typer.Option(
@@ -89,11 +95,15 @@ def calibrate(
     """
     from realitygap.study import calibrate_from, save_calibration
 
-    out = _checked(what, robot, out, observe, data, witness, figure)
+    out = _checked(what, robot, out, observe, data, witness, figure, choose=choose)
     if data is not None:
         made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
     else:
-        made = _measured(what, robot or "", out, observe, budget, base, seed, arena, witness, quiet=as_json)
+        made = _measured(
+            *(what, robot or "", out, observe, budget, base, seed, arena, witness),
+            choose=choose,
+            quiet=as_json,
+        )
     save_calibration(out, made)
     if figure is not None:
         from realitygap.report import save_sensor_figure
@@ -110,6 +120,8 @@ def _checked(
     data: Path | None,
     witness: str | None,
     figure: Path | None,
+    *,
+    choose: bool,
 ) -> Path:
     """Refuse what cannot be, before a trial is lost on it; where the calibration goes."""
     if (robot is None) == (data is None):
@@ -132,8 +144,8 @@ def _checked(
         raise StudyError(f"--observe is {observe!r}, expected cells, encoders or track.")
     if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):
         raise StudyError("--figure draws the readings of `calibrate sensors` into a .svg, .pdf or .png.")
-    if witness is not None and data is not None:
-        raise StudyError("--witness goes with --robot: --from drives nothing.")
+    if data is not None and (witness is not None or choose):
+        raise StudyError("--witness and --choose go with --robot: --from drives nothing.")
     return out
 
 
@@ -152,6 +164,7 @@ def _measured(
     arena: str,
     witness: str | None,
     *,
+    choose: bool,
     quiet: bool,
 ) -> Calibration:
     """Carry out the trials, and fit."""
@@ -179,6 +192,7 @@ def _measured(
                 budget=budget,
                 seed=seed,
                 trials_file=kept,
+                choose=choose,
                 guide=guide,
                 tell=None if quiet or guide is not None else _tell,
             )

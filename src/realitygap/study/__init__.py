@@ -2,6 +2,7 @@
 
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
+from ._calibrate_all import calibrate_all
 from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
@@ -59,6 +60,7 @@ __all__ = [
     "Transferred",
     "TrialsSection",
     "calibrate",
+    "calibrate_all",
     "calibrate_from",
     "calibration_of",
     "choose_condition",

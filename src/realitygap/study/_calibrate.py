@@ -21,12 +21,11 @@ from realitygap.records import (
     read_observations,
     write_whole,
 )
-from realitygap.robots import DEFAULT_ROBOT, SimPlatform
+from realitygap.robots import DEFAULT_ROBOT
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
-from ._calibrate_all import calibrate_all, calibration_of
-from ._calibrate_kinds import KINDS, Kind, Parts
+from ._calibrate_kinds import ALL_TRIALS, KINDS, Kind, Parts
 from ._targets import observations_head
 from ._wrapped_targets import (
     PATH,
@@ -41,12 +40,6 @@ from ._wrapped_targets import (
 SEED_STRIDE = 10_000
 """Between the numbers of trials of calibrations with different seeds."""
 
-ALL = "all"
-"""The kind that fits everything at once."""
-
-BUDGET_OF_ALL = 20
-"""Trials where no budget is given."""
-
 Tell = Callable[[int, int], None]
 """Told of how many of how many trials are there."""
 
@@ -60,6 +53,7 @@ def calibrate(
     budget: int | None = None,
     seed: int = 0,
     trials_file: Path | None = None,
+    choose: bool = False,
     guide: Guide | None = None,
     tell: Tell | None = None,
 ) -> Calibration:
@@ -74,6 +68,7 @@ def calibrate(
         budget: Trials in all; what the kind needs when not given.
         seed: Of trials and draws.
         trials_file: Where trials are kept as they end, and taken up from; nowhere when not given.
+        choose: Of all: whether the last trials are chosen after a first fit, as those that tell most.
         guide: Who puts the robot where it has to stand; nobody has to where the target places itself.
         tell: Called after each trial.
 
@@ -83,11 +78,14 @@ def calibrate(
         StoppedByPerson: The guide was told to stop; what was recorded is kept.
     """
     _refuse(kind, target, robot, observe, budget)
+    if choose and kind != "all":
+        raise StudyError(f"--choose goes with all: the trials of {kind} are known before the first of them.")
     around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
     if trials_file is None:
-        return _calibrated(kind, around, robot, observe, budget, seed, tell)
+        return _calibrated(kind, around, robot, observe, budget, seed, tell, choose=choose)
     with ObservationsFile(trials_file, observations_head(target, observe, str(robot))) as file:
-        return _calibrated(kind, ResumableTarget(around, file), robot, observe, budget, seed, tell)
+        kept = ResumableTarget(around, file)
+        return _calibrated(kind, kept, robot, observe, budget, seed, tell, choose=choose)
 
 
 def _calibrated(
@@ -98,20 +96,42 @@ def _calibrated(
     budget: int | None,
     seed: int,
     tell: Tell | None,
+    *,
+    choose: bool,
 ) -> Calibration:
-    if kind == ALL:
-        n = BUDGET_OF_ALL if budget is None else budget
-        counted = CountingTarget(target, n, tell)
-        try:
-            made = calibrate_all(counted, robot=load_robot(robot), observe=observe, budget=n, seed=seed)
-        except ValueError as error:
-            raise StudyError(str(error)) from error
-        return _calibration(kind, _parts_of(made), robot, target.name, target.label, observe, made.trials)
+    if choose:
+        return _chosen(target, robot, observe, ALL_TRIALS if budget is None else budget, seed, tell)
     plans = _plans(KINDS[kind], target.arena, load_robot(robot), budget)
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
     return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
+
+
+def _chosen(
+    target: Target, robot: str | Path, observe: Observe, n: int, seed: int, tell: Tell | None
+) -> Calibration:
+    """A calibration of everything whose last trials are chosen after a first fit."""
+    from ._calibrate_all import calibrate_all
+
+    counting = CountingTarget(target, n, tell)
+    try:
+        made = calibrate_all(
+            counting, robot=load_robot(robot), observe=observe, budget=n, seed=seed, choose=True
+        )
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+    parts = Parts(
+        made.fitted,
+        made.numbers,
+        made.draws,
+        made.method,
+        made.notes,
+        made.misspecified,
+        made.misspecification_p,
+        made.evidence,
+    )
+    return _calibration("all", parts, robot, target.name, target.label, observe, made.trials)
 
 
 def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
@@ -121,12 +141,12 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
         StudyError: It cannot be.
     """
     _check_kind(kind)
-    base, made = load_robot(robot), KINDS.get(kind)
-    if made is not None and budget is not None and budget < made.least:
+    base, made = load_robot(robot), KINDS[kind]
+    if budget is not None and budget < made.least:
         raise StudyError(
             f"--budget is {budget}, and a calibration of {kind} takes at least {made.least} trials."
         )
-    if made is not None and observe not in made.observes:
+    if observe not in made.observes:
         raise StudyError(
             f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
             f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
@@ -182,8 +202,8 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
 
 
 def _check_kind(kind: str) -> None:
-    if kind not in (*KINDS, ALL):
-        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, (*KINDS, ALL))}")
+    if kind not in KINDS:
+        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, KINDS)}")
 
 
 def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
@@ -203,29 +223,9 @@ def _fit(
 ) -> Parts:
     base = load_robot(robot)
     try:
-        if kind != ALL:
-            return KINDS[kind].fit(trials, base, arena, observe, seed)
-        step_s = trials[0].step_s if trials else base.step_s
-        made = calibration_of(
-            trials, SimPlatform(robot=base, step_s=step_s), arena, robot_name=base.name, target="", label="SIM",
-            observe=observe, seed=seed,
-        )  # fmt: skip
-        return _parts_of(made)
+        return KINDS[kind].fit(trials, base, arena, observe, seed)
     except ValueError as error:
         raise StudyError(str(error)) from error
-
-
-def _parts_of(made: Calibration) -> Parts:
-    return Parts(
-        made.fitted,
-        made.numbers,
-        made.draws,
-        made.method,
-        made.notes,
-        made.misspecified,
-        made.misspecification_p,
-        made.evidence,
-    )
 
 
 def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:

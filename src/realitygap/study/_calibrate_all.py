@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Any
 
 import numpy as np
 
 from realitygap.calibration import (
     Effort,
     Evidence,
+    Floats,
+    Misfit,
     Parameter,
     Posterior,
     Vectors,
     evidence_of,
     excitation,
     fit_all,
+    information_of,
+    misfits,
+    next_trials,
     numbers_of,
     random_controllers,
     ranges_of,
     scribbler_prior,
+    values_of,
 )
 from realitygap.errors import whole_number
 from realitygap.evolution import Genome
@@ -29,12 +34,18 @@ from realitygap.robots import SimPlatform
 from realitygap.trials import SimEnsemble, Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
+from ._calibrate_kinds import Parts
+
 METHOD = (
-    "approximate Bayesian computation with score summaries (Alsing & Wandelt 2018), regression adjustment (Beaumont et "
-    "al. 2002) and truncated rounds (Deistler et al. 2022)"
+    "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
+    "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002)."
 )
 STEPS = 100  # of a trial
 IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
+N_CANDIDATES = 12  # of which the next trials are chosen
+N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
+BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
+LEAST_TO_CHOOSE = 10  # trials
 
 
 def calibrate_all(
@@ -45,6 +56,7 @@ def calibrate_all(
     budget: int,
     seed: int = 0,
     effort: Effort = "full",
+    choose: bool = False,
     tell: Callable[[str], None] | None = None,
     keep: Callable[[ObservedTrial], None] | None = None,
     threads: int | None = None,
@@ -61,6 +73,8 @@ def calibrate_all(
         budget: Trials to carry out; with 0 the robot stays as its file has it.
         seed: Of all random numbers.
         effort: How many simulations.
+        choose: Whether the last trials of 10 and more are chosen after a first fit, as those that tell most of how
+            controllers that were not tried will do.
         tell: Told what is going on.
         keep: Given each trial as it comes, to be kept.
         threads: Of the simulations.
@@ -71,21 +85,42 @@ def calibrate_all(
     """
     whole_number("budget", budget, 0)
     platform = SimPlatform(step_s=target.step_s, **({} if robot is None else {"robot": robot}))
-    plans = budget_plans(target.arena, platform.body_radius, budget, seed)
-    if tell is not None and plans:
-        tell(f"{len(plans)} trials on {target.name}, {observe} observed")
-    trials = target.carry_out(plans, observe, None if keep is None else lambda _, trial: keep(trial))
-    name = robot if isinstance(robot, str) else platform.robot.name
-    return calibration_of(
-        trials, platform, target.arena, robot_name=name, target=target.name, label=target.label, observe=observe,
-        seed=seed, effort=effort, tell=tell, threads=threads,
-    )  # fmt: skip
+    say = tell or (lambda _: None)
+    told = None if keep is None else lambda _, trial: keep(trial)
+    plans = all_plans(target.arena, platform.robot, budget, seed)
+    is_chosen = choose and budget >= LEAST_TO_CHOOSE
+    first = round(BEFORE_CHOICE * budget) if is_chosen else budget
+    say(f"{first} trials on {target.name}, {observe} observed")
+    trials = list(target.carry_out(plans[:first], observe, told))
+    fit = _Fit(platform, target.arena, seed, say, threads)
+    if is_chosen:
+        chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
+        say(f"{len(chosen)} more trials, chosen")
+        trials += target.carry_out(chosen, observe, told)
+    parts = fit.parts(trials, effort)
+    return Calibration(
+        kind="all",
+        robot=robot if isinstance(robot, str) else platform.robot.name,
+        target=target.name,
+        label=target.label,
+        observe=observe,
+        trials=len(trials),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        method=parts.method,
+        fitted=parts.fitted,
+        numbers=dict(parts.numbers),
+        draws={name: tuple(np.asarray(value).tolist()) for name, value in parts.draws.items()},
+        misspecified=parts.misspecified,
+        misspecification_p=parts.misspecification_p,
+        notes=parts.notes,
+        evidence=parts.evidence,
+    )
 
 
-def budget_plans(arena: Arena, radius: float, budget: int, seed: int) -> list[TrialPlan]:
-    """The trials of a calibration, excitation and controllers in turn."""
+def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> list[TrialPlan]:
+    """The trials of a calibration of everything: excitation and random controllers in turn."""
     rng = np.random.default_rng([seed, 1])
-    given = excitation(arena, radius, (budget + 1) // 2, STEPS, rng)
+    given = excitation(arena, robot.radius, (budget + 1) // 2, STEPS, rng)
     driven = [
         TrialPlan(genome=genome, steps=STEPS)
         for genome in random_controllers(budget // 2, int(rng.integers(2**31)))
@@ -94,46 +129,124 @@ def budget_plans(arena: Arena, radius: float, budget: int, seed: int) -> list[Tr
     return [TrialPlan(**{**vars(plan), "number": k}) for k, plan in enumerate(plans)]
 
 
-def calibration_of(
+def fit_everything(
     trials: Sequence[ObservedTrial],
-    platform: SimPlatform,
+    robot: RobotModel,
     arena: Arena,
-    *,
-    robot_name: str,
-    target: str,
-    label: Any,
-    observe: Observe,
     seed: int = 0,
+    *,
     effort: Effort = "full",
     tell: Callable[[str], None] | None = None,
     threads: int | None = None,
-) -> Calibration:
-    """The calibration from trials that were recorded; arguments as in `calibrate_all`."""
-    prior = scribbler_prior(platform.robot)
-    common: dict[str, Any] = {
-        "kind": "all", "robot": robot_name, "target": target, "label": label, "observe": observe, "trials": len(trials),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-    }  # fmt: skip
-    if not trials:
-        return _as_it_is(common, prior, platform.robot)
-    genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-    evidence = evidence_of(trials, genomes, arena.grid.n_cells)
-    ensemble = SimEnsemble(platform, arena, ranges=ranges_of(prior, platform.robot), threads=threads)
+) -> Parts:
+    """The fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
 
-    def simulate(one: Evidence, numbers: Any, key: int) -> Vectors:
-        return ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
+    Raises:
+        ValueError: Trials with commands of several lengths of time.
+    """
+    times = sorted({trial.step_s for trial in trials})
+    if len(times) > 1:
+        raise ValueError(
+            f"The trials' commands last {times[0]:g} to {times[-1]:g} s, expected one length of time. Fit them apart."
+        )
+    platform = SimPlatform(robot=robot, **({"step_s": times[0]} if times else {}))
+    return _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
 
-    posterior = fit_all(evidence, simulate, prior, platform.robot, seed=seed, effort=effort, tell=tell)
-    middle = {name: np.median(value, keepdims=True) for name, value in posterior.values.items()}
-    numbers = numbers_of(prior, middle, platform.robot)
-    draws = numbers_of(prior, posterior.values, platform.robot)
-    return Calibration(
-        **common,
-        method=METHOD,
-        fitted=tuple(_fitted(parameter, posterior) for parameter in prior),
-        numbers={name: float(value[0]) for name, value in numbers.items()},
-        draws={name: tuple(value.tolist()) for name, value in draws.items()},
-    )
+
+class _Fit:
+    """A robot in an arena, ready to be fitted."""
+
+    def __init__(
+        self, platform: SimPlatform, arena: Arena, seed: int, tell: Callable[[str], None], threads: int | None
+    ) -> None:
+        self.robot = platform.robot
+        self.arena = arena
+        self.seed = seed
+        self.tell = tell
+        self.prior = scribbler_prior(self.robot)
+        self.ensemble = SimEnsemble(
+            platform, arena, ranges=ranges_of(self.prior, self.robot), threads=threads
+        )
+
+    def simulate(self, one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
+        """(m, d) what is seen of m robots."""
+        return self.ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
+
+    def evidence(self, trials: Sequence[ObservedTrial]) -> list[Evidence]:
+        genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
+        return evidence_of(trials, genomes, self.arena.grid.n_cells)
+
+    def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+        return fit_all(
+            self.evidence(trials), self.simulate, self.prior, self.robot,
+            seed=self.seed, effort=effort, tell=self.tell,
+        )  # fmt: skip
+
+    def numbers(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
+        return numbers_of(self.prior, values, self.robot)
+
+    def parts(self, trials: Sequence[ObservedTrial], effort: Effort) -> Parts:
+        """All that the trials tell."""
+        if not self.evidence(trials):
+            return self._as_it_is()
+        posterior = self.posterior(trials, effort)
+        middle = {name: np.median(value, keepdims=True) for name, value in posterior.values.items()}
+        draws = self.numbers(posterior.values)
+        found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
+        return Parts(
+            fitted=tuple(_fitted(parameter, posterior) for parameter in self.prior),
+            numbers={name: float(value[0]) for name, value in self.numbers(middle).items()},
+            draws=draws,
+            method=METHOD,
+            notes=tuple(_said_of(misfit) for misfit in found),
+            misspecified=any(misfit.is_too_large for misfit in found),
+            misspecification_p=min(1.0, len(found) * min(misfit.p for misfit in found)),
+            evidence={"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}},
+        )
+
+    def chosen(self, posterior: Posterior, n: int, number: int) -> list[TrialPlan]:
+        """The n trials that tell most of how controllers do that were not tried."""
+        rng = np.random.default_rng([self.seed, 2])
+        given = excitation(self.arena, self.robot.radius, N_CANDIDATES // 2, STEPS, rng)
+        controllers = random_controllers(N_CANDIDATES, int(rng.integers(2**31)))
+        driven = [TrialPlan(genome=genome, steps=STEPS) for genome in controllers[: N_CANDIDATES // 2]]
+        places = posterior.places[:N_ASKED]
+        numbers = self.numbers(values_of(self.prior, places))
+        informations = []
+        for k, plan in enumerate([*given, *driven]):
+            (one,) = self._unseen(plan)
+            vectors = self.simulate(one, numbers, self.seed + k)
+            informations.append(information_of(places, vectors, one.finest))
+        starts = np.tile(self.arena.start, (N_CANDIDATES // 2, 1))
+        held_out = controllers[N_CANDIDATES // 2 :]
+        goal = self.ensemble.drive(held_out, starts, STEPS, numbers, self.seed, keep=()).coverage
+        which = next_trials(places, informations, n, goal)
+        plans = [[*given, *driven][k] for k in which]
+        return [TrialPlan(**{**vars(plan), "number": number + k}) for k, plan in enumerate(plans)]
+
+    def _unseen(self, plan: TrialPlan) -> list[Evidence]:
+        """What a trial that was not carried out would tell, seen from afar."""
+        n, s = plan.steps, len(self.robot.range)
+        commands = plan.commands if plan.genome is None else np.zeros((n, 2))
+        start = plan.start or self.arena.start
+        x, y, heading = start
+        trial = ObservedTrial((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
+        return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
+
+    def _as_it_is(self) -> Parts:
+        """Of no trials: the robot's own numbers."""
+        plain = {
+            name: value.center if isinstance(value, Distribution) else value
+            for name, value in self.robot.numbers().items()
+        }
+        numbers = {e.number: plain[e.number] for parameter in self.prior for e in parameter.expand}
+        return Parts(
+            fitted=(),
+            numbers=numbers,
+            draws={name: (value,) for name, value in numbers.items()},
+            method="None: no trials.",
+            notes=("No trial was observed: these are the robot file's numbers.",),
+        )
 
 
 def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
@@ -154,17 +267,6 @@ def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
     )
 
 
-def _as_it_is(common: dict[str, Any], prior: Sequence[Parameter], robot: RobotModel) -> Calibration:
-    """Of no trials: the robot's own numbers."""
-    plain = {
-        name: value.center if isinstance(value, Distribution) else value
-        for name, value in robot.numbers().items()
-    }
-    numbers = {effect.number: plain[effect.number] for parameter in prior for effect in parameter.expand}
-    return Calibration(
-        **common,
-        method="none: no trials",
-        numbers=numbers,
-        draws={name: (value,) for name, value in numbers.items()},
-        notes=("No trial was observed: these are the robot file's numbers.",),
-    )
+def _said_of(misfit: Misfit) -> str:
+    most = f"expected at most {misfit.tolerated:.0%}"
+    return f"{misfit.kind}: {misfit.share:.0%} of its variance is neither predicted nor chance, {most}."

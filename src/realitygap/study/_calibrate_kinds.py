@@ -17,6 +17,8 @@ from realitygap.calibration import (
     Placement,
     SensorFit,
     Simulate,
+    contact_plans,
+    fit_contact,
     fit_motion,
     fit_path,
     fit_sensor,
@@ -112,6 +114,10 @@ _SENSORS_METHOD = (
 MISFIT = 0.05
 """A check's p below which the sensor's model does not make what was read, over all sensors."""
 
+MISPLACED = 0.1
+"""Share of a sensor's readings that have to be elsewhere for the fit before it is said not to make them: with enough
+readings any model is found wrong somewhere."""
+
 
 def _sensor_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
     return sensor_plans(arena, robot, budget)
@@ -136,13 +142,14 @@ def _fit_sensors(
     placements = placements_of(standing, _rays_in(robot, arena))
     fits = [fit_sensor(robot, k, each, rng) for k, each in enumerate(placements)]
     p = min(1.0, len(fits) * min(fit.p for fit in fits))
+    farthest = max(fit.misfit for fit in fits)
     return Parts(
         fitted=tuple(fitted for fit in fits for fitted in fit.fitted),
         numbers={name: value for fit in fits for name, value in fit.numbers.items()},
         draws={name: values for fit in fits for name, values in fit.draws.items()},
         method=_SENSORS_METHOD,
         notes=tuple(_said_of(fit) for fit in fits) + _said_of_placements(placements[0]),
-        misspecified=p < MISFIT,
+        misspecified=p < MISFIT and farthest > MISPLACED,
         misspecification_p=p,
         evidence={"sensors": [_drawn_of(fit, each) for fit, each in zip(fits, placements, strict=True)]},
     )
@@ -165,7 +172,8 @@ def _said_of(fit: SensorFit) -> str:
     return (
         f"{fit.name}: {apart.readings} readings in {apart.placements} placements count as {apart.effective:.0f}; "
         f"correlation of consecutive ones {apart.correlation:.2f} (p {apart.correlation_p:.3f}), share of the variance "
-        f"between placements {apart.between:.2f} (p {apart.between_p:.3f}); posterior predictive p {fit.p:.3f}."
+        f"between placements {apart.between:.2f} (p {apart.between_p:.3f}); posterior predictive p {fit.p:.3f}, "
+        f"{fit.misfit:.0%} of the readings are not where the fit has them."
     )
 
 
@@ -193,7 +201,7 @@ def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]
     }
 
 
-# motion
+# motion and contact
 
 
 def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
@@ -206,6 +214,17 @@ def _fit_motion(
     moving = _of_purpose(trials, "motion")
     fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
     return _parts_of(fit)
+
+
+def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return contact_plans(arena, robot) if budget is None else contact_plans(arena, robot, budget)
+
+
+def _fit_contact(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    met = _of_purpose(trials, "contact")
+    return _parts_of(fit_contact(met, _replay(met, robot, arena), robot, arena, observe=observe, seed=seed))
 
 
 def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedTrial]:
@@ -224,9 +243,30 @@ def _parts_of(fit: MotionFit) -> Parts:
     return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
 
 
+# all
+
+
+def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    from ._calibrate_all import all_plans
+
+    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
+
+
+def _fit_all(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    from ._calibrate_all import fit_everything
+
+    return fit_everything(trials, robot, arena, seed)
+
+
+ALL_TRIALS = 20
+"""Of a calibration of everything, when nothing is said."""
+
 KINDS: dict[str, Kind] = {
     "path": Kind(_path_plans, _fit_path, least=2),
     "sensors": Kind(_sensor_plans, _fit_sensors),
     "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
+    "contact": Kind(_contact_plans, _fit_contact, observes=("track",)),
+    "all": Kind(_all_plans, _fit_all),
 }
-"""Those whose trials are known before the first of them; `all` chooses trials by what came before."""

@@ -115,7 +115,7 @@ def _carry_out(
     plan: ClosingPlan, name: TwinName, folder: Path, show: Callable[[], None] | None = None
 ) -> None:
     """One twin, in this process; the twin itself is in another."""
-    from ._calibrate_all import calibrate_all  # type: ignore[import-untyped]
+    from ._calibrate_all import calibrate_all
 
     arena = choose_condition(STUDY, None, plan.seed).arena.arena()
 

@@ -102,7 +102,7 @@ class Calibrating:
         path = self.folder / f"{name}.toml"
         if path.exists():
             return load_calibration(path)
-        from ._calibrate_all import calibrate_all  # type: ignore[import-untyped]
+        from ._calibrate_all import calibrate_all
 
         self.tell(f"calibrating by {n} trials, {self.observe} observed")
         trials = self.folder / f"{name}.jsonl"

@@ -1,0 +1,113 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from realitygap.calibration import (
+    Effect,
+    Evidence,
+    Parameter,
+    fit_all,
+    information_of,
+    misfits,
+    next_trials,
+    numbers_of,
+    ranges_of,
+    scribbler_prior,
+    standard_of,
+    values_of,
+)
+from realitygap.world import Distribution, load_robot
+
+ROBOT = load_robot("scribbler-s2-fluke2")
+PRIOR = (
+    Parameter("drive.track", Distribution(uniform=(0.1, 0.2)), "m", (Effect("drive.track"),)),
+    Parameter("drive.lag", Distribution(uniform=(0.0, 0.4)), "s", (Effect("drive.lag"),)),
+    Parameter("drive.slip", Distribution(uniform=(0.0, 0.2)), "", (Effect("drive.slip"),)),
+)
+SLOPES = np.random.default_rng(5).normal(size=(2, 60)) * [[30.0], [4.0]]  # drive.slip shows in nothing
+
+
+def simulate(one, numbers, key):
+    """A simulator whose posterior is nearly normal: track shows well, lag less."""
+    noise = np.random.default_rng(key).normal(size=(len(numbers["drive.track"]), 60))
+    shown = np.outer(numbers["drive.track"] - 0.15, SLOPES[0]) + np.outer(
+        numbers["drive.lag"] - 0.2, SLOPES[1]
+    )
+    return (shown + noise).astype(np.float32)
+
+
+def evidence_with(seen):
+    n = len(seen)
+    return Evidence(
+        SimpleNamespace(), (), lambda _: seen, seen, np.full(n, "reading"), np.zeros(n, int), np.arange(n)
+    )
+
+
+def observed(rng):
+    standard = rng.normal(size=(1, 3))
+    numbers = numbers_of(PRIOR, values_of(PRIOR, standard), ROBOT)
+    return standard[0], evidence_with(simulate(None, numbers, int(rng.integers(2**60)))[0])
+
+
+def test_intervals_cover_as_often_as_they_say():
+    # 3 x 50 intervals of 90 %: outside of 81 to 97 % by chance once in 1000 suites.
+    inside = []
+    for k in range(50):
+        truth, evidence = observed(np.random.default_rng(k))
+        places = fit_all([evidence], simulate, PRIOR, ROBOT, seed=k, effort="small").places
+        low, high = np.quantile(places, [0.05, 0.95], axis=0)
+        inside.append((low <= truth) & (truth <= high))
+    assert 0.81 <= np.mean(inside) <= 0.97
+
+
+def test_what_shows_is_found_and_what_does_not_stays_as_it_was():
+    truth, evidence = observed(np.random.default_rng(7))
+    places = fit_all([evidence], simulate, PRIOR, ROBOT, seed=1, effort="small").places
+    information = (SLOPES[0] ** 2).sum() * (0.1 * 0.4) ** 2  # d track / d standard is at most 0.1 * 0.4
+    assert places[:, 0].std() < 3 / np.sqrt(information)
+    assert places[:, 0].mean() == pytest.approx(truth[0], abs=4 * places[:, 0].std())
+    assert places[:, 2].std() == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_simulator_that_cannot_make_what_was_observed_is_told():
+    rng = np.random.default_rng(3)
+    _, right = observed(rng)
+    numbers = numbers_of(
+        PRIOR, fit_all([right], simulate, PRIOR, ROBOT, seed=1, effort="small").values, ROBOT
+    )
+    (fits,) = misfits([right], simulate, numbers, key=1)
+    wrong = evidence_with(right.seen + 4 * np.where(np.arange(60) % 7 < 3, 1, -1).astype(np.float32))
+    (fails,) = misfits([wrong], simulate, numbers, key=1)
+    assert not fits.is_too_large
+    assert fits.p > 0.01
+    assert fails.is_too_large
+    assert fails.p == 0.0
+
+
+def test_the_next_trial_is_the_one_that_tells_of_the_goal():
+    rng = np.random.default_rng(1)
+    places = rng.normal(size=(400, 2))
+    noise = rng.normal(size=(400, 8))
+    of_first = (places[:, :1] * 2 + noise).astype(np.float32)
+    of_second = (places[:, 1:] * 3 + noise).astype(np.float32)
+    finest = np.full(8, 0.01, np.float32)
+    informations = [information_of(places, vectors, finest) for vectors in (of_first, of_second)]
+    assert next_trials(places, informations, 1) == [1]
+    assert next_trials(places, informations, 1, goal=places[:, :1]) == [0]
+    with pytest.raises(ValueError, match="at least one candidate"):
+        next_trials(places, [], 1)
+
+
+def test_the_prior_of_a_scribbler_holds_its_file_and_comes_back_from_its_scale():
+    prior = scribbler_prior(ROBOT)
+    standard = np.random.default_rng(0).normal(size=(7, len(prior)))
+    assert standard_of(prior, values_of(prior, standard)) == pytest.approx(standard, abs=1e-9)
+    ranges = ranges_of(prior, ROBOT)
+    for name, value in ROBOT.numbers().items():
+        if name in ranges and value > 0:
+            assert ranges[name][0] <= value <= ranges[name][1], name
+    even = {parameter.name: np.array([parameter.prior.center]) for parameter in prior}
+    even |= {"drive.gain": np.array([0.9]), "drive.asymmetry": np.array([0.1])}
+    numbers = numbers_of(prior, even, ROBOT)
+    assert (numbers["drive.gain_left"][0], numbers["drive.gain_right"][0]) == pytest.approx((0.95, 0.85))

@@ -4,7 +4,8 @@ Each vector is a fixed function of what is seen, so a simulator that is right ma
 
 * Commands given one by one are given again, and all that is seen counts.
 * With poses, a robot is put back to where it was seen before each command, and each command is predicted by itself
-  (multiple shooting): what it answers does not depend on what it was about to do then, so controllers' trials serve too.
+  (multiple shooting): what it answers does not depend on what it was about to do then, so trials of controllers serve
+  too.
 * With encoders, the wheels of any trial are predicted from its commands: in `sim` nothing else moves them.
 * Without poses, controllers drive anew, as what they do next depends on what they saw.
 """
@@ -130,7 +131,9 @@ def _of_group(
         made = [_evidence(put_back, keep, partial(_shooting, anchors), seen, number)]
     elif is_driven:
         driven = Play(starts, steps, genomes=tuple(genome for _, _, genome in group if genome is not None))
-        made = [_evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)]
+        made = [
+            _evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)
+        ]
     else:
         made = [_evidence(given, ("readings", "stalled"), partial(_step_by_step, steps), seen, number)]
     if observe == "encoders":
@@ -215,7 +218,9 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     columns.add("cell", rehearsal.cells, 0)
     columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
     most = readings.max(axis=-1, keepdims=True)
-    seen = np.concatenate([most, most == 0, most - readings.min(axis=-1, keepdims=True), stalled, commands], axis=-1)
+    seen = np.concatenate(
+        [most, most == 0, most - readings.min(axis=-1, keepdims=True), stalled, commands], axis=-1
+    )
     for lag in (0, 1, 2, 4):
         a, b = seen[:, :, : t - lag], seen[:, :, lag:]
         columns.add("reading", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)

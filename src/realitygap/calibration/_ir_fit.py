@@ -12,7 +12,7 @@ from realitygap.world import Fitted, RobotModel
 from ._ir_checks import Independence, independence, predictive_p
 from ._ir_mixture import MixtureReadings
 from ._ir_pulses import PulseReadings
-from ._ir_readings import Array, Placement
+from ._ir_readings import Array, Placement, refuse_response
 from ._ir_scales import BATTERY, Scale
 from ._tempering import sample_posterior
 
@@ -27,8 +27,6 @@ IDENTIFIED = 1 / 3
 
 CURVE = 60
 """Distances of the fitted curve in a figure."""
-
-FITTED_RESPONSES = ("ir", "pulses")
 
 SensorModel = PulseReadings | MixtureReadings
 
@@ -77,11 +75,7 @@ def fit_sensor(
         ValueError: No readings, or a sensor whose response is no infrared one.
     """
     sensor = robot.range[number]
-    if sensor.response not in FITTED_RESPONSES:
-        raise ValueError(
-            f"range.{number} of robot {robot.name!r} has the response {sensor.response!r}, expected ir or pulses: of "
-            "others there is no noise to fit."
-        )
+    refuse_response(robot, number, sensor.response)
     placements = [placement for placement in placements if len(placement.readings)]
     if not placements:
         raise ValueError(f"There are no readings of range.{number}: expected those of a robot that stands.")

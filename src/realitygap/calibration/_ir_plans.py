@@ -17,7 +17,7 @@ from realitygap.records import ObservedTrial
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, Pose, RobotModel
 
-from ._ir_readings import Placement
+from ._ir_readings import Placement, refuse_response
 
 READINGS = 50
 """At each placement."""
@@ -61,6 +61,8 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
     Raises:
         ValueError: The arena or the robot does not allow it.
     """
+    for k, sensor in enumerate(robot.range):
+        refuse_response(robot, k, sensor.response)
     distances = sensor_distances(robot)
     if not arena.walls:
         raise ValueError(f"Arena {arena.name!r} has no wall to stand before.")

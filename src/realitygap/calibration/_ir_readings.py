@@ -8,10 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.world import RobotModel
+
 Array = NDArray[np.float64]
 
 SAME_V = 0.05
 """Voltages that differ by less say nothing of a battery [V]."""
+
+
+def refuse_response(robot: RobotModel, number: int, response: str) -> None:
+    """Return where a range sensor is an infrared one.
+
+    Raises:
+        ValueError: It is another.
+    """
+    if response not in ("ir", "pulses"):
+        raise ValueError(
+            f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir or pulses: of others "
+            "there is no noise to fit."
+        )
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,9 @@ def learn_compression(places: Floats, vectors: Vectors, finest: Vectors) -> Comp
     project = (inverse @ design.T).astype(np.float32)
     spread = np.diag(inverse)[1:, None].astype(np.float32)
     d = vectors.shape[1]
-    made = Compression(*(np.zeros(d, np.float32) for _ in range(2)), *(np.zeros((d, p), np.float32) for _ in range(2)))
+    made = Compression(
+        *(np.zeros(d, np.float32) for _ in range(2)), *(np.zeros((d, p), np.float32) for _ in range(2))
+    )
     for part in _parts(d):
         some = vectors[:, part]
         means = project @ some

@@ -14,6 +14,7 @@ from ._bench import bench
 from ._calibrate import calibrate
 from ._emulate import emulate
 from ._export import export
+from ._gap import gap, plan
 from ._results import digest, report
 from ._robot import robot
 from ._show import show
@@ -66,4 +67,6 @@ app.command("bench")(bench)
 app.add_typer(robot, name="robot")
 app.add_typer(twin, name="twin")
 app.command("trials")(trials)
+app.command("gap")(gap)
+app.command("plan")(plan)
 app.command("transfer")(transfer)

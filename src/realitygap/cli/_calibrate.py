@@ -13,7 +13,6 @@ import typer
 from realitygap.errors import StudyError
 
 if TYPE_CHECKING:
-    from realitygap.trials import Target
     from realitygap.world import Calibration
 
 _OBSERVE = ("cells", "encoders", "track")
@@ -160,14 +159,18 @@ def _measured(
     from realitygap.study import StoppedByPerson, calibrate, open_target
     from realitygap.world import load_arena, load_robot
 
+    from ._calibrate_attendant import TerminalAttendant
+    from ._calibrate_guide import TerminalGuide
+
     kept = out.with_suffix(".trials.jsonl")
     base = base or DEFAULT_ROBOT
     where, model = load_arena(arena), load_robot(base)
-    more = {} if witness is None else {"witness": witness}
+    is_led = _is_led(robot, witness)
     again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."
     try:
-        with open_target(robot, where, key=seed, **more) as target:
-            guide = _guide_for(target, where, model)
+        attendant = TerminalAttendant(where) if is_led else None
+        guide = TerminalGuide(where, model) if is_led else None
+        with open_target(robot, where, key=seed, witness=witness, attendant=attendant) as target:
             return calibrate(
                 what,
                 target,
@@ -187,11 +190,14 @@ def _measured(
         raise typer.Exit(130) from None
 
 
-def _guide_for(target: Target, arena: Any, model: Any) -> Any:
-    """A person at the terminal for a robot that nobody else puts anywhere."""
-    from ._calibrate_guide import TerminalGuide
+def _is_led(robot: str, witness: str | None) -> bool:
+    """Whether a person at the terminal has to put the robot where it is to stand."""
+    name, _, port = robot.partition(":")
+    if name != "scribbler" or witness is not None:
+        return False
+    from realitygap.robots.scribbler import is_in_this_program
 
-    return TerminalGuide(arena, model) if target.label == "REAL" else None
+    return not is_in_this_program(port)
 
 
 def _tell(done: int, n: int) -> None:

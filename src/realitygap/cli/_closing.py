@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ CLOSING = "closing-the-gap"
 """Known without loading what carries it out."""
 
 
-def refuse_options(study: str, options: dict[str, object]) -> None:
+def refuse_options(study: str, options: Mapping[str, object]) -> None:
     """Refuse options that mean nothing for a study.
 
     Raises:
@@ -107,8 +108,8 @@ def _print(summary: dict[str, Any]) -> None:
     from realitygap.report import goal_table
 
     typer.echo(
-        f"{len(summary['twins'])} twins (TWIN), of which {summary['n_counted']} differ from the simulator (SIM) by more "
-        "than three standard errors"
+        f"{len(summary['twins'])} twins (TWIN), of which {summary['n_counted']} differ from the simulator (SIM) by "
+        "more than three standard errors"
     )
     typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'twins':>7}  met")
     for name, wanted, figure, span, n, met in goal_table(summary):

@@ -39,7 +39,14 @@ def emulate(
         int | None,
         typer.Option(metavar="PORT", min=0, max=65535, help="A TCP port of this machine instead; 0 for any."),
     ] = None,
-    speed: Annotated[float, typer.Option(min=0.001, max=1000, help="Its seconds in one of real time.")] = 1.0,
+    speed: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            max=1000,
+            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass.",
+        ),
+    ] = 1.0,
     timing: Annotated[
         str, typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time.")
     ] = "on",

@@ -84,7 +84,7 @@ def transfer(
     arena = choose_condition(study, condition, seed).arena.arena()
     folder = out or Path("results/transfer")
     try:
-        with open_target(to, arena) as target:
+        with open_target(to, arena, processes=processes) as target:
             result = carry_out(
                 study,
                 target,

@@ -187,6 +187,11 @@ class Emulator:
             times.append(self._events[0][0])
         return min((time for time in times if time is not None), default=None)
 
+    @property
+    def is_talking(self) -> bool:
+        """Whether bytes are on their way, to it or from it."""
+        return bool(self._incoming) or self._line.due(1) is not None
+
     # -- bytes --
 
     def receive(self, data: bytes) -> None:

@@ -22,6 +22,8 @@ from ._witness import DirectWitness, answer_witness
 HOST = "127.0.0.1"
 PIECE = 1 << 16
 LONGEST_REQUEST = 1 << 16  # bytes of a line that a witness may send
+SILENT_S = 0.002  # for so long a client says nothing that waits for more of an answer
+ANSWER_S = 5.0  # within which an answer comes, by the emulator's time
 IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
 
 
@@ -316,7 +318,8 @@ class Server:
     Args:
         emulator: The robot.
         channel: Where clients connect.
-        speed: Seconds of the emulator in one of real time.
+        speed: Seconds of the emulator in one of real time; 0: its time passes only while it answers, and when its
+            witness lets it.
         witness: The port on which its witness is served, 0 for any; None for not at all.
         watch: Called about every `watch_s`, with the emulator.
         watch_s: See there [s].
@@ -340,7 +343,8 @@ class Server:
         self.emulator, self._channel, self._speed = emulator, channel, speed
         self.name = channel.name
         self._lock = RLock()
-        self.witness = DirectWitness(emulator, self._lock)
+        self._waits = speed == 0
+        self.witness = DirectWitness(emulator, self._lock, waits=self._waits)
         self._watch, self._watch_s, self._watched = watch, watch_s, 0.0
         try:
             self._door = None if witness is None else WitnessDoor(self.witness, witness)
@@ -355,10 +359,14 @@ class Server:
         self._wake_read, self._wake_write = socket.socketpair()
         self._selector.register(self._wake_read, selectors.EVENT_READ, None)
         self._waiting = b""
+        self._asked = 0  # when a client said something that may still be answered [ns]
+        self._is_asked = False
+        if self._door:
+            self.witness.cells()  # compiled code takes a while to load, and time would run on meanwhile
         self._stopped = False
         self._is_away = False
         self._thread: Thread | None = None
-        self._begun = time.monotonic() - emulator.now / speed
+        self._begun = 0.0 if self._waits else time.monotonic() - emulator.now / speed
 
     def start(self) -> Server:
         """Serve in a thread of its own until `close`."""
@@ -369,8 +377,11 @@ class Server:
     def run(self) -> None:
         """Serve until `stop`."""
         while not self._stopped:
-            for key, _ in self._selector.select(self._pause()):
+            ready = self._selector.select(self._pause())
+            for key, _ in ready:
                 self._take(key.data, key.fileobj)
+            if self._waits:
+                self._answer(is_silent=not ready)
             self._exchange()
 
     def stop(self) -> None:
@@ -403,9 +414,12 @@ class Server:
             due = self.emulator.next_event()
             turning = self.emulator.table.motors.turning
         times = []
-        if due is not None and not self._waiting:
+        if self._waits:
+            if due is not None and self._is_asked and not self._waiting:
+                times.append(SILENT_S)
+        elif due is not None and not self._waiting:
             times.append((due - self.emulator.now_ns) / SECOND / self._speed - self._behind())
-        if turning:
+        if turning and not self._waits:
             times.append(IDLE_S)
         if self._watch:
             times.append(self._watched + self._watch_s - time.monotonic())
@@ -431,8 +445,27 @@ class Server:
                 with self._lock:
                     self._catch_up()
                     self.emulator.receive(data)
+                    self._asked, self._is_asked = self.emulator.now_ns, True
+
+    def _answer(self, *, is_silent: bool) -> None:
+        """Let the time of an emulator that waits pass until it has answered.
+
+        Args:
+            is_silent: Whether the client has waited for a while: it may be that more is to come.
+        """
+        with self._lock:
+            while self._is_asked and (is_silent or self.emulator.is_talking):
+                due = self.emulator.next_event()
+                if due is None or due > self._asked + nanoseconds(ANSWER_S):
+                    self._is_asked = False
+                    break
+                self.emulator.advance_to(due)
+                self._waiting += self.emulator.transmit()
+                is_silent = False
 
     def _catch_up(self) -> None:
+        if self._waits:
+            return
         self.emulator.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
 
     def _exchange(self) -> None:

@@ -62,11 +62,24 @@ class DirectWitness:
     Args:
         emulator: Whom to watch.
         lock: Held while doing so.
+        waits: Whether the emulator's time passes only when somebody lets it.
     """
 
-    def __init__(self, emulator: Emulator, lock: RLock | None = None) -> None:
+    def __init__(self, emulator: Emulator, lock: RLock | None = None, *, waits: bool = False) -> None:
         self._emulator = emulator
         self._lock = lock or RLock()
+        self.waits = waits
+
+    def advance(self, seconds: float) -> None:
+        """Let the time of an emulator that waits pass.
+
+        Raises:
+            ValueError: It passes by itself, or does not run backwards.
+        """
+        if not self.waits:
+            raise ValueError("its time passes by itself; with --speed 0 it waits")
+        with self._lock:
+            self._emulator.advance(seconds)
 
     def now(self) -> float:
         """The emulator's time [s]."""
@@ -133,6 +146,10 @@ def answer_witness(witness: Witness, line: bytes) -> bytes:
 def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
     if what == "place":
         return witness.place(Pose(*map(float, request["pose"])), int(request["seed"]))
+    if what == "waits":
+        return bool(getattr(witness, "waits", False))
+    if what == "advance" and isinstance(witness, DirectWitness):
+        return witness.advance(float(request["seconds"]))
     if what == "cells_at":
         return witness.cells_at([float(time) for time in request["times"]])
     if what == "path":
@@ -155,7 +172,7 @@ class RemoteWitness:
         RobotError: Nobody answers there.
     """
 
-    def __init__(self, address: str, timeout_s: float = 5.0) -> None:
+    def __init__(self, address: str, timeout_s: float = 30.0) -> None:
         self._address = address
         host, _, port = address.rpartition(":")
         try:
@@ -178,6 +195,15 @@ class RemoteWitness:
         if "error" in reply:
             raise RobotError(f"The witness at {self._address} says: {reply['error']}")
         return reply["result"]
+
+    @property
+    def waits(self) -> bool:
+        """Whether the emulator's time passes only when somebody lets it."""
+        return bool(self._ask("waits"))
+
+    def advance(self, seconds: float) -> None:
+        """Let the time of an emulator that waits pass."""
+        self._ask("advance", seconds=seconds)
 
     def now(self) -> float:
         """The emulator's time [s]."""

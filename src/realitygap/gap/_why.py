@@ -101,7 +101,7 @@ def explain_gap(
     for k in range(resamples):
         drawn[k] = squares[which[k]][:, rng.integers(0, c, c)].mean(axis=1)
     drawn = rms_of(drawn)
-    falls, others = -shapley_values(worth)[0], -shapley_values(drawn)
+    falls, others = _falls(worth)[0], _falls(drawn)
     return Why(
         tuple(parts),
         tuple(_estimate(falls[k], others[:, k], c) for k in range(len(parts))),
@@ -109,6 +109,11 @@ def explain_gap(
         _estimate(worth[0, 0], drawn[:, 0], c),
         _estimate(worth[0, -1], drawn[:, -1], c),
     )
+
+
+def _falls(worth: Values) -> Values:
+    """(b, g) by how much each part lets the gap fall; exactly 0 where only rounding is left."""
+    return np.asarray(np.round(-shapley_values(worth), 12) + 0.0)
 
 
 def _estimate(value: float, drawn: Values, n: int) -> Estimate:

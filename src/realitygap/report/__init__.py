@@ -54,6 +54,11 @@ from realitygap.report._effects import (
 )
 from realitygap.report._formats import save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
+from realitygap.report._gap_maps_figure import draw_gap_maps
+from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
+from realitygap.report._gap_page import refuse_gap_page, write_gap_report
+from realitygap.report._gap_replay_figure import draw_gap_replay
+from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
@@ -131,6 +136,11 @@ __all__ = [
     "draw_coverage",
     "draw_distance",
     "draw_divergence",
+    "draw_gap_differences",
+    "draw_gap_maps",
+    "draw_gap_pairs",
+    "draw_gap_replay",
+    "draw_gap_why",
     "draw_individuals",
     "draw_lineage",
     "draw_networks",
@@ -150,6 +160,7 @@ __all__ = [
     "newcombe_interval",
     "permutation_p",
     "quartiles",
+    "refuse_gap_page",
     "retry_champions",
     "runs_for_a_claim",
     "runs_needed",
@@ -171,6 +182,7 @@ __all__ = [
     "watch",
     "why_table",
     "write_closing_page",
+    "write_gap_report",
     "write_movie",
     "write_report",
 ]

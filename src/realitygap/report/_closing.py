@@ -99,7 +99,7 @@ def goal_table(summary: Mapping[str, Any]) -> Table:
 
 def why_table(summary: Mapping[str, Any]) -> Table:
     """Twins that miss a goal, in the columns of `WHY_HEAD`."""
-    rows = []
+    rows: Table = []
     for goal in summary["goals"]:
         if goal["met"] is False:
             for each in goal["why"]:

@@ -132,8 +132,8 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
                 if kind == "none"
                 else [each["means"] for _, each in _after(summary, kind, budget)]
             )
-            xs = np.concatenate([each["SIM"] for each in means])
-            ys = np.concatenate([next(v for k, v in each.items() if k != "SIM") for each in means])
+            xs = np.concatenate([each["source"] for each in means])
+            ys = np.concatenate([each["target"] for each in means])
             axes.set_xlim(0, 1)
             axes.set_ylim(0, 1)
             draw_line(axes, [0, 1], [0, 1], color=Ink.MUTED, linewidth=0.7)
@@ -165,8 +165,8 @@ def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strat
     highest = 1.05 * max(max(each) for each in values.values())
     caption = (
         f"Mean coverage on the twin (TWIN) in fresh trials of what each strategy chose with "
-        f"{summary['plan']['transfer_budget']} trials on it. Small points: twins. Large points and bars: mean over twins "
-        "and its 95 % interval."
+        f"{summary['plan']['transfer_budget']} trials on it. Small points: twins. Large points and bars: mean over "
+        "twins and its 95 % interval."
     )
     alt = "Coverage on the twins by strategy of transfer."
     with house_style():

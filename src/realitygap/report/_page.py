@@ -45,12 +45,13 @@ from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
 
-_LABELS = {
+LABELS = {
     "SIM": "computed by a simulation of robot and arena; no robot was driven",
     "TWIN": "computed by a second, structurally different simulation that stands in for a robot",
     "EMULATED": "driven over the robot’s own protocol, with a simulated robot behind it",
     "REAL": "driven on the physical robot",
 }
+"""What the labels of figures say."""
 
 _PLATFORMS = {
     "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
@@ -63,7 +64,7 @@ _MOST_GAPS = 12
 
 
 @dataclass(frozen=True)
-class _FigureOnPage:
+class FigureOnPage:
     """A figure in two widths, of which the page shows the one that fits; `drawing` is the wide one."""
 
     anchor: str
@@ -196,21 +197,21 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # --- figures ------------------------------------------------------------------------------------------------
 
 
-def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> _FigureOnPage:
+def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> FigureOnPage:
     from markupsafe import Markup
 
     pictures = (Markup(inline(wide.svg)), Markup(inline(narrow.svg)))
-    return _FigureOnPage(anchor, title, wide.caption, *pictures, wide)
+    return FigureOnPage(anchor, title, wide.caption, *pictures, wide)
 
 
-def _coverage_figure(tally: Tally) -> _FigureOnPage:
+def _coverage_figure(tally: Tally) -> FigureOnPage:
     return _on_page("figure-4", "Figure 4", *draw_tally_coverage(tally, widths=(WIDE, NARROW)))
 
 
-def _path_figures(tally: Tally) -> list[_FigureOnPage | str]:
+def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
     """A figure for a condition that selects by coverage and one by novelty, or why there is none."""
     names = _conditions_with_paths(tally)
-    found: list[_FigureOnPage | str] = []
+    found: list[FigureOnPage | str] = []
     for index, condition in enumerate(names):
         number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
         anchor = f"figure-6-{index}"
@@ -237,7 +238,7 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
     return names or [there[0]["name"]]
 
 
-def _choices_figure(tally: Tally) -> _FigureOnPage | None:
+def _choices_figure(tally: Tally) -> FigureOnPage | None:
     if not compare_tally_choices(tally):
         return None
     return _on_page("figure-10", "Figure 10", *draw_tally_choices(tally, widths=(WIDE, NARROW)))
@@ -339,7 +340,7 @@ def _robot_steps(tally: Tally) -> int | None:
 
 def _labels(tally: Tally) -> list[tuple[str, str]]:
     labels = sorted({label_of(condition) for condition in tally.conditions})
-    return [(label, _LABELS.get(label, "as the records say")) for label in labels]
+    return [(label, LABELS.get(label, "as the records say")) for label in labels]
 
 
 def _published_sources(tally: Tally) -> list[str]:

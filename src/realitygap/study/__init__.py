@@ -10,6 +10,8 @@ from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
 from ._gap import GapStudy, run_gap, study_gap
+from ._gap_between import GapBetween, gap_between
+from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy
 from ._realism import measure_realism
@@ -38,6 +40,8 @@ __all__ = [
     "ConditionNotes",
     "Controller",
     "Estimate",
+    "GapBetween",
+    "GapPlan",
     "GapStudy",
     "Guide",
     "KeptTarget",
@@ -62,6 +66,7 @@ __all__ = [
     "connect_robot",
     "drive_study",
     "estimate_mean",
+    "gap_between",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -73,6 +78,9 @@ __all__ = [
     "open_target",
     "parse_study",
     "part_of",
+    "pilot_spreads",
+    "plan_gap",
+    "recorded_spreads",
     "refuse_port_without_robot",
     "run_gap",
     "run_study",

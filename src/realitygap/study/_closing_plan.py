@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from realitygap.errors import RecordError
 from realitygap.records import Observe, write_whole
@@ -48,6 +48,7 @@ class ClosingPlan:
         fresh_trials: By which what a strategy chose is judged.
         runs: Evolutions in simulation of each replicate.
         repeats: Trials of each individual in simulation.
+        effort: How much is simulated for a calibration.
         seed: Of all random numbers.
     """
 
@@ -63,6 +64,7 @@ class ClosingPlan:
     fresh_trials: int = 20
     runs: int = 100
     repeats: int = 8
+    effort: Literal["small", "full"] = "full"
     seed: int = 1
 
     @property
@@ -104,6 +106,7 @@ SMALL = ClosingPlan(
     fresh_trials=4,
     runs=20,
     repeats=4,
+    effort="small",
 )
 """Minutes in place of hours; too little to say anything but that all of it works."""
 

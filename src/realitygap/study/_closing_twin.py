@@ -131,7 +131,7 @@ class ClosingTwin:
         misspecified = None if calibration is None else calibration.misspecified
         gap = measure_gap(source, target, misspecified=misspecified, seed=self.plan.seed)
         found: dict[str, Any] = {"observe": "none", "budget": 0, "gap": gap.to_dict()}
-        found["means"] = {"SIM": source.means.tolist(), target.label: target.means.tolist()}
+        found["means"] = {"source": source.means.tolist(), "target": target.means.tolist()}
         if calibration is not None:
             found["calibration"] = {
                 "trials": calibration.trials,
@@ -155,7 +155,7 @@ class ClosingTwin:
                     observe=observe,
                     budget=budget,
                     seed=self.name.seed,
-                    tell=None,
+                    effort=self.plan.effort,
                 )
             write_whole(path, found.to_toml().encode())
         return load_calibration(path)

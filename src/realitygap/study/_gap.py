@@ -148,13 +148,13 @@ def study_gap(
     if source.arena.grid != target.arena.grid:
         raise StudyError(f"{source.name} and {target.name} have different grids, expected the same arena.")
     seen = _as_much(observe, source)
-    plans = _plans([each.genome for each in controllers], trials, TARGET_FROM)
-    more = _plans([each.genome for each in reevolved], trials, REEVOLVED_FROM)
+    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM)
+    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM)
     on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
-    one = _side(source, in_source, len(controllers))
-    other = _side(target, on_target[: len(plans)], len(controllers))
+    one = side_of(source, in_source, len(controllers))
+    other = side_of(target, on_target[: len(plans)], len(controllers))
     result = measure_gap(one, other, margin=margin, misspecified=misspecified, seed=seed)
     result = replace(
         result,
@@ -179,7 +179,7 @@ def study_gap(
 # --- trials -------------------------------------------------------------------------------------------------
 
 
-def _plans(genomes: Sequence[Genome], trials: int, first: int) -> list[TrialPlan]:
+def plans_of(genomes: Sequence[Genome], trials: int, first: int) -> list[TrialPlan]:
     """Round the controllers, again and again."""
     return [
         TrialPlan(genome=genome, number=first + MOST_TRIALS * i + k)
@@ -233,7 +233,8 @@ def _by_controller(trials: Sequence[ObservedTrial], n: int) -> list[ObservedTria
     return [trials[k] for i in range(n) for k in range(i, len(trials), n)]
 
 
-def _side(platform: Target, trials: Sequence[ObservedTrial], n: int) -> GapSide:
+def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int) -> GapSide:
+    """Trials that went round n controllers, as a side of a gap."""
     n_cells = platform.arena.grid.n_cells
     ordered = _by_controller(trials, n)
     cells = np.zeros((len(ordered), n_cells), np.bool_)
@@ -302,7 +303,7 @@ def _reevolved(
             0,
             "The controllers are no champions of a simulator (--controllers STUDY), so nothing was evolved there.",
         )
-    there = _side(target, on_target, len(reevolved)).means
+    there = side_of(target, on_target, len(reevolved)).means
     return difference_of_groups(here, there)
 
 

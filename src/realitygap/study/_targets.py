@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import functools
+
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.records import ObservationsHead, Observe
-from realitygap.robots import DEFAULT_ROBOT, JyroPlatform, SimPlatform
-from realitygap.trials import SimTarget, Target, TwinTarget
+from realitygap.robots import DEFAULT_ROBOT, JyroPlatform, ScribblerPlatform, SimPlatform
+from realitygap.robots.scribbler import is_in_this_program
+from realitygap.trials import (
+    Attendant,
+    OnLost,
+    RobotTarget,
+    SimTarget,
+    Target,
+    TwinTarget,
+    WitnessAttendant,
+)
 from realitygap.world import Arena
 
+from ._robot import connect_robot
+
+FULL_SCALE = 6400.0
+"""The largest reading of a Fluke's obstacle sensors: readings of robots and simulators are shares of it."""
 TARGETS = ("jyro", "sim", "sim:FILE", "twin:FILE", "scribbler:PORT")
 
 
@@ -16,15 +31,24 @@ def open_target(
     arena: Arena,
     *,
     processes: int | None = None,
+    witness: str | None = None,
+    attendant: Attendant | None = None,
+    step_s: float = 0.5,
+    on_lost: OnLost = "retry",
     noise: float = 0.0,
     key: int = 0,
 ) -> Target:
     """Open what can carry out trials.
 
     Args:
-        spec: Its name: `jyro`, `sim`, `sim:FILE`, where the file is of a robot or a calibration, or `twin:FILE`.
+        spec: Its name: `jyro`, `sim`, `sim:FILE`, where the file is of a robot or a calibration, `twin:FILE`,
+            or `scribbler:PORT`.
         arena: Where.
         processes: Of a twin: how many; one a processor that may be used when not given.
+        witness: Of an emulated robot in another program: the address of its witness, HOST:PORT.
+        attendant: Of a robot: who places it and says what it drew, where no witness does.
+        step_s: Of a robot: how long one command lasts [s].
+        on_lost: Of a robot: what follows a trial in which the link was lost.
         noise: Of a simulator: the paper's a, on top of the robot's own noise.
         key: Of a simulator: of its random numbers.
 
@@ -32,7 +56,7 @@ def open_target(
         StudyError: There is no such platform, or it cannot be made of this.
         DescriptionError: The twin's file cannot be used.
         MissingExtraError: MuJoCo is not installed.
-        RobotError: The twin's process does not come up.
+        RobotError: The robot, its witness or the twin's process cannot be reached.
     """
     name, colon, rest = spec.partition(":")
     if name == "jyro" and not colon:
@@ -41,12 +65,30 @@ def open_target(
         return SimTarget(_sim(rest), arena, noise, key=key, name=spec)
     if name == "twin" and rest:
         return TwinTarget(rest, arena, processes, name=spec)
+    if name == "scribbler" and rest:
+        platform = ScribblerPlatform(reading_max=FULL_SCALE)
+        chosen = attendant or _witness(rest, witness)
+        opened = functools.partial(connect_robot(rest), platform)
+        return RobotTarget(opened, arena, chosen, name=spec, step_s=step_s, on_lost=on_lost)
     raise StudyError(f"{spec!r} is no platform for trials. {did_you_mean(spec, TARGETS)}")
 
 
 def observations_head(target: Target, observe: Observe, robot: str = DEFAULT_ROBOT) -> ObservationsHead:
     """What a file of trials of a target begins with."""
     return ObservationsHead(target.name, target.label, robot, target.arena.to_dict(), target.step_s, observe)
+
+
+def _witness(port: str, address: str | None) -> Attendant:
+    if is_in_this_program(port):
+        return WitnessAttendant()
+    if address is not None:
+        from realitygap.emulator import connect_witness
+
+        return WitnessAttendant(connect_witness(address))
+    raise StudyError(
+        f"Who places the robot at {port} and says what it drew? Name the witness of an emulator (HOST:PORT, from "
+        "realitygap emulate --witness PORT), or give an attendant."
+    )
 
 
 def _sim(file: str) -> SimPlatform:

@@ -1,5 +1,6 @@
 """One controller on one robot, or a population on a platform."""
 
+from ._attendant import Attendant, RobotsOwnSenses, WitnessAttendant
 from ._batch import (
     NoiseKey,
     PlatformTrials,
@@ -26,25 +27,31 @@ from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
 from ._target import Target, TrialPlan
+from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
 
 __all__ = [
     "PATH_PARTS",
+    "Attendant",
     "Card",
     "DrivenTrial",
     "EndReason",
     "JyroRobot",
     "JyroTrials",
     "NoiseKey",
+    "OnLost",
     "Onlooker",
     "Operator",
+    "PacedRobot",
     "PlatformTrials",
     "Play",
     "Preflight",
     "Rehearsal",
     "RobotOnlooker",
+    "RobotTarget",
+    "RobotsOwnSenses",
     "SceneTrack",
     "SimEnsemble",
     "SimRobot",
@@ -62,6 +69,7 @@ __all__ = [
     "TrialStopped",
     "TwinTarget",
     "Verdict",
+    "WitnessAttendant",
     "WitnessOperator",
     "carry_out_on_robot",
     "cell_at",

@@ -153,12 +153,7 @@ class WitnessOperator:
         Raises:
             RobotError: It drives in another arena than the study's.
         """
-        there, wanted = self.witness.arena(), card.arena
-        if there.grid != wanted.grid or set(there.walls) != set(wanted.walls):
-            raise RobotError(
-                f"The emulated robot drives in the arena {there.name!r}, and the study is about {wanted.name!r}: other "
-                "walls or cells. Start the emulator with the study's arena (--arena, or arena= in its port)."
-            )
+        refuse_other_arena(self.witness.arena(), card.arena)
         self.witness.place(card.arena.start, trial_seed(card))
         self._times = []
 
@@ -189,6 +184,19 @@ class WitnessOperator:
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
         """Close it."""
         return ()
+
+
+def refuse_other_arena(there: Arena, wanted: Arena) -> None:
+    """Refuse an emulated robot that drives elsewhere than it should.
+
+    Raises:
+        RobotError: Walls or cells differ.
+    """
+    if there.grid != wanted.grid or set(there.walls) != set(wanted.walls):
+        raise RobotError(
+            f"The emulated robot drives in the arena {there.name!r}, and the study is about {wanted.name!r}: other "
+            "walls or cells. Start the emulator with the study's arena (--arena, or arena= in its port)."
+        )
 
 
 def trial_seed(card: Card) -> int:

@@ -1,0 +1,61 @@
+"""Somebody beside a robot that is calibrated: what it senses of itself, and cells that are counted by eye."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from realitygap.trials import RobotsOwnSenses
+
+from ._operator import pick_cells
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from realitygap.records import Observe
+    from realitygap.robots import Clock, Robot
+    from realitygap.trials import TrialPlan
+    from realitygap.world import Arena, Pose
+
+_NO_LINE = ("path", "sensors")
+"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
+
+
+class TerminalAttendant(RobotsOwnSenses):
+    """Counts the cells of trials that are drawn; that the robot stands at its start is asked before."""
+
+    observes: Observe = "cells"
+
+    def __init__(self, arena: Arena) -> None:
+        super().__init__()
+        self._arena = arena
+        self._plan: TrialPlan | None = None
+
+    def meet(self, robot: Robot, arena: Arena) -> Clock:
+        """A robot was opened; an S2 tells what its encoders count."""
+        self._met(robot)
+        self.observes = "encoders" if self.has_encoders else "cells"
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
+        return clock
+
+    def place(self, plan: TrialPlan, start: Pose) -> None:
+        """It stands there."""
+        self.begin()
+        self._plan = plan
+
+    def look(self) -> None:
+        """Nobody sees where it is."""
+
+    def poses(self) -> NDArray[np.float64]:
+        """None."""
+        return np.empty((0, 3))
+
+    def cells(self) -> tuple[int, ...]:
+        """Those that its line crosses, as they are picked in the terminal."""
+        if self._plan is None or self._plan.purpose in _NO_LINE:
+            return ()
+        while True:
+            cells = pick_cells(self._arena)
+            if cells is not None:
+                return tuple(cells)

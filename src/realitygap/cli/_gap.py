@@ -1,0 +1,349 @@
+"""`realitygap gap` and `realitygap plan`: how far two platforms are apart, and how many trials it takes to tell."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import StudyError
+
+if TYPE_CHECKING:
+    from realitygap.gap import Estimate, GapResult, Why
+    from realitygap.study import GapPlan
+
+
+class Seen(StrEnum):
+    """How much is seen of the target."""
+
+    cells = "cells"
+    encoders = "encoders"
+    track = "track"
+
+
+def gap(
+    sim: Annotated[str, typer.Argument(metavar="SIM", help="The simulator: sim, sim:FILE or jyro.")],
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="twin:FILE, scribbler:PORT, sim, sim:FILE or jyro.")
+    ],
+    controllers: Annotated[
+        str,
+        typer.Option(
+            metavar="WHICH",
+            help="random: unrelated networks; a study by name or file, or a folder of results: its champions.",
+        ),
+    ] = "random",
+    n_controllers: Annotated[int, typer.Option(min=2, max=1024, help="How many.")] = 30,
+    trials: Annotated[int, typer.Option(min=1, max=4096, help="Of each controller on each platform.")] = 10,
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="Test equivalence in level at this margin, in coverage, such as 0.05."
+        ),
+    ] = None,
+    observe: Annotated[
+        Seen, typer.Option(help="What is seen of the target; track: replays, too.")
+    ] = Seen.cells,
+    arena: Annotated[str, typer.Option(metavar="NAME", help="An arena by name, or a file.")] = "paper",
+    noise: Annotated[
+        float | None,
+        typer.Option(min=0, max=10, help="The paper's a on simulators. [default: 0.1 on jyro, else none]"),
+    ] = None,
+    reevolved: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHICH",
+            help="Champions evolved on the target: adds the re-evolved gap (apart, the paper's).",
+        ),
+    ] = None,
+    why: Annotated[
+        bool,
+        typer.Option("--why", help="What each part of the model carries; SIM is a calibration sim:FILE."),
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write figures and tables as one page (.html).")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--out", metavar="FILE", help="Keep the target's trials here (.jsonl), and go on with them."
+        ),
+    ] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Of a twin: trials at once. [default: all processors]")
+    ] = None,
+    witness: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulated robot in another program.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of all random numbers.")] = 1,
+) -> None:
+    """Measure the gap: the same controllers on a simulator and on a target, again and again.
+
+    Printed with intervals of 95 %: level, root mean square over controllers without the noise of trials, order,
+    behavior, and equivalence at a margin. What so few trials cannot carry is refused, with how many would do.
+
+    Example: realitygap gap sim jyro --n-controllers 10 --trials 5
+
+    Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
+
+    In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
+    """
+    from realitygap.study import gap_between
+
+    if margin is not None and not 0 < margin < float("inf"):
+        raise StudyError(f"--margin is {margin}, expected a coverage above 0, such as 0.05.")
+    if report is not None:
+        from realitygap.report import refuse_gap_page
+
+        refuse_gap_page(report)
+    try:
+        with _TrialsBar(quiet=as_json) as bar:
+            found = gap_between(
+                sim,
+                target,
+                controllers=controllers,
+                n_controllers=n_controllers,
+                trials=trials,
+                margin=margin,
+                observe=observe.value,
+                arena=arena,
+                noise=noise,
+                reevolved=reevolved,
+                why=why,
+                processes=processes,
+                witness=witness,
+                seed=seed,
+                results=out,
+                tell=bar.show,
+                say=bar.say,
+            )
+    except KeyboardInterrupt:
+        kept = (
+            f"What was tried is in {out}; the same command goes on there."
+            if out
+            else "Nothing was kept (-o FILE)."
+        )
+        typer.echo(f"Interrupted. {kept}", err=True)
+        raise typer.Exit(130) from None
+    result = found.study.result
+    if report is not None:
+        from realitygap.report import write_gap_report
+
+        write_gap_report(found, report)
+        typer.echo(f"Written: {report}", err=True)
+    if as_json:
+        values: dict[str, Any] = result.to_dict()
+        typer.echo(
+            json.dumps(values if found.why is None else values | {"why": found.why.to_dict()}, indent=2)
+        )
+        return
+    _print(result)
+    if found.why is not None:
+        _print_why(found.why)
+
+
+_ROWS = (
+    ("rms", "RMS gap, noise taken out"),
+    ("level", "level: target less simulator"),
+    ("a12", "A12: target above simulator"),
+    ("srcc", "correlation over controllers"),
+    ("noise_ceiling", "  noise allows at most"),
+    ("srcc_disattenuated", "  without noise"),
+    ("mmrv", "rank violation (MMRV)"),
+    ("mmrv_floor", "  of the target by itself"),
+    ("energy", "energy distance of cells"),
+    ("energy_ends", "energy distance of ends [m]"),
+    ("equivalence", "equivalence (interval of 90 %)"),
+)
+
+
+def _print(result: GapResult) -> None:
+    one, other = result.trials
+    typer.echo(
+        f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
+        f"{result.level.n} controllers, {one} and {other} trials each, coverage"
+    )
+    for name, title in _ROWS:
+        _print_row(title, getattr(result, name))
+    typer.echo("Kept apart from it:")
+    _print_row("re-evolved gap", result.reevolved)
+    _print_row("luck of selection", result.luck)
+    if result.misspecified is not None:
+        says = "cannot" if result.misspecified else "can"
+        typer.echo(f"The simulator {says} make what was observed when it was calibrated.")
+    for note in result.notes:
+        typer.echo(note)
+    typer.echo(result.verdict)
+
+
+def _print_row(title: str, found: Estimate) -> None:
+    number = "-" if found.estimate is None else f"{found.estimate:.3f}"
+    ends = "" if found.low is None else f"[{found.low:.3f}, {found.high:.3f}]"
+    p = found.more.get("p")
+    more = "" if p is None else f"p = {p:.3f}" if p >= 0.001 else "p < 0.001"
+    typer.echo(f"  {title:32}{number:>8}  {ends:17} {more}".rstrip())
+    if found.refused:
+        typer.echo(f"    {found.refused}")
+
+
+def _print_why(why: Why) -> None:
+    typer.echo(f"Why: RMS gap {why.before} with the robot's defaults, {why.after} with the fit. Of the fall,")
+    for k in why.order:
+        fall, n = why.falls[k], why.numbers[k]
+        ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
+        typer.echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} numbers")
+    typer.echo(why.advice)
+
+
+class _TrialsBar:
+    """Trials done on each platform, on standard error where that is a terminal."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._console = Console(stderr=True, quiet=quiet)
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("trials"),
+            TimeRemainingColumn(),
+            console=self._console,
+            transient=True,
+        )
+        self._tasks: dict[tuple[str, int], Any] = {}
+
+    def __enter__(self) -> _TrialsBar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._progress.live.is_started:  # else it would print an empty line
+            self._progress.stop()
+
+    def show(self, name: str, done: int, total: int) -> None:
+        """So many trials are done."""
+        if not self._console.is_terminal:
+            return
+        if not self._progress.live.is_started:
+            self._progress.start()
+        key = (name, total)
+        if key not in self._tasks or self._progress.tasks[self._tasks[key]].completed > done:
+            self._tasks[key] = self._progress.add_task(name, total=total)
+        self._progress.update(self._tasks[key], completed=done)
+
+    def say(self, text: str) -> None:
+        """What is done otherwise, on a terminal."""
+        if self._console.is_terminal:
+            self._console.print(text, highlight=False, markup=False)
+
+
+def plan(
+    effect: Annotated[
+        float | None, typer.Option(metavar="D", help="Find a mean difference in coverage of so much.")
+    ] = None,
+    margin: Annotated[
+        float | None, typer.Option(metavar="M", help="Show equivalence within a margin, in coverage.")
+    ] = None,
+    correlation: Annotated[
+        float | None, typer.Option(metavar="R", help="Show that a correlation of so much is above --least.")
+    ] = None,
+    least: Annotated[float, typer.Option(help="Of --correlation.")] = 0.5,
+    spread: Annotated[
+        float | None,
+        typer.Option(
+            min=0, help="Standard deviation of true differences over controllers. [default: half of theirs]"
+        ),
+    ] = None,
+    power: Annotated[float, typer.Option(min=0.05, max=0.999, help="How often it shall be found.")] = 0.8,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="FILE", help="Trials that were observed (.jsonl). [default: a pilot on sim]"
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of pilot and simulated studies.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
+) -> None:
+    """Say how many controllers and trials a question about the gap takes, before any is driven.
+
+    Numbers come from normal formulas, and simulated studies of that size say how often it is found in truth.
+
+    Example: realitygap plan --effect 0.05
+
+    Example: realitygap plan --margin 0.05 --spread 0.03
+
+    In Python: realitygap.study.plan_gap("effect", 0.05)
+    """
+    from realitygap.study import plan_gap, recorded_spreads
+
+    asked = {"effect": effect, "margin": margin, "correlation": correlation}
+    given = {name: value for name, value in asked.items() if value is not None}
+    if len(given) != 1:
+        raise StudyError(
+            f"Came {', '.join('--' + name for name in given) or 'no question'}, expected one of --effect, --margin and "
+            "--correlation. For example: realitygap plan --effect 0.05"
+        )
+    ((question, value),) = given.items()
+    found = plan_gap(
+        question,  # type: ignore[arg-type]
+        value,
+        spreads=None if data is None else recorded_spreads(str(data)),
+        spread=spread,
+        least=least,
+        power=power,
+        seed=seed,
+    )
+    if as_json:
+        typer.echo(json.dumps(_plan_json(found), indent=2))
+    else:
+        _print_plan(found, least, power)
+
+
+def _plan_json(found: GapPlan) -> dict[str, Any]:
+    return {
+        "question": found.question,
+        "value": found.value,
+        "spread": found.spread,
+        "noise": found.spreads.noise,
+        "controllers_spread": found.spreads.controllers,
+        "from": found.spreads.origin,
+        "rows": [{**vars(row), "trials_on_target": row.on_target} for row in found.needed],
+    }
+
+
+def _print_plan(found: GapPlan, least: float, power: float) -> None:
+    question = {
+        "effect": f"to find a mean difference of {found.value:g}",
+        "margin": f"to show equivalence within ±{found.value:g} where there is no difference",
+        "correlation": f"to show that a correlation of {found.value:g} is above {least:g}",
+    }[found.question]
+    typer.echo(f"Controllers {question} in {100 * power:g} of 100 studies, in coverage")
+    typer.echo(
+        f"Trials of one controller vary by {found.spreads.noise:.3f}, controllers by "
+        f"{found.spreads.controllers:.3f} (standard deviations of {found.spreads.origin})"
+    )
+    if found.question != "correlation":
+        typer.echo(f"Assumed: true differences of controllers vary by {found.spread:.3f} (--spread)")
+    typer.echo(
+        f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'found in simulated studies':>30}"
+    )
+    for row in found.needed:
+        if row.controllers is None or row.power is None:
+            typer.echo(f"{row.trials:>12}{'over 100,000':>13}")
+            continue
+        share = f"{row.power:.2f} [{row.low:.2f}, {row.high:.2f}]"
+        typer.echo(f"{row.trials:>12}{row.controllers:>13,}{row.on_target:>15,}{share:>30}")
+    if found.best is not None:
+        typer.echo(
+            f"Fewest trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} controllers with "
+            f"{found.best.trials} each."
+        )
+    if found.question == "effect":
+        typer.echo(
+            "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."
+        )

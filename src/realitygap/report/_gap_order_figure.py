@@ -1,0 +1,156 @@
+"""Figures of a gap controller by controller: quality on both sides, and differences in order."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import special
+
+from realitygap.drawing import Ink
+from realitygap.gap import GapSide
+from realitygap.report._drawing import (
+    WIDE,
+    Drawing,
+    draw_line,
+    house_style,
+    new_figure,
+    place_axes,
+    shorten,
+    to_svg,
+)
+from realitygap.study import GapStudy
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST_ACROSS = 4.4
+"""Of the square of a scatter [in]."""
+
+
+def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
+    """Mean quality of each controller on both sides, with intervals, beside the line of no gap."""
+    source, target = gap.source, gap.target
+    size = min(width - 0.75, _MOST_ACROSS)
+    order = _order_in_words(gap)
+    caption = (
+        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
+        f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. On "
+        f"the line there is no gap. {order}"
+    )
+    alt = f"Scatter of {source.n} controllers: coverage on {source.name} against coverage on {target.name}. {order}"
+    with house_style():
+        figure = new_figure(width, size + 0.6)
+        axes = place_axes(figure, 0.55, 0.1, size, size)
+        top = _top(source, target)
+        axes.set_xlim(0, top)
+        axes.set_ylim(0, top)
+        draw_line(axes, [0, top], [0, top], color=Ink.RULE, linewidth=1.0, zorder=1)
+        kinds: list[str] = [each.kind for each in gap.controllers]
+        across, up = _reaches(source), _reaches(target)
+        for kind, color, marker in (("random", Ink.PUBLISHED, "s"), ("champion", Ink.OURS, "o")):
+            rows = [k for k, each in enumerate(kinds) if each == kind]
+            if rows:
+                _draw_pairs(
+                    axes, source.means[rows], target.means[rows], across[rows], up[rows], color, marker
+                )
+        axes.set_xlabel(f"coverage on {shorten(source.name, 24)} ({source.label})", labelpad=3)
+        axes.set_ylabel(f"coverage on {shorten(target.name, 24)} ({target.label})", labelpad=3)
+        _legend(axes, kinds)
+        return Drawing(to_svg(figure, "gap-pairs", alt), caption, alt, figure)
+
+
+def _draw_pairs(axes: Axes, x: Any, y: Any, across: Any, up: Any, color: str, marker: str) -> None:
+    for k in range(len(x)):
+        draw_line(
+            axes, [x[k] - across[k], x[k] + across[k]], [y[k], y[k]], color=color, linewidth=0.7, alpha=0.6
+        )
+        draw_line(axes, [x[k], x[k]], [y[k] - up[k], y[k] + up[k]], color=color, linewidth=0.7, alpha=0.6)
+    draw_line(
+        axes, x, y, color=color, marker=marker, linestyle="", markersize=4.2, markeredgewidth=0, zorder=5
+    )
+
+
+def _legend(axes: Axes, kinds: list[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    shown = (("random", Ink.PUBLISHED, "s", "unrelated"), ("champion", Ink.OURS, "o", "champions"))
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=color,
+            marker=marker,
+            linestyle="",
+            markersize=4.2,
+            label=f"{name}, n = {kinds.count(kind)}",
+        )
+        for kind, color, marker, name in shown
+        if kind in kinds
+    ]
+    axes.legend(handles=handles, loc="upper left", frameon=False, fontsize=7.5, handlelength=1.0)
+
+
+def _order_in_words(gap: GapStudy) -> str:
+    raw, ceiling, without = gap.result.srcc, gap.result.noise_ceiling, gap.result.srcc_disattenuated
+    if raw.estimate is None:
+        return raw.refused
+    words = f"Spearman’s correlation {raw}"
+    if ceiling.estimate is not None:
+        words += f"; noise allows at most {ceiling}"
+    if without.estimate is not None:
+        words += f"; without noise {without}"
+    return words + "."
+
+
+def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
+    """The difference of means of each controller in order, with intervals, the level, and the margin."""
+    source, target, level = gap.source, gap.target, gap.result.level
+    differences = target.means - source.means
+    reach = np.hypot(_reaches(source), _reaches(target))
+    order = np.argsort(differences)
+    margin = gap.result.equivalence.more.get("margin")
+    band = f" The gray band is the margin of equivalence, ±{margin:g}." if margin else ""
+    caption = (
+        f"Coverage on {target.name} ({target.label}) less coverage on {source.name} ({source.label}) of each of "
+        f"{source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals of 95 % for "
+        f"each by itself. Blue: the level, {level}.{band}"
+    )
+    span = f"{differences.min():.2f} to {differences.max():.2f}"
+    alt = f"Differences of {source.n} controllers from {span}; mean {level}."
+    with house_style():
+        figure = new_figure(width, 2.6)
+        axes = place_axes(figure, 0.6, 0.12, width - 0.68, 2.1)
+        n = source.n
+        most = 1.08 * float(np.abs(differences).max() + reach.max())
+        axes.set_xlim(-0.7, n - 0.3)
+        axes.set_ylim(-max(most, 0.02), max(most, 0.02))
+        if margin:
+            axes.axhspan(-margin, margin, color=Ink.RULE, alpha=0.6, linewidth=0)
+        axes.axhline(0, color=Ink.MUTED, linewidth=0.7)
+        if level.low is not None and level.high is not None:
+            axes.axhspan(level.low, level.high, color=Ink.BAND, alpha=0.5, linewidth=0)
+        axes.axhline(level.estimate or 0.0, color=Ink.OURS, linewidth=1.2)
+        for place, k in enumerate(order):
+            ends = [differences[k] - reach[k], differences[k] + reach[k]]
+            draw_line(axes, [place, place], ends, color=Ink.RUN, linewidth=0.8)
+        draw_line(
+            axes, np.arange(n), differences[order], color=Ink.TEXT, marker="o", linestyle="", markersize=3.4
+        )
+        axes.set_xticks([])
+        axes.set_xlabel("controllers in order", labelpad=3)
+        axes.set_ylabel("difference in coverage", labelpad=3)
+        return Drawing(to_svg(figure, "gap-differences", alt), caption, alt, figure)
+
+
+def _reaches(side: GapSide) -> Any:
+    """(c,) half the interval of each mean; 0 where there is one trial."""
+    if side.trials < 2:
+        return np.zeros(side.n)
+    return float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)
+
+
+def _top(source: GapSide, target: GapSide) -> float:
+    most = max(float((side.means + _reaches(side)).max()) for side in (source, target))
+    return min(1.0, math.ceil(most * 10 + 0.2) / 10)

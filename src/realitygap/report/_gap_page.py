@@ -1,0 +1,170 @@
+"""One page that holds a gap: the verdict, its measures, figures, and what is kept apart from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from realitygap._version import __version__
+from realitygap.errors import RecordError
+from realitygap.gap import Estimate, GapResult
+from realitygap.records import is_special, refuse_results, write_whole
+from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
+from realitygap.report._gap_maps_figure import draw_gap_maps
+from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
+from realitygap.report._gap_replay_figure import draw_gap_replay
+from realitygap.report._gap_why_figure import draw_gap_why
+from realitygap.report._page import LABELS, FigureOnPage
+from realitygap.study import GapBetween
+
+_MEASURES = (
+    ("rms", "RMS gap", "root mean square over controllers of the difference in coverage, noise taken out"),
+    ("level", "Level", "mean difference in coverage, target less simulator"),
+    ("a12", "A₁₂", "how likely a trial on the target is above one of the same controller in simulation"),
+    ("srcc", "Correlation", "Spearman’s, of mean coverages over controllers"),
+    ("noise_ceiling", "Noise ceiling", "the correlation that noise leaves of a perfect one, by split halves"),
+    ("srcc_disattenuated", "Without noise", "the correlation over its ceiling, at most 1"),
+    ("mmrv", "MMRV", "mean maximum rank violation, in the target’s coverage"),
+    ("mmrv_floor", "MMRV floor", "that of one half of the target’s trials by the other half"),
+    ("energy", "Energy distance, cells", "of visited cells, mean over controllers [√cells]"),
+    ("energy_ends", "Energy distance, ends", "of the places where trials end, mean over controllers [m]"),
+    ("equivalence", "Equivalence", "the level with the 90 % interval of two one-sided tests"),
+)
+_APART = (
+    (
+        "reevolved",
+        "Re-evolved gap",
+        "champions evolved and tried on the target less those of the simulator, there",
+    ),
+    ("luck", "Luck of selection", "what champions lose on fresh seeds where they were selected"),
+)
+
+
+def refuse_gap_page(path: str | Path) -> None:
+    """Refuse a place for the page before trials are carried out.
+
+    Raises:
+        RecordError: It ends in something else than .html, or is a file of results.
+    """
+    path = Path(path)
+    refuse_results(path)
+    if path.suffix.lower() not in (".html", ".htm") and not is_special(path):
+        raise RecordError(f"{path} does not end in .html: the report of a gap is a page.")
+
+
+def write_gap_report(gap: GapBetween, path: str | Path) -> Path:
+    """Write a gap as one HTML file that needs no other file and no network.
+
+    Args:
+        gap: From `realitygap.study.gap_between`.
+        path: Ends in .html; a file that is there gives way.
+
+    Returns:
+        The path.
+
+    Raises:
+        RecordError: The file cannot be written, or would take the place of a file of results.
+    """
+    refuse_gap_page(path)
+    write_whole(Path(path), _render(gap).encode("utf-8", "replace"))
+    return Path(path)
+
+
+def _render(gap: GapBetween) -> str:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("realitygap.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("gap.html.jinja").render(_content(gap))
+
+
+def _content(gap: GapBetween) -> dict[str, Any]:
+    study, why = gap.study, gap.why
+    result = study.result
+    labels = list(dict.fromkeys(result.labels))
+    return {
+        "css": resources.files("realitygap.report")
+        .joinpath("templates/report.css")
+        .read_text(encoding="utf-8"),
+        "version": __version__,
+        "title": f"The gap from {result.source} to {result.target}",
+        "labels": [(label, LABELS[label]) for label in labels],
+        "verdict": result.verdict,
+        "facts": _facts(gap),
+        "measures": [_row(result, *each) for each in _MEASURES],
+        "apart": [_row(result, *each) for each in _APART],
+        "advice": None if why is None else why.advice,
+        "figures": [
+            figure
+            for figure in (
+                _figure("pairs", "Figure 1", lambda width: draw_gap_pairs(study, width=width)),
+                _figure("differences", "Figure 2", lambda width: draw_gap_differences(study, width=width)),
+                _figure("maps", "Figure 3", lambda width: draw_gap_maps(study, width=width)),
+                _figure("replay", "Figure 4", lambda width: draw_gap_replay(study, width=width)),
+            )
+            if figure is not None
+        ],
+        "why": None
+        if why is None
+        else _figure("why", "Figure 5", lambda width: draw_gap_why(why, study, width=width)),
+        "controllers": [
+            (each.name, *(f"{side.means[k]:.3f}" for side in (study.source, study.target)))
+            for k, each in enumerate(study.controllers)
+        ],
+        "names": [f"{side.label} {side.name}" for side in (study.source, study.target)],
+    }
+
+
+def _figure(anchor: str, title: str, draw: Callable[[float], Drawing | None]) -> FigureOnPage | None:
+    from markupsafe import Markup
+
+    wide, narrow = draw(WIDE), draw(NARROW)
+    if wide is None or narrow is None:
+        return None
+    # ids inside one page differ
+    small = narrow.svg.replace(f"gap-{anchor}-", f"gap-{anchor}-narrow-")
+    return FigureOnPage(anchor, title, wide.caption, Markup(inline(wide.svg)), Markup(inline(small)), wide)
+
+
+def _facts(gap: GapBetween) -> list[tuple[str, str]]:
+    study = gap.study
+    result = study.result
+    kinds = [each.kind for each in study.controllers]
+    facts = [
+        ("Simulator", f"{result.source} ({result.labels[0]}), {result.trials[0]} trials of each controller"),
+        ("Target", f"{result.target} ({result.labels[1]}), {result.trials[1]} trials of each controller"),
+        (
+            "Controllers",
+            f"{len(kinds)}: {kinds.count('random')} unrelated networks and {kinds.count('champion')} champions",
+        ),
+        ("Arena", study.arena.name),
+        (
+            "Observed",
+            {"cells": "crossed cells", "encoders": "cells and encoders"}.get(study.observe, "all poses"),
+        ),
+    ]
+    if result.misspecified is not None:
+        says = "cannot" if result.misspecified else "can"
+        facts.append(("Model", f"The simulator {says} make what was observed when it was calibrated."))
+    return facts + [("Note", note) for note in result.notes]
+
+
+def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, Any]:
+    found: Estimate = getattr(result, name)
+    p = found.more.get("p")
+    return {
+        "title": title,
+        "meaning": meaning,
+        "estimate": "–" if found.estimate is None else f"{found.estimate:.3f}",
+        "interval": "–" if found.low is None else f"{found.low:.3f} to {found.high:.3f}",
+        "n": found.n,
+        "p": "" if p is None else f"{p:.3f}",
+        "refused": found.refused,
+    }

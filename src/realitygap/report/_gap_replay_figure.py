@@ -1,0 +1,61 @@
+"""How far replayed commands come away from what the target did, step by step."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from realitygap.drawing import Ink
+from realitygap.report._drawing import WIDE, Drawing, house_style, new_figure, place_axes, to_svg
+from realitygap.study import GapStudy
+
+
+def draw_gap_replay(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
+    """Distance and difference in heading over steps beside what noise does; None where nobody saw the robot."""
+    replay = gap.replay
+    if replay is None:
+        return None
+    last = replay.distance.shape[1] - 1
+    ends = float(replay.distance[:, last].mean()), float(replay.noise_distance[:, last].mean())
+    caption = (
+        f"Open-loop replay: the commands of {replay.n} trials on {gap.target.name} ({gap.target.label}) given to the "
+        f"robot of {gap.source.name} ({gap.source.label}) from the same start, four times each. Line: how far the two "
+        f"robots are apart after each step, mean, with the 10th to 90th percentile of trials; thin: between two replays, "
+        f"which noise alone drives apart. After {last} steps {ends[0]:.2f} m and {ends[1]:.2f} m."
+    )
+    alt = (
+        f"Curves of the distance between target and replay, which reaches {ends[0]:.2f} m after {last} steps."
+    )
+    panels = (
+        ("apart [m]", replay.distance, replay.noise_distance, None),
+        ("headings apart [rad]", replay.heading, replay.noise_heading, math.pi),
+    )
+    columns = 2 if width > 6 else 1
+    with house_style():
+        high, across = 1.6, (width - 0.1) / columns - 0.62
+        figure = new_figure(width, (2 // columns) * (high + 0.55))
+        for k, (title, between, noise, most) in enumerate(panels):
+            row, column = divmod(k, columns)
+            axes = place_axes(
+                figure, 0.55 + column * (across + 0.62), 0.1 + row * (high + 0.55), across, high
+            )
+            steps = np.arange(between.shape[1])
+            low, top = np.percentile(between, [10, 90], axis=0)
+            axes.fill_between(steps, low, top, color=Ink.BAND, alpha=0.55, linewidth=0)
+            axes.plot(steps, between.mean(axis=0), color=Ink.OURS, linewidth=1.8, label="target and replay")
+            axes.plot(
+                steps,
+                noise.mean(axis=0),
+                color=Ink.RUN,
+                linewidth=1.0,
+                linestyle=(0, (5, 1.5)),
+                label="noise alone",
+            )
+            axes.set_xlim(0, steps[-1])
+            axes.set_ylim(0, most or max(1.08 * float(top.max()), 0.02))
+            axes.set_xlabel("step", labelpad=2)
+            axes.set_ylabel(title, labelpad=3)
+            if k == 0:
+                axes.legend(loc="upper left", frameon=False, fontsize=7.5)
+        return Drawing(to_svg(figure, "gap-replay", alt), caption, alt, figure)

@@ -1,0 +1,142 @@
+"""The gap between two platforms by name: opened, tried, measured and explained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from realitygap.errors import StudyError
+from realitygap.gap import Why
+from realitygap.records import OBSERVATIONS, Observe
+from realitygap.trials import Target
+from realitygap.world import Arena, Calibration, load_arena
+
+from ._controllers import sample_controllers
+from ._gap import GapStudy, Tell, study_gap
+from ._targets import open_target
+from ._why import calibration_of, why_gap
+
+PAPERS_NOISE = 0.1
+"""The paper's a on `jyro`, whose sensors are without noise otherwise."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class GapBetween:
+    """A gap between two platforms, and why it is there.
+
+    Attributes:
+        study: Measures, and what figures are drawn from.
+        why: What each part of the model carries; None where nobody asked.
+    """
+
+    study: GapStudy
+    why: Why | None
+
+
+def gap_between(
+    sim: str,
+    target: str,
+    *,
+    controllers: str | Path = "random",
+    n_controllers: int = 30,
+    trials: int = 10,
+    margin: float | None = None,
+    observe: Observe = "cells",
+    arena: str | Path | Arena = "paper",
+    noise: float | None = None,
+    reevolved: str | Path | None = None,
+    why: bool = False,
+    processes: int | None = None,
+    witness: str | None = None,
+    seed: int = 1,
+    results: str | Path | None = None,
+    tell: Tell | None = None,
+    say: Say | None = None,
+) -> GapBetween:
+    """Measure the gap between a simulator and a target, both by name; as `realitygap gap`.
+
+    Args:
+        sim: The simulator: `sim`, `sim:FILE` or `jyro`.
+        target: Any platform, such as `twin:FILE` or `scribbler:PORT`.
+        controllers: As in `sample_controllers`.
+        n_controllers: How many.
+        trials: Of each on each platform.
+        margin: Of equivalence in level, in coverage.
+        observe: How much is seen of the target.
+        arena: By name, from a file, or an `Arena`.
+        noise: The paper's a on simulators; 0.1 on `jyro` and none on others when not given.
+        reevolved: Results or a study that was evolved on the target.
+        why: Whether to find what each part of the model carries; the simulator has to be a calibration then.
+        processes: Of a twin.
+        witness: Of an emulated robot in another program: HOST:PORT.
+        seed: Of everything.
+        results: A file where the target's trials are kept.
+        tell: Called as trials are done.
+        say: Called with what is done otherwise.
+
+    Raises:
+        StudyError: A platform, study or number that cannot be.
+        RealityGapError: The robot failed, or files cannot be read or written.
+    """
+    place = arena if isinstance(arena, Arena) else load_arena(arena)
+    calibration = calibration_of(sim)
+    if why and calibration is None:
+        raise StudyError(
+            f"Parts of the model are switched in from a calibration, and {sim} is none. Make one with: realitygap "
+            f"calibrate all --robot {target} --observe {observe} -o fit.toml; then measure the gap of sim:fit.toml."
+        )
+    if why and trials < 2:
+        raise StudyError(
+            "Why there is a gap needs at least 2 trials of each controller, to tell it from noise."
+        )
+    tell_of = say or (lambda _: None)
+    tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
+    chosen = sample_controllers(controllers, n_controllers, seed)
+    there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
+    with (
+        _open(sim, place, noise, 2 * seed, None, None) as source,
+        _open(target, place, noise, 2 * seed + 1, processes, witness) as costly,
+    ):
+        _refuse_more_than_is_seen(costly, observe)
+        found = study_gap(
+            source,
+            costly,
+            chosen,
+            trials=trials,
+            margin=margin,
+            observe=observe,
+            misspecified=_misspecified(calibration),
+            reevolved=there,
+            seed=seed,
+            tell=tell,
+            results=results,
+        )
+    parts = None
+    if why and calibration is not None:
+        tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")
+        genomes = [each.genome for each in chosen]
+        parts = why_gap(calibration, place, genomes, found.target, seed=seed)
+    return GapBetween(found, parts)
+
+
+def _misspecified(calibration: Calibration | None) -> bool | None:
+    """What the predictive check of a whole calibration said; only that one fits trials as wholes."""
+    return calibration.misspecified if calibration is not None and calibration.kind == "all" else None
+
+
+def _open(
+    spec: str, arena: Arena, noise: float | None, key: int, processes: int | None, witness: str | None
+) -> Target:
+    level = (PAPERS_NOISE if spec == "jyro" else 0.0) if noise is None else noise
+    return open_target(spec, arena, processes=processes, witness=witness, noise=level, key=key)
+
+
+def _refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
+    if OBSERVATIONS.index(observe) > OBSERVATIONS.index(target.observes):
+        raise StudyError(
+            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
+            "or name a witness that sees more."
+        )

@@ -1,0 +1,182 @@
+"""Who puts a robot at its start and says what it drew, for trials one by one: an emulator's witness, or a person."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import RobotError
+from realitygap.records import Observe
+from realitygap.robots import Clock, Robot
+from realitygap.world import Arena, Pose
+
+from ._carry_out import Onlooker
+from ._operator import refuse_other_arena
+from ._target import TrialPlan
+
+if TYPE_CHECKING:
+    from realitygap.emulator import Witness
+
+COUNT_M = 0.00025
+"""Way of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
+LEARN_S = 0.02
+"""How long the speed of an emulator's time is looked at before it is relied on [s]."""
+
+
+class Attendant(Onlooker, Protocol):
+    """Who stands beside a robot.
+
+    Attributes:
+        observes: The most that can be seen with it.
+    """
+
+    observes: Observe
+
+    def meet(self, robot: Robot, arena: Arena) -> Clock:
+        """A robot was opened; the clock by which its commands are timed.
+
+        Raises:
+            RobotError: It is not one that can be attended to.
+        """
+        ...
+
+    def place(self, plan: TrialPlan, start: Pose) -> None:
+        """Put the robot at a start; returns when it stands there."""
+        ...
+
+
+class RobotsOwnSenses:
+    """What a Scribbler says of itself beyond its observations: its battery and, an S2, its encoders."""
+
+    def __init__(self) -> None:
+        self._robot: Any = None
+        self._zero: tuple[int, int] | None = None
+
+    @property
+    def has_encoders(self) -> bool:
+        """Whether the robot that was met has any."""
+        return getattr(getattr(self._robot, "info", None), "model", "") == "s2"
+
+    def _met(self, robot: Any) -> None:
+        self._robot = robot
+        has_fluke = self.has_encoders and robot.info.fluke != "none"
+        self._is_turned = has_fluke and robot.forwardness == "fluke"
+
+    def begin(self) -> None:
+        """A trial begins: wheels count from here on."""
+        self._zero = None
+
+    def battery_v(self) -> float:
+        """By its Fluke [V]; nan without one."""
+        info = getattr(self._robot, "info", None)
+        return math.nan if info is None or info.fluke == "none" else float(self._robot.battery())
+
+    def wheels(self) -> tuple[float, float] | None:
+        """By its encoders, seen by the end that is ahead [m]."""
+        if not self.has_encoders:
+            return None
+        left, right = self._robot.encoders()
+        self._zero = self._zero or (left, right)
+        left, right = left - self._zero[0], right - self._zero[1]
+        if self._is_turned:
+            left, right = -right, -left
+        return left * COUNT_M, right * COUNT_M
+
+
+class WitnessAttendant(RobotsOwnSenses):
+    """The attendant of an emulated robot: nobody. Trial `number` has the noise of that number.
+
+    Args:
+        witness: Of the emulator; that of the robot's port when not given.
+    """
+
+    observes: Observe = "track"
+
+    def __init__(self, witness: Witness | None = None) -> None:
+        super().__init__()
+        self._given = witness
+        self._times: list[float] = []
+
+    def meet(self, robot: Robot, arena: Arena) -> Clock:
+        """Take the witness that comes with the robot's port, unless there is one.
+
+        Raises:
+            RobotError: The robot would count as REAL, there is no witness, or it drives in another arena.
+        """
+        if robot.label != "EMULATED":
+            raise RobotError(
+                f"A robot on this port counts as {robot.label}, and a witness sees an emulated one: its cells would "
+                "be taken for a robot's. Use a pseudo-terminal or a port of this machine, or leave the witness out."
+            )
+        self._met(robot)
+        own = getattr(getattr(robot, "port", None), "witness", None)
+        found = own or self._given
+        if found is None:
+            raise RobotError(
+                "This robot has no witness that would say what it drew: it is no emulator in this program. Name the "
+                "address of one's witness, HOST:PORT (realitygap emulate --witness PORT)."
+            )
+        self._witness: Witness = found
+        refuse_other_arena(found.arena(), arena)
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
+        return clock if own is not None else WitnessClock(found, clock)
+
+    def place(self, plan: TrialPlan, start: Pose) -> None:
+        """Put it there."""
+        self.begin()
+        self._times = []
+        self._witness.place(start, plan.number)
+
+    def look(self) -> None:
+        """Note the time: where it was then is in the path that is told afterwards."""
+        self._times.append(self._witness.now())
+
+    def poses(self) -> NDArray[np.float64]:
+        """(n, 3) at each look."""
+        path = self._witness.path()
+        at = [
+            np.interp(self._times, path[:, 0], column) for column in (*path[:, 1:3].T, np.unwrap(path[:, 3]))
+        ]
+        poses: NDArray[np.float64] = np.stack(at, axis=1)
+        poses[:, 2] %= math.tau
+        return poses
+
+    def cells(self) -> tuple[int, ...]:
+        """Cells along the driven line."""
+        return self._witness.cells()
+
+
+class WitnessClock:
+    """The time of an emulator in another program: faster than ours, or one that passes only when it is let.
+
+    Args:
+        witness: Who tells it.
+        real: By which is waited.
+    """
+
+    def __init__(self, witness: Witness, real: Clock) -> None:
+        self._witness, self._real = witness, real
+        self._waits = getattr(witness, "waits", False)
+        self._began = (witness.now(), time.monotonic())
+
+    def now(self) -> float:
+        """The emulator's time [s]."""
+        return self._witness.now()
+
+    def sleep(self, seconds: float) -> None:
+        """Let so much of its time pass."""
+        if self._waits:
+            self._witness.advance(seconds)  # type: ignore[attr-defined]  # one that waits has it
+            return
+        until = self.now() + seconds
+        while (left := until - self.now()) > 0:
+            is_known = time.monotonic() - self._began[1] >= LEARN_S
+            self._real.sleep(left / self._speed() if is_known else min(left, LEARN_S))
+
+    def _speed(self) -> float:
+        """Seconds of the emulator in one of real time, so far."""
+        return max((self._witness.now() - self._began[0]) / (time.monotonic() - self._began[1]), 1e-3)

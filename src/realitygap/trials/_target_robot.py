@@ -1,0 +1,209 @@
+"""A robot on a port as a target: an emulated one by itself, a physical one with somebody beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from types import TracebackType
+from typing import Any, Literal, Self
+
+from realitygap.errors import RobotError
+from realitygap.records import Observe, ObservedTrial
+from realitygap.robots import Clock, Command, Label, Observation, Robot
+from realitygap.world import Arena, Pose
+
+from ._attendant import Attendant
+from ._carry_out import TrialStopped, carry_out_on_robot
+from ._physical import EndReason
+from ._target import TrialPlan, check_plans
+
+OnLost = Literal["retry", "skip", "stop"]
+"""What follows a trial in which the link was lost: the same again, once; the next one; or nothing."""
+
+MOST_NUMBER = 2**32 - 1
+LATE = 0.02
+"""How much longer than said commands of a trial may take before what they took is kept instead."""
+
+
+class PacedRobot:
+    """A robot whose commands follow each other in time: what its readings take counts as a part of the command.
+
+    So a command takes effect that much after its readings, and lasts `step_s` all the same. Where readings take longer
+    than that, commands do, too.
+
+    Args:
+        robot: Whom to pace.
+        step_s: How long a command lasts [s].
+        clock: By which.
+    """
+
+    def __init__(self, robot: Any, step_s: float, clock: Clock) -> None:
+        self._robot, self._clock = robot, clock
+        self._robot.step_s = 0.0  # it is waited here
+        self.label: Label = robot.label
+        self.step_s = step_s
+        self.n_sensors: int = robot.n_sensors
+        self._begun = self._due = 0.0
+        self._n = 0
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """As `Robot.reset`; a robot on a port stays where it was put."""
+        self._robot.reset()
+        self._n = 0
+
+    def observe(self) -> Observation:
+        """As `Robot.observe`; the first one begins the time."""
+        if not self._n:
+            self._begun = self._due = self._clock.now()
+        seen: Observation = self._robot.observe()
+        return seen
+
+    def drive(self, command: Command) -> None:
+        """As `Robot.drive`; returns when its time is over, reckoned from the readings before it."""
+        self._robot.drive(command)
+        self._n += 1
+        self._due += self.step_s
+        left = self._due - self._clock.now()
+        if left > 0:
+            self._clock.sleep(left)
+        else:
+            self._due -= left
+
+    @property
+    def lasted_s(self) -> float:
+        """How long commands of the trial lasted in the mean [s]; `step_s` where that was kept."""
+        mean = (self._due - self._begun) / self._n if self._n else self.step_s
+        return mean if mean > self.step_s * (1 + LATE) else self.step_s
+
+    def stop(self) -> None:
+        """Stop the motors."""
+        self._robot.stop()
+
+    def close(self) -> None:
+        """Stop the motors and let go of it."""
+        self._robot.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class RobotTarget:
+    """A robot on a port, and who stands beside it.
+
+    Where the link is lost in a trial, what was seen of it is told as a trial that ended as LOST, and the link is opened
+    anew. The motors are stopped on every way out.
+
+    Args:
+        open_robot: Opens the robot.
+        arena: Where.
+        attendant: Who places it and says what it drew.
+        name: As the user named it.
+        step_s: How long a command lasts [s].
+        on_lost: What follows a trial in which the link was lost.
+
+    Raises:
+        RobotError: The robot cannot be reached, or not attended to.
+    """
+
+    def __init__(
+        self,
+        open_robot: Callable[[], Robot],
+        arena: Arena,
+        attendant: Attendant,
+        *,
+        name: str,
+        step_s: float = 0.5,
+        on_lost: OnLost = "retry",
+    ) -> None:
+        self.name, self.arena, self.step_s = name, arena, step_s
+        self._open_robot, self._attendant, self._on_lost = open_robot, attendant, on_lost
+        self._robot: PacedRobot | None = None
+        robot = self._ready()
+        self.label: Label = robot.label
+        self.n_sensors = robot.n_sensors
+        self.observes: Observe = attendant.observes
+
+    def _ready(self) -> PacedRobot:
+        """The robot, opened where it is not."""
+        if self._robot is None:
+            robot = self._open_robot()
+            try:
+                clock = self._attendant.meet(robot, self.arena)
+            except BaseException:
+                robot.close()
+                raise
+            self._robot = PacedRobot(robot, self.step_s, clock)
+        return self._robot
+
+    def carry_out(
+        self,
+        plans: Sequence[TrialPlan],
+        observe: Observe,
+        tell: Callable[[int, ObservedTrial], None] | None = None,
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
+        check_plans(plans, observe, self, MOST_NUMBER)
+        trials = []
+        try:
+            for k, plan in enumerate(plans):
+                told = None if tell is None else functools.partial(tell, k)
+                trials.append(self._carry_out(plan, observe, told))
+        except BaseException:
+            self.close()
+            raise
+        return trials
+
+    def _carry_out(
+        self, plan: TrialPlan, observe: Observe, tell: Callable[[ObservedTrial], None] | None
+    ) -> ObservedTrial:
+        """One trial; one that is lost again where that is wanted."""
+        attempts = 2 if self._on_lost == "retry" else 1
+        for _ in range(attempts):
+            trial, problem = self._try(plan, observe, tell)
+            if tell is not None:
+                tell(trial)
+            if trial.end != EndReason.LOST:
+                return trial
+            self.close()
+        if self._on_lost == "skip":
+            return trial
+        again = "twice " if attempts > 1 else ""
+        raise RobotError(
+            f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: {problem} "
+            "The trials before it are kept. Put the robot right, then go on with the rest."
+        )
+
+    def _try(
+        self, plan: TrialPlan, observe: Observe, tell: Callable[[ObservedTrial], None] | None
+    ) -> tuple[ObservedTrial, str]:
+        robot, start = self._ready(), plan.start or self.arena.start
+        self._attendant.place(plan, start)
+        try:
+            trial, problem = carry_out_on_robot(robot, plan, observe, self._attendant, start)
+        except TrialStopped as stopped:
+            if tell is not None:
+                tell(stopped.trial)
+            raise
+        return replace(trial, step_s=robot.lasted_s), problem
+
+    def close(self) -> None:
+        """Stop the motors and let go of the robot; safe to call twice."""
+        if self._robot is not None:
+            robot, self._robot = self._robot, None
+            with contextlib.suppress(RobotError):
+                robot.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

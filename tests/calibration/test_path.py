@@ -1,0 +1,123 @@
+"""The fit to straight paths and turns on the spot."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realitygap.calibration import end_pose_of, fit_path, moved_in, path_plans, ruled
+from realitygap.calibration._path import STRAIGHT, TURNING
+from realitygap.records import ObservedTrial
+from realitygap.robots import SimPlatform
+from realitygap.study._calibrate_kinds import _moved_in_sim
+from realitygap.trials import SimTarget
+from realitygap.world import INCH, load_robot, paper_arena
+
+ROBOT = load_robot("scribbler-s2-fluke2")
+ARENA = paper_arena()
+
+
+def fitted(trials, seed: int = 0, robot=ROBOT):
+    """The fit, and its parameters by name."""
+    fit = fit_path(
+        trials, lambda trial: _moved_in_sim(trial, robot, ARENA), robot, np.random.default_rng(seed)
+    )
+    return fit, {each.name: each for each in fit.fitted}
+
+
+def recorded(numbers: dict[str, float], key: int, observe="track", n: int = 10) -> list[ObservedTrial]:
+    """Trials of a simulated robot with these numbers."""
+    target = SimTarget(SimPlatform(robot=ROBOT, set=numbers), ARENA, key=key)
+    return target.carry_out(path_plans(ARENA, n), observe)
+
+
+def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) -> ObservedTrial:
+    """What a person with a ruler has of a trial."""
+    trial = ObservedTrial(
+        start=(0.2, 0.3, 0.0),
+        step_s=0.5,
+        commands=np.tile(command, (5, 1)),
+        readings=np.zeros((5, 3)),
+        stalled=np.zeros(5, bool),
+        cells=(),
+        purpose="path",
+    )
+    end = end_pose_of(trial, ahead_in * INCH, left_in * INCH, math.radians(turned_deg))
+    return replace(trial, end_pose=end)
+
+
+@pytest.mark.parametrize("seen", ["track", "ruler"])
+def test_intervals_cover_gains_and_track_as_often_as_they_say(seen):
+    rng = np.random.default_rng(17)
+    hits = []
+    for key in range(12):
+        truth = {
+            "drive.gain_left": float(rng.uniform(0.85, 1.1)),
+            "drive.gain_right": float(rng.uniform(0.85, 1.1)),
+            "drive.track": float(rng.uniform(0.14, 0.17)),
+        }
+        trials = recorded(truth, key)
+        fit, _ = fitted([ruled(trial) for trial in trials] if seen == "ruler" else trials)
+        for name, value in truth.items():
+            low, high = np.quantile(fit.draws[name], [0.05, 0.95])
+            hits.append(low <= value <= high)
+    # 36 intervals: 0.90 with a standard deviation of 0.05, so that chance alone fails some 1 in 300 keys; these do not
+    assert np.mean(hits) >= 0.75
+
+
+def test_the_papers_own_lengths_make_70_steps_and_not_87():
+    trials = [measured(13.75, 0.0, STRAIGHT) for _ in range(5)]
+    fit, own = fitted(trials)
+    assert own["path.jyro_steps"].estimate == pytest.approx(69.85, abs=0.01)
+    assert 69 < own["path.jyro_steps"].low < own["path.jyro_steps"].high < 71
+    assert own["path.step_length"].estimate == pytest.approx(2.75 * INCH)
+    assert "took 87; its own lengths make it 70" in fit.notes[0]
+    assert not own["drive.track"].identified
+
+
+def test_turns_beyond_half_a_turn_are_counted():
+    trials = [measured(13.0, 0.0, STRAIGHT), measured(0, 300.0, TURNING)] * 3
+    _, own = fitted(trials)
+    assert own["path.step_turn"].estimate == pytest.approx(math.radians(60))
+    simulated = next(trial for trial in recorded({}, 0) if np.all(trial.commands == TURNING))
+    assert moved_in(simulated).turned > math.pi  # 5 steps of 54 degrees
+
+
+def test_repeats_that_read_the_same_are_as_uncertain_as_the_ruler():
+    _, own = fitted([measured(13.75, 0.0, STRAIGHT)] * 3)
+    width = own["path.step_length"].high - own["path.step_length"].low
+    # t(2) at 5 % is 2.92; an eighth of an inch is even over itself; three repeats, five steps
+    assert width == pytest.approx(2 * 2.92 * (INCH / 8) / math.sqrt(12) / math.sqrt(3) / 5, rel=0.25)
+
+
+def test_one_path_alone_identifies_nothing():
+    _, own = fitted([measured(13.75, 0.0, STRAIGHT)])
+    assert not own["drive.gain"].identified
+    assert "three times more" in own["drive.gain"].advice
+
+
+def test_encoders_tell_gains_and_not_the_track():
+    trials = recorded({"drive.gain_left": 0.95, "drive.gain_right": 0.95}, 3, observe="encoders")
+    fit, own = fitted(trials)
+    assert own["drive.gain"].low < 0.95 < own["drive.gain"].high
+    assert not own["drive.track"].identified
+    assert "drive.track" not in fit.numbers
+
+
+def test_the_ruler_rounds_and_forgets_what_a_camera_saw():
+    trial = recorded({}, 5)[0]
+    with_ruler = ruled(trial)
+    assert len(with_ruler.poses) == 0
+    ahead = (with_ruler.end_pose[0] - trial.start[0]) / INCH
+    assert ahead * 8 == pytest.approx(round(ahead * 8), abs=1e-9)
+    degrees = math.degrees(with_ruler.end_pose[2])
+    assert degrees == pytest.approx(round(degrees), abs=1e-9)
+    assert moved_in(with_ruler).way == pytest.approx(moved_in(trial).way, abs=INCH / 16 + 1e-3)
+
+
+def test_no_straight_path_is_told():
+    with pytest.raises(ValueError, match="There is no straight path"):
+        fitted([measured(0, 300.0, TURNING)])

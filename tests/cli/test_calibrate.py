@@ -1,0 +1,224 @@
+"""`realitygap calibrate`: unattended, led through at a terminal, from recorded data, and its mistakes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from realitygap.cli import _calibrate, _calibrate_guide, app
+from realitygap.cli._calibrate_guide import parse_length
+from realitygap.errors import RealityGapError
+from realitygap.records import read_observations
+from realitygap.world import load_calibration, load_robot
+
+PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
+
+
+def run(*arguments: object) -> str:
+    done = CliRunner().invoke(app, ["calibrate", *map(str, arguments)], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def refused(*arguments: object) -> str:
+    done = CliRunner().invoke(app, ["calibrate", *map(str, arguments)])
+    assert isinstance(done.exception, RealityGapError), done.output
+    return str(done.exception)
+
+
+@pytest.fixture(scope="module")
+def sensors(tmp_path_factory) -> Path:
+    """A folder with a calibration of the sensors of sim, at reduced size."""
+    folder = tmp_path_factory.mktemp("sensors")
+    run(*("sensors", "--robot", "sim", "--budget", 6, "-o", folder / "fit.toml", "--seed", 3))
+    return folder
+
+
+def test_sensors_of_a_simulation_are_measured_unattended_and_kept(sensors):
+    made = load_calibration(sensors / "fit.toml")
+    assert (made.kind, made.label, made.trials, made.robot) == ("sensors", "SIM", 6, "scribbler-s2-fluke2")
+    assert load_robot(sensors / "fit.toml").range[1].decay == pytest.approx(made.numbers["range.1.decay"])
+    kept = read_observations(sensors / "fit.trials.jsonl")
+    assert [trial.purpose for trial in kept.trials] == ["sensors"] * 6
+    assert {len(trial.readings) for trial in kept.trials} == {50}
+    assert made.n_draws == 500
+    assert any("fewer than 3 placements" in note for note in made.notes)
+
+
+def test_the_same_command_takes_up_what_was_kept_and_a_larger_budget_adds_to_it(sensors):
+    before = (sensors / "fit.trials.jsonl").read_bytes()
+    out = json.loads(
+        run("sensors", "--robot", "sim", "--budget", 7, "-o", sensors / "fit.toml", "--seed", 3, "--json")
+    )
+    after = (sensors / "fit.trials.jsonl").read_bytes()
+    assert after.startswith(before)
+    assert after.count(b"\n") == before.count(b"\n") + 1
+    assert out["trials"] == 7
+    assert {each["name"] for each in out["fitted"]} >= {"range.0.amplitude", "range.2.burst"}
+
+
+def test_recorded_trials_alone_give_the_same_fit_and_figure(sensors, tmp_path):
+    data = tmp_path / "data.jsonl"
+    data.write_bytes(b"".join((sensors / "fit.trials.jsonl").read_bytes().splitlines(keepends=True)[:7]))
+    out = run("sensors", "--from", data, "-o", tmp_path / "again.toml", "--figure", tmp_path / "fit.svg")
+    assert "range.0.decay" in out
+    assert "Not identified: battery_per_v: Record with a full" in out
+    first = run("sensors", "--from", data, "-o", tmp_path / "third.toml")
+    assert "Written" in first
+    made = [load_calibration(tmp_path / name) for name in ("again.toml", "third.toml")]
+    assert made[0].numbers == made[1].numbers
+    picture = (tmp_path / "fit.svg").read_text()
+    assert "SIM: 300 readings of each range sensor" in picture
+    assert "range.2 (SIM)" in picture
+
+
+def test_an_emulated_robot_is_measured_with_a_ruler_and_not_seen_otherwise(tmp_path):
+    out = run("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
+    assert "(EMULATED)" in out
+    assert "path.jyro_steps" in out
+    kept = read_observations(tmp_path / "path.trials.jsonl").trials
+    assert all(len(trial.poses) == 0 and len(trial.wheels) == 0 for trial in kept)
+    assert all(trial.end_pose is not None for trial in kept)
+    made = load_calibration(tmp_path / "path.toml")
+    track = {each.name: each for each in made.fitted}["drive.track"]
+    assert 0.13 < track.estimate < 0.17
+
+
+def test_a_calibration_builds_on_an_earlier_one(sensors, tmp_path):
+    run("path", "--robot", "sim", "--base", sensors / "fit.toml", "-o", tmp_path / "both.toml", "--budget", 4)
+    made, below = load_calibration(tmp_path / "both.toml"), load_calibration(sensors / "fit.toml")
+    assert made.robot == "scribbler-s2-fluke2"
+    assert made.numbers["range.1.decay"] == below.numbers["range.1.decay"]
+    assert set(made.draws) == {*below.draws, "drive.gain_left", "drive.gain_right", "drive.track"}
+    assert made.n_draws == 500
+    assert sorted(made.draws["range.1.decay"]) == sorted(below.draws["range.1.decay"])
+    robot = load_robot(tmp_path / "both.toml")
+    assert robot.drive.track == pytest.approx(made.numbers["drive.track"])
+
+
+class Person:
+    """Types these answers, and notes what was asked."""
+
+    def __init__(self, *answers: str) -> None:
+        self.answers = list(answers)
+        self.asked: list[str] = []
+
+    def __call__(self, question: str) -> str:
+        self.asked.append(question)
+        return self.answers.pop(0)
+
+
+@pytest.fixture
+def person(monkeypatch):
+    """Lets somebody answer at the terminal, before an emulated robot that counts as one that nobody places."""
+
+    def answering(*answers: str) -> Person:
+        somebody = Person(*answers)
+        monkeypatch.setattr(_calibrate_guide, "_ask_at_terminal", somebody)
+        monkeypatch.setattr(_calibrate, "_is_led", lambda robot, witness: True)
+        return somebody
+
+    return answering
+
+
+STRAIGHT, TURN = ("", "13 3/4", "-1/8", "2"), ("", "281")
+
+
+def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person, tmp_path):
+    command = ("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
+    first = person(*STRAIGHT, *TURN, "q")
+    out = run(*command)
+    assert "Trial 1 of 4: put it with 24 in free ahead" in out
+    assert "It turns for 5 full steps" in out
+    assert "the same command goes on where it stopped" in out
+    assert not (tmp_path / "path.toml").exists()
+    assert not first.answers
+    kept = read_observations(tmp_path / "path.trials.jsonl").trials
+    assert len(kept) == 2
+    ahead, left, heading = kept[0].end_pose
+    assert ahead - kept[0].start[0] == pytest.approx(13.75 * 0.0254)
+    assert left - kept[0].start[1] == pytest.approx(-0.125 * 0.0254)
+    assert heading == pytest.approx(0.0349, abs=1e-4)
+    # the third trial, the fourth, back to the third, which is 14 in now, an answer mistyped, and the fourth again
+    second = person(*("?", "r", *STRAIGHT), "r", *("", "x", "14", "0", "r"), *("", "14", "0", "0"), *TURN)
+    out = run(*command)
+    assert "Trial 1 of 2: put it with 24 in free ahead" in out
+    assert "There is none before." in out
+    assert "'x' is no number. Expected one such as 13.75, 13 3/4 or -2." in out
+    assert not second.answers
+    made = load_calibration(tmp_path / "path.toml")
+    assert made.evidence["path"]["straight_m"] == pytest.approx([13.75 * 0.0254, 14 * 0.0254], rel=1e-3)
+    assert made.label == "EMULATED"
+
+
+def test_a_person_is_told_how_far_from_the_wall_the_robot_has_to_stand(person, tmp_path):
+    person("", "", "q")
+    out = run("sensors", "--robot", PORT, "-o", tmp_path / "fit.toml")
+    assert "Trial 1 of 18: put it square to a wall, its sensors 3 in from it" in out
+    assert "Trial 2 of 18: put it square to a wall, its sensors 6 in from it" in out
+    assert "50 readings, on average" in out
+    assert len(read_observations(tmp_path / "fit.trials.jsonl").trials) == 2
+
+
+def test_without_a_terminal_nobody_is_led(monkeypatch, tmp_path):
+    monkeypatch.setattr(_calibrate, "_is_led", lambda robot, witness: True)
+    said = refused("sensors", "--robot", PORT, "-o", tmp_path / "fit.toml")
+    assert "There is no terminal" in said
+    assert "--from FILE" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("13.75", 13.75),
+        ("13 3/4", 13.75),
+        ("13-3/4", 13.75),
+        ("-1/8", -0.125),
+        (".5", 0.5),
+        ("-2", -2.0),
+        ("", None),
+        ("1/0", None),
+        ("13 3/0", None),
+        ("13 in", None),
+    ],
+)
+def test_numbers_are_read_as_on_a_ruler(text, value):
+    assert parse_length(text) == value
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("sensors", "-o", "x.toml"), "Name what is calibrated (--robot PLATFORM)"),
+        (("sensors", "--robot", "sim", "--from", "x", "-o", "x.toml"), "and not both"),
+        (("sensors", "--robot", "sim"), "Name the file that the calibration goes to"),
+        (("sensors", "--robot", "sim", "-o", "x.txt"), "does not end in .toml"),
+        (("sensors", "--robot", "sim", "-o", "no/x.toml"), "There is no folder no"),
+        (("sensor", "--robot", "sim", "-o", "x.toml"), "Cannot calibrate 'sensor'. Did you mean 'sensors'?"),
+        (("sensors", "--robot", "sym", "-o", "x.toml"), "'sym' is no platform"),
+        (
+            ("sensors", "--robot", "sim", "--observe", "all", "-o", "x.toml"),
+            "expected cells, encoders or track",
+        ),
+        (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "takes at least 2 trials"),
+        (("path", "--robot", "sim", "--figure", "x.svg", "-o", "x.toml"), "--figure draws the readings"),
+        (("sensors", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "has 3 range sensors"),
+        (("sensors", "--robot", "jyro", "--base", "jyro", "-o", "x.toml"), "expected ir or pulses"),
+        (("sensors", "--from", "none.jsonl", "-o", "x.toml"), "There is no file none.jsonl"),
+        (("sensors", "--robot", "sim", "--arena", "peper", "-o", "x.toml"), "Unknown arena"),
+    ],
+)
+def test_mistakes_are_one_message_and_lose_nothing(arguments, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert says in refused(*arguments)
+    assert not Path("x.toml").exists()
+
+
+def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):
+    data = sensors / "fit.trials.jsonl"
+    assert "There is no straight path" in refused("path", "--from", data, "-o", tmp_path / "x.toml")
+    other = refused("sensors", "--from", data, "--base", "e-puck", "-o", tmp_path / "x.toml")
+    assert "have 3 range sensors and robot 'e-puck' 8" in other

@@ -1,0 +1,210 @@
+"""A robot on a port as a target."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from realitygap.errors import RobotError, StudyError
+from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.records import ObservedTrial, trial_to_dict
+from realitygap.robots import Command, ScribblerPlatform
+from realitygap.robots.twin import sample_twin
+from realitygap.study import connect_robot, open_target
+from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessAttendant
+from realitygap.world import Pose, load_arena, paper_arena
+
+ARENA = paper_arena()
+PORT = "emulator://s2?fluke=2&speed=off"
+FORWARD = TrialPlan(commands=np.array([[1.0, 0.0]] * 4 + [[0.0, 0.5]] * 2), purpose="path", number=5)
+
+
+def controller(steps: int = 8) -> TrialPlan:
+    settings = NeatSettings.named("rosenzweig-remy", population=8, add_node=0.5, weight_step=5.0)
+    genome: Genome = Population(3, 2, settings, seed=11, bias=False).ask()[2]
+    return TrialPlan(start=Pose(0.5, 0.3, 1.0), genome=genome, steps=steps, number=7)
+
+
+def emulated() -> RobotTarget:
+    target = open_target(f"scribbler:{PORT}", ARENA)
+    assert isinstance(target, RobotTarget)
+    return target
+
+
+@contextmanager
+def emulator(*options: str) -> Iterator[tuple[str, str]]:
+    """An emulator in another process that goes as fast as it can; its port and its witness's address."""
+    command = [sys.executable, "-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0"]
+    with subprocess.Popen([*command, "--speed", "0", *options], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            port = process.stdout.readline().strip()
+            yield f"scribbler:{port}", process.stdout.readline().split()[1]
+        finally:
+            process.terminate()
+
+
+def test_driven_ahead_wheels_cells_and_poses_agree() -> None:
+    with emulated() as target:
+        (trial,) = target.carry_out([FORWARD], "track")
+        assert (target.label, target.observes, target.n_sensors) == ("EMULATED", "track", 3)
+    assert trial.end == "step limit"
+    assert trial.step_s == 0.5
+    assert trial.number == 5
+    assert trial.purpose == "path"
+    assert 8 < trial.battery_v < 10
+    ahead = trial.poses[4, 0] - trial.poses[0, 0]
+    assert trial.poses[0] == pytest.approx(tuple(ARENA.start))
+    assert 0.2 < ahead < 0.35
+    assert trial.wheels[4] == pytest.approx((ahead, ahead), abs=0.002)  # the encoders' counts are 0.25 mm
+    assert trial.poses[6, 2] > 0.5  # to the left
+    assert trial.wheels[6, 1] > trial.wheels[4, 1] > trial.wheels[6, 0]
+    assert trial.cells == (13, 14, 15, 16, 17, 29)
+
+
+def test_a_command_lasts_its_time_whatever_the_readings_take() -> None:
+    with emulated() as target:
+        one, other = (target.carry_out([FORWARD], observe)[0] for observe in ("cells", "track"))
+    assert one.step_s == other.step_s == 0.5
+    slow = open_target(f"scribbler:{PORT}", ARENA, step_s=0.1)
+    with slow:
+        (trial,) = slow.carry_out([FORWARD], "cells")
+    assert trial.step_s > 0.11  # what readings take by the wire
+
+
+@pytest.mark.parametrize("observe", ["cells", "encoders"])
+def test_what_is_not_observed_does_not_come_out(observe: Any) -> None:
+    with emulated() as target:
+        (trial,) = target.carry_out([FORWARD], observe)
+    assert trial.observe == observe
+    assert list(trial.cells) == sorted(trial.cells)
+
+
+def test_over_tcp_it_is_what_it_is_in_this_process() -> None:
+    plans = [FORWARD, controller()]
+    with emulated() as target:
+        expected = target.carry_out(plans, "track")
+    with emulator() as (port, witness), open_target(port, ARENA, witness=witness) as target:
+        trials = target.carry_out(plans, "track")
+    for trial, other in zip(trials, expected, strict=True):
+        assert trial.cells == other.cells
+        np.testing.assert_allclose(trial.poses, other.poses, atol=1e-3)
+        np.testing.assert_allclose(trial.wheels, other.wheels, atol=1e-3)
+        np.testing.assert_allclose(trial.readings, other.readings, atol=0.02)
+
+
+@pytest.mark.long
+def test_a_twin_behind_the_emulator_drives_by_itself(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
+    file = tmp_path / "close.toml"
+    file.write_text(sample_twin("close", 1).to_toml())
+    with (
+        emulator("--twin", str(file)) as (port, witness),
+        open_target(port, ARENA, witness=witness) as target,
+    ):
+        first = target.carry_out([FORWARD, controller()], "track")
+        again = target.carry_out([FORWARD, controller()], "track")
+    for one, other in zip(first, again, strict=True):
+        assert one.end == "step limit"
+        np.testing.assert_allclose(one.poses, other.poses, atol=0.01)
+    assert first[0].wheels[4] == pytest.approx(first[0].poses[4, 0] - first[0].poses[0, 0], rel=0.2)
+
+
+class Failing:
+    """A Scribbler whose link is lost at some commands, counted over all that were opened."""
+
+    def __init__(self, robot: Any, lost_at: list[int]) -> None:
+        self._robot, self._lost_at = robot, lost_at
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._robot, name)
+
+    def drive(self, command: Command) -> None:
+        self._lost_at[0] -= 1
+        if self._lost_at[0] == 0:
+            self._lost_at.pop(0)
+            raise RobotError("The link is gone.")
+        self._robot.drive(command)
+
+
+def failing(lost_at: list[int], on_lost: OnLost) -> tuple[RobotTarget, list[Any]]:
+    opened: list[Any] = []
+
+    def open_robot() -> Any:
+        opened.append(Failing(connect_robot(PORT)(ScribblerPlatform(reading_max=6400)), lost_at))
+        return opened[-1]
+
+    target = RobotTarget(open_robot, ARENA, WitnessAttendant(), name="scribbler:test", on_lost=on_lost)
+    return target, opened
+
+
+def test_a_lost_trial_is_told_and_driven_again_once() -> None:
+    target, opened = failing([3, 99], "retry")
+    told: list[tuple[int, ObservedTrial]] = []
+    with target:
+        (trial,) = target.carry_out([FORWARD], "track", lambda k, trial: told.append((k, trial)))
+    assert [(k, each.end, len(each.commands)) for k, each in told] == [(0, "lost", 2), (0, "step limit", 6)]
+    assert len(told[0][1].poses) == 3
+    assert trial_to_dict(trial) == trial_to_dict(told[1][1])
+    assert len(opened) == 2
+    assert all(robot.link.motors_off for robot in opened)
+
+
+def test_a_trial_lost_twice_stops_with_the_trials_before_it_kept() -> None:
+    target, _ = failing([9, 2, 99], "retry")
+    told: list[str] = []
+    with (
+        target,
+        pytest.raises(RobotError, match=r"Trial 5 on scribbler:test was lost twice after 1 commands"),
+    ):
+        target.carry_out([FORWARD] * 2, "cells", lambda k, trial: told.append(trial.end))
+    assert told == ["step limit", "lost", "lost"]
+
+
+def test_lost_trials_may_be_skipped() -> None:
+    target, _ = failing([3, 99], "skip")
+    with target:
+        trials = target.carry_out([FORWARD] * 2, "track")
+    assert [trial.end for trial in trials] == ["lost", "step limit"]
+
+
+def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
+    target = emulated()
+    told: list[ObservedTrial] = []
+
+    class Impatient(Failing):
+        def drive(self, command: Command) -> None:
+            self._lost_at[0] -= 1
+            if not self._lost_at[0]:
+                raise KeyboardInterrupt
+            self._robot.drive(command)
+
+    robot = Impatient(connect_robot(PORT)(ScribblerPlatform(reading_max=6400)), [4])
+    target = RobotTarget(lambda: robot, ARENA, WitnessAttendant(), name="scribbler:test")
+    with pytest.raises(KeyboardInterrupt):
+        target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
+    assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 3)]
+    assert robot.link.motors_off
+    assert not robot.link.is_open
+
+
+def test_what_cannot_be_is_said_before_anything_moves() -> None:
+    with pytest.raises(StudyError, match="Who places the robot at /dev/rfcomm0"):
+        open_target("scribbler:/dev/rfcomm0", ARENA)
+    with pytest.raises(
+        StudyError, match=r"'scribler:x' is no platform for trials. Did you mean 'scribbler:PORT'"
+    ):
+        open_target("scribler:x", ARENA)
+    with pytest.raises(StudyError, match=r"no-such-robot"):
+        open_target("sim:no-such-robot", ARENA)
+    with pytest.raises(RobotError, match="No witness at 127"):
+        open_target("scribbler:socket://127.0.0.1:1", ARENA, witness="127.0.0.1:1")
+    with pytest.raises(RobotError, match="drives in the arena 'paper', and the study is about"):
+        open_target(f"scribbler:{PORT}", load_arena("wall"))

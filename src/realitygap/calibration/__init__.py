@@ -1,34 +1,60 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
+from ._abc import Effort, Posterior, fit_all
+from ._contact import fit_contact
+from ._contact_plans import contact_plans
+from ._evidence import Evidence, Vectors, evidence_of
+from ._excitation import excitation, random_controllers, random_start
 from ._ir_checks import Independence, independence, predictive_p
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
 from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
+from ._motion_plans import motion_plans
 from ._path import PathFit, fit_path, path_plans
+from ._prior import Effect, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 
 __all__ = [
     "LEAST_PLACEMENTS",
+    "Effect",
+    "Effort",
+    "Evidence",
     "Independence",
     "MotionFit",
     "Moved",
+    "Parameter",
     "PathFit",
     "Placement",
+    "Posterior",
     "SensorFit",
     "Simulate",
+    "Vectors",
+    "contact_plans",
     "distance_of",
     "end_pose_of",
+    "evidence_of",
+    "excitation",
+    "fit_all",
+    "fit_contact",
     "fit_motion",
     "fit_path",
     "fit_sensor",
     "independence",
+    "motion_plans",
     "moved_in",
+    "numbers_of",
     "path_plans",
     "placements_of",
     "predictive_p",
+    "random_controllers",
+    "random_start",
+    "ranges_of",
     "ruled",
+    "scribbler_prior",
     "sensor_distances",
     "sensor_plans",
+    "standard_of",
+    "values_of",
 ]

@@ -4,9 +4,9 @@ Rounds of approximate Bayesian computation: parameters are drawn from the prior 
 them, vectors of what is seen pressed into summaries (`_score.py`), and parameters regressed on these. The box then
 shrinks to where the posterior is.
 
-Sources: semi-automatic summaries, Fearnhead & Prangle, JRSS B 74 (2012); regression adjustment, Beaumont, Zhang & Balding,
-Genetics 162 (2002); rounds whose proposals are the prior cut to where the posterior can be, so that no weights are needed:
-truncated sequential estimation, Deistler, Goncalves & Macke, NeurIPS 2022.
+Sources: semi-automatic summaries, Fearnhead & Prangle, JRSS B 74 (2012); regression adjustment, Beaumont, Zhang &
+Balding, Genetics 162 (2002); rounds whose proposals are the prior cut to where the posterior can be, so that no
+weights are needed: truncated sequential estimation, Deistler, Goncalves & Macke, NeurIPS 2022.
 """
 
 from __future__ import annotations
@@ -78,6 +78,7 @@ def fit_all(
     """
     rng = np.random.default_rng(seed)
     p = len(prior)
+    groups = _groups(prior)
     low, high = np.full(p, -END), np.full(p, END)
     seen = [one.seen[None] for one in evidence]
     n_simulated = 0
@@ -103,7 +104,7 @@ def fit_all(
         summaries = np.concatenate([press(v) for press, v in zip(learned, vectors, strict=True)], axis=1)
         del vectors
         observed = np.concatenate([press(v) for press, v in zip(learned, seen, strict=True)], axis=1)[0]
-        draws, off = _adjusted(rng, places, summaries, observed, low, high)
+        draws, off = _adjusted(rng, places, summaries, observed, groups)
         if tell is not None:
             tell(
                 f"round {turn + 1} of {ROUNDS[effort]}: {np.mean(high - low) / (2 * END):.0%} of the prior's width"
@@ -114,6 +115,12 @@ def fit_all(
     return Posterior(keep, values_of(prior, keep), off, n_simulated)
 
 
+def _groups(prior: Sequence[Parameter]) -> list[NDArray[np.int64]]:
+    """Sensors apart from all else: what they answer somewhere has nothing to do with how the robot gets there."""
+    of_sensors = np.array([parameter.name.startswith("range.") for parameter in prior])
+    return [at for at in (np.flatnonzero(~of_sensors), np.flatnonzero(of_sensors)) if len(at)]
+
+
 def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats:
     """(n, p) from the prior within a box; evenly spread along each parameter (Latin hypercube)."""
     ranks = np.argsort(rng.uniform(size=(len(low), n)), axis=1).T
@@ -122,50 +129,67 @@ def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats
 
 
 def _adjusted(
-    rng: np.random.Generator, places: Floats, summaries: Floats, observed: Floats, low: Floats, high: Floats
+    rng: np.random.Generator,
+    places: Floats,
+    summaries: Floats,
+    observed: Floats,
+    groups: Sequence[NDArray[np.int64]],
 ) -> tuple[Floats, Floats]:
     """Draws from the posterior: parameters moved by their regression on the summaries to what was observed.
 
-    First all simulations say which combination of summaries tells of each parameter; then those nearest in these
-    combinations say how parameters scatter around.
+    First all simulations say which combination of summaries tells of each parameter; then, for each group of
+    parameters, those nearest in these combinations say how parameters scatter around.
     """
     n, p = places.shape
     scale = summaries.std(axis=0) + 1e-12
-    here = np.clip((observed - summaries.mean(axis=0)) / scale, -6, 6)
-    there = (summaries - summaries.mean(axis=0)) / scale
-    told, told_here = _predict(there, places, here)
-    left = places - told
-    spread = left.std(axis=0) + 1e-9
-    far = ((told - told_here) / spread) ** 2
-    # A parameter that is not told weighs nothing: all simulations are as near.
-    distance = far.sum(axis=1)
-    n_near = int(max(n // 3, min(n, 12 * p)))
-    reach = np.partition(distance, n_near - 1)[n_near - 1]
-    weight = np.maximum(1.0 - distance / (reach * 1.0001 + 1e-12), 0.0)
-    near = weight > 0
-    moved, _ = _local(told[near], places[near], weight[near], told_here)
-    which = rng.choice(near.sum(), 4 * N_DRAWS, p=weight[near] / weight.sum())
-    return np.clip(moved[which], -END, END), (told_here - told[near].mean(axis=0)) / (
-        told[near].std(axis=0) + 1e-9
-    )
+    middle = summaries.mean(axis=0)
+    there, here = (summaries - middle) / scale, np.clip((observed - middle) / scale, -6, 6)
+    draws, off = np.empty((4 * N_DRAWS, p)), np.empty(p)
+    for group in groups:
+        mine = places[:, group]
+        told, told_here = _predict(there, mine, here)
+        spread = (mine - told).std(axis=0) + 1e-9
+        distance = (((told - told_here) / spread) ** 2).sum(axis=1)
+        n_near = int(max(n // 4, min(n, 15 * len(group))))
+        reach = np.partition(distance, n_near - 1)[n_near - 1]
+        weight = np.maximum(1.0 - distance / (reach * 1.0001 + 1e-12), 0.0)
+        near = weight > 0
+        moved = _local(told[near], mine[near], weight[near], told_here)
+        which = rng.choice(near.sum(), len(draws), p=weight[near] / weight.sum())
+        draws[:, group] = np.clip(moved[which], -END, END)
+        off[group] = (told_here - told[near].mean(axis=0)) / (told[near].std(axis=0) + 1e-9)
+    return draws, off
 
 
 def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
-    """Ridge regression of places on summaries; what it says of the simulations, and of the observed."""
-    n, q = summaries.shape
+    """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed."""
     mean = places.mean(axis=0)
-    gram = summaries.T @ summaries + 1e-3 * n * np.eye(q)
-    slopes = np.linalg.solve(gram, summaries.T @ (places - mean))
-    return mean + summaries @ slopes, mean + here @ slopes
+    slopes = _ridge(summaries, places - mean)
+    first, first_here = summaries @ slopes, here @ slopes
+    scale = first.std(axis=0) + 1e-9
+    first, first_here = first / scale, np.clip(first_here / scale, -4, 4)
+    one, other = np.triu_indices(places.shape[1])
+    if len(one) * 4 > len(places):
+        one = other = np.arange(places.shape[1])
+    squares = first[:, one] * first[:, other]
+    design = np.column_stack([summaries, squares - squares.mean(axis=0)])
+    row = np.concatenate([here, first_here[one] * first_here[other] - squares.mean(axis=0)])
+    slopes = _ridge(design, places - mean)
+    return mean + design @ slopes, mean + row @ slopes
 
 
-def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> tuple[Floats, Floats]:
+def _ridge(design: Floats, wanted: Floats) -> Floats:
+    gram = design.T @ design
+    return np.linalg.solve(gram + 1e-3 * np.diag(np.diag(gram) + 1e-9), design.T @ wanted)
+
+
+def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:
     """Places moved to `here` along a weighted linear regression on what was told."""
     design = np.column_stack([np.ones(len(told)), told - here])
     weighed = design * weight[:, None]
     gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *told.var(axis=0) + 1e-12])
     slopes = np.linalg.solve(gram, weighed.T @ places)
-    return slopes[0] + (places - design @ slopes), slopes
+    return np.asarray(slopes[0] + (places - design @ slopes))
 
 
 def _next_box(draws: Floats) -> tuple[Floats, Floats]:

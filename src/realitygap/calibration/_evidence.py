@@ -4,7 +4,8 @@ Each vector is a fixed function of what is seen, so a simulator that is right ma
 
 * Commands given one by one are given again, and all that is seen counts.
 * With poses, a robot is put back to where it was seen before each command, and each command is predicted by itself
-  (multiple shooting): what it answers does not depend on what it was about to do then, so controllers' trials serve too.
+  (multiple shooting): what it answers does not depend on what it was about to do then, so trials of controllers serve
+  too.
 * With encoders, the wheels of any trial are predicted from its commands: in `sim` nothing else moves them.
 * Without poses, controllers drive anew, as what they do next depends on what they saw.
 """

@@ -1,4 +1,4 @@
-"""What is thought possible of a robot before it is observed: parameters, each of which may stand for several numbers."""
+"""What is thought possible of a robot before it is observed: parameters, which may stand for several numbers each."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
             "straight lines ahead and back",
         ),
         Parameter("drive.track", _ratio(0.75 * track, 1.35 * track), "m", (Effect("drive.track"),), "turns in place"),
-        Parameter("drive.axle", _even(-0.03, 0.03), "m", (Effect("drive.axle"),), "turns in place, with --observe track"),
+        Parameter("drive.axle", _even(-0.03, 0.03), "m", (Effect("drive.axle"),), "turns, with --observe track"),
         *_plain("drive", DRIVE, numbers),
         Parameter("contact.friction", _even(0.0, 1.0), "", (Effect("contact.friction"),), "walls met at slant angles"),
         Parameter("contact.lat", _ratio(0.05, 5.0), "", (Effect("contact.lat"),), "walls scraped along"),

@@ -176,8 +176,6 @@ __all__ = [
     "sign_flip_p",
     "smallest_p",
     "strategy_table",
-    "summarize",
-    "summarize_tasks",
     "twin_table",
     "watch",
     "why_table",

@@ -1,0 +1,100 @@
+"""Whether a simulator can make what was observed: the posterior predictive check, with the size of what it cannot make.
+
+With enough trials any robot differs from any simulator significantly, so what counts is a size: of what varies in the
+observations, the share that the fitted simulator neither predicts nor makes by chance.
+
+Source: posterior predictive checks, Gelman, Meng & Stern, Statistica Sinica 6 (1996). The limits in `TOLERATED` are
+chosen on twins, see docs/explanations/inference.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._evidence import Evidence, Vectors
+from ._prior import Floats
+
+N_PREDICTIVE = 200  # robots from the posterior
+
+TOLERATED = {
+    "ahead": 0.2,
+    "turn": 0.2,
+    "reading": 0.35,
+    "stall": 1.0,
+    "coverage": 1.0,
+    "command": 0.5,
+    "wheels": 0.2,
+}
+"""Share of the variance of each kind of observation up to which a fit counts as well specified."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What a fitted simulator cannot make of one kind of observation.
+
+    Attributes:
+        kind: Of what was observed, such as turn.
+        share: Of its variance, what is neither predicted nor chance; may come out below 0.
+        tolerated: Up to which share the fit counts as well specified.
+        p: Share of robots from the posterior whose own trials are as far off.
+    """
+
+    kind: str
+    share: float
+    tolerated: float
+    p: float
+
+    @property
+    def is_too_large(self) -> bool:
+        """Whether the simulator cannot make what was observed."""
+        return self.share > self.tolerated
+
+
+def misfits(
+    evidence: Sequence[Evidence],
+    simulate: Callable[[Evidence, Mapping[str, Floats], int], Vectors],
+    numbers: Mapping[str, Floats],
+    *,
+    key: int,
+) -> list[Misfit]:
+    """What robots of the posterior cannot make of each kind of observation.
+
+    Args:
+        evidence: What was observed.
+        simulate: Carries the trials out anew.
+        numbers: (m,) draws of the robot's numbers from the posterior, by dotted name.
+        key: Of the random numbers.
+    """
+    m = len(next(iter(numbers.values())))
+    which = np.linspace(0, m - 1, N_PREDICTIVE).astype(int)
+    some = {name: value[which] for name, value in numbers.items()}
+    sums: dict[str, NDArray[np.float64]] = {}
+    for k, one in enumerate(evidence):
+        made = simulate(one, some, key + k)
+        mean, variance = made.mean(axis=0), made.var(axis=0, ddof=1)
+        expected = variance * (1 + 1 / len(made))
+        off = ((one.seen - mean) ** 2).astype(np.float64)
+        own = (made - mean) ** 2
+        for kind in np.unique(one.kinds):
+            at = one.kinds == kind
+            seen = one.seen[at].astype(np.float64)
+            row = np.array(
+                [
+                    off[at].sum(),
+                    expected[at].sum(),
+                    ((seen - seen.mean()) ** 2).sum(),
+                    *own[:, at].sum(axis=1),
+                ]
+            )
+            sums[str(kind)] = sums.get(str(kind), np.zeros(3 + len(made))) + row
+    found = []
+    for kind, (off_sum, expected_sum, total, *own_sums) in sums.items():
+        if kind in TOLERATED:
+            share = (off_sum - expected_sum) / max(total, 1e-12)
+            p = float(np.mean(np.array(own_sums) >= off_sum))
+            found.append(Misfit(kind, float(share), TOLERATED[kind], p))
+    return found

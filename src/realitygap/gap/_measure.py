@@ -149,7 +149,8 @@ class _Work:
             # all samples are alike; so many controllers could have come out so of a share a little off: Clopper &
             # Pearson (1934)
             off = 1 - ((1 - CONFIDENCE) / 2) ** (1 / self.n)
-            return Estimate(value, *((1 - off, 1.0) if value else (0.0, off)), self.n)
+            low, high = (1 - off, 1.0) if value else (0.0, off)
+            return Estimate(value, low, high, self.n)
         return self._estimate(value, bootstrap_mean(shares, self.n_resamples, self.rng))
 
     # --- order ----------------------------------------------------------------------------------------------

@@ -176,6 +176,8 @@ __all__ = [
     "sign_flip_p",
     "smallest_p",
     "strategy_table",
+    "summarize",
+    "summarize_tasks",
     "twin_table",
     "watch",
     "why_table",

@@ -99,6 +99,7 @@ class ClosingPlan:
 SMALL = ClosingPlan(
     families=("worn", "delayed"),
     twins=1,
+    first_seed=1,
     budgets=(0, 10),
     controllers=8,
     trials=4,

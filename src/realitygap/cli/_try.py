@@ -43,13 +43,12 @@ def try_genome(
 
     Example: realitygap try champion.json --on "scribbler:emulator://s2?fluke=2&speed=off&twin=worn-1.toml"
 
-    In Python: target.carry_out([TrialPlan(genome=Genome.load("champion.json"))], "cells")
+    In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
     """
     from realitygap.errors import did_you_mean
     from realitygap.evolution import Genome
-    from realitygap.records import OBSERVATIONS, ObservationsFile
-    from realitygap.study import observations_head
-    from realitygap.trials import TrialPlan
+    from realitygap.records import OBSERVATIONS
+    from realitygap.study import try_on
     from realitygap.world import load_arena
 
     from ._target import opened_target
@@ -58,17 +57,9 @@ def try_genome(
         raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
     controller = Genome.load(genome)
     with opened_target(on, load_arena(arena), witness=witness, seed=seed) as target:
-        file = None if out is None else ObservationsFile(out, observations_head(target, observe))
-        done = list(file.trials) if file is not None else []
-        if any(trial.genome != controller.to_json() for trial in done):
-            raise StudyError(f"{out} has trials of another controller. Name another file.")
-        numbers = [k for k in range(trials) if k not in {trial.number for trial in done}]
-        plans = [TrialPlan(genome=controller, steps=steps, number=k) for k in numbers]
-        tried = target.carry_out(
-            plans, observe, None if file is None else lambda _, trial: file.append(trial)
-        )
+        tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
         n_cells = target.arena.grid.n_cells
-        coverage = [len(trial.cells) / n_cells for trial in [*done, *tried]]
+        coverage = [len(trial.cells) / n_cells for trial in tried]
         if as_json:
             typer.echo(json.dumps({"target": target.name, "label": target.label, "coverage": coverage}))
             return

@@ -2,9 +2,9 @@
 
     uv run python docs/make_closing.py results/closing-the-gap
 
-Takes the results of `realitygap run closing-the-gap`, whole or as far as they are, and writes docs/data/closing/*.csv,
-the sentences of docs/data/closing/words.md, docs/data/closing/summary.json, and docs/images/closing/*.svg. Every number of
-the page comes from there. The study itself takes hours and is not run here.
+Takes the results of `realitygap run closing-the-gap`, whole or as far as they are, and writes into docs/data/closing
+tables, the sentences of words.md and summary.json, and into docs/images/closing the figures. Every number of the page
+comes from there. The study itself takes hours and is not run here.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ def sentences(summary: dict[str, Any]) -> str:
     )
     size = (
         f"{plan['twins']} twins of each of the families {', '.join(plan['families'])} (seeds from {plan['first_seed']} "
-        f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated by "
-        f"{', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with {plan['transfer_budget']} "
+        f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated "
+        f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with {plan['transfer_budget']} "
         f"trials, {plan['replicates']} replicates and {plan['fresh_trials']} fresh trials. {done}"
     )
     counted = (
-        f"{summary['n_counted']} of {len(summary['twins'])} twins differ from the simulator as it is by more than three "
-        f"standard errors, and count. Goals are judged at {summary['budget']} trials."
+        f"{summary['n_counted']} of {len(summary['twins'])} twins differ from the simulator as it is by more than "
+        f"three standard errors, and count. Goals are judged at {summary['budget']} trials."
     )
     met = [goal["name"] for goal in goals if goal["met"]]
     missed = [goal["name"] for goal in goals if goal["met"] is False]

@@ -59,7 +59,8 @@ def sentences(summary: dict[str, Any]) -> str:
     size = (
         f"{plan['twins']} twins of each of the families {', '.join(plan['families'])} (seeds from {plan['first_seed']} "
         f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated "
-        f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with {plan['transfer_budget']} "
+        f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with "
+        f"{plan['transfer_budget']} "
         f"trials, {plan['replicates']} replicates and {plan['fresh_trials']} fresh trials. {done}"
     )
     counted = (

@@ -60,13 +60,15 @@ def sentences(summary: dict[str, Any]) -> str:
         f"{plan['twins']} twins of each of the families {', '.join(plan['families'])} (seeds from {plan['first_seed']} "
         f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated "
         f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with "
-        f"{plan['transfer_budget']} "
-        f"trials, {plan['replicates']} replicates and {plan['fresh_trials']} fresh trials. {done}"
+        f"{plan['transfer_budget']} trials, {plan['replicates']} replicates and "
+        f"{plan['fresh_trials']} fresh trials. {done}"
     )
     counted = (
         f"{summary['n_counted']} of {len(summary['twins'])} twins differ from the simulator as it is by more than "
         f"three standard errors, and count. Goals are judged at {summary['budget']} trials."
     )
+    if (plan["twins"], len(plan["families"])) < (10, 4):
+        counted += " **This is less than the whole study: it shows that all of it works, and nothing else.**"
     met = [goal["name"] for goal in goals if goal["met"]]
     missed = [goal["name"] for goal in goals if goal["met"] is False]
     verdict = f"Met: {'; '.join(met) or NOTHING}.\n\nMissed: {'; '.join(missed) or NOTHING}."

@@ -231,7 +231,9 @@ class SimEnsemble:
         first = (play.genomes or (self._no_genome,))[0]
         scene = self._scene(paper_inputs(first.rules), given)
         networks = decode_all(play.genomes or (first,))
-        work = _Work(scene, self._own, play, first.rules, first.bias_value, networks, key, tuple(keep), same_noise)
+        work = _Work(
+            scene, self._own, play, first.rules, first.bias_value, networks, key, tuple(keep), same_noise
+        )
         size = max(1, CHUNK_BYTES // (work.bytes_of_trial * len(play.starts)))
         size = max(1, min(size, -(-m // self.threads)))
         chunks = [range(at, min(at + size, m)) for at in range(0, m, size)]

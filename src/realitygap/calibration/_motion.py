@@ -11,7 +11,7 @@ import numpy as np
 from realitygap.records import Observe, ObservedTrial
 from realitygap.world import Arena, Fitted, RobotModel
 
-from ._handles import MOTION, MOTION_NOISE, own_values, parameters_of, robot_numbers, values_at
+from ._handles import MOTION, MOTION_NOISE, Known, own_values, parameters_of, robot_numbers, values_at
 from ._identify import Identified, advice_for, identify_from
 from ._prior import Parameter
 from ._scatter import Scatter, scatter_parameters
@@ -144,7 +144,7 @@ def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method:
         for name in names
     )  # fmt: skip
     notes = (
-        "Cells, readings and stalls do not show where the robot was at each command: fit all parameters to whole trials.",
+        "Cells, readings and stalls do not show where it was at each command: fit all parameters to whole trials.",
     )
     return MotionFit(fitted, {}, {}, method, notes)
 

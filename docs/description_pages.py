@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from realitygap.drawing import Picture
+from realitygap.robots.twin import FAMILIES, TwinModel, family_rows, sample_twin, twin_picture
 from realitygap.settings import is_hidden
 from realitygap.world import (
     Arena,
@@ -47,14 +48,39 @@ def description_parts() -> dict[str, str]:
     parts = {
         "parts/robot-keys.md": keys_of(RobotModel, "robot"),
         "parts/arena-keys.md": keys_of(ArenaFile, "arena"),
+        "parts/twin-keys.md": keys_of(TwinModel, "twin"),
+        "parts/twin-families.md": twin_families(),
         "parts/distribution-keys.md": table_of(Distribution),
         "parts/robots.md": robots(),
         "parts/arenas.md": arenas(),
     }
+    parts["parts/twin.svg"] = twin_picture(sample_twin("odd-body", 2)).to_svg()
     parts["parts/yard.svg"] = picture_of(load_arena(_yard())).to_svg()
     parts |= {f"parts/robot-{name}.svg": model_picture(load_robot(name)).to_svg() for name in SHOWN_ROBOTS}
     parts |= {f"parts/arena-{name}.svg": picture_of(load_arena(name)).to_svg() for name in arena_names()}
     return parts
+
+
+def twin_families() -> str:
+    """What every twin draws, and what each family draws besides or instead."""
+    kinds = {"every": "what twins of all families but `same` draw, unless their family says otherwise"}
+    kinds |= {name: family.meaning for name, family in FAMILIES.items()}
+    parts = []
+    for name, meaning in kinds.items():
+        rows = [
+            f"| `{row.number}` | {value_of(row.low)} | {value_of(row.high)} | {row.part if row.part != name else ''} |"
+            for row in family_rows(name)
+        ]
+        table = ["| number | from | to | of |", "|---|---|---|---|", *rows] if rows else ["Nothing else."]
+        parts += [f"## {name}", meaning[:1].upper() + meaning[1:] + ".", "\n".join(table)]
+    return "\n\n".join(parts) + "\n"
+
+
+def value_of(value: bool | float | str) -> str:
+    """A value that a family draws."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, int | float) else f'`"{value}"`'
 
 
 def _yard() -> Path:

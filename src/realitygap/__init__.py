@@ -67,10 +67,12 @@ __all__ = [
 
 
 _PACKAGES = {
+    "calibration",
     "drawing",
     "emulator",
     "errors",
     "evolution",
+    "gap",
     "gym",
     "playback",
     "records",

@@ -61,6 +61,15 @@ def test_mistakes_are_one_message(words, said):
         twin(*words)
 
 
+def test_the_emulator_refuses_a_twin_that_it_cannot_move(tmp_path):
+    file = tmp_path / "same.toml"
+    twin("sample", "--family", "same", "-o", file)
+    for path, said in ((file, "engine 'sim'"), (tmp_path / "none.toml", "There is no twin file")):
+        done = CliRunner().invoke(app, ["emulate", "scribbler", "--twin", str(path)])
+        assert isinstance(done.exception, RealityGapError)
+        assert said in str(done.exception)
+
+
 def test_what_cannot_be_rendered_is_refused(tmp_path):
     file = tmp_path / "a.toml"
     twin("sample", "--family", "close", "-o", file)

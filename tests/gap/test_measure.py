@@ -103,3 +103,11 @@ def test_a_side_must_be_finite_and_whole():
         GapSide("sim", "SIM", np.array([[np.nan]]))
     with pytest.raises(ValueError, match="cells of sim"):
         GapSide("sim", "SIM", np.zeros((2, 3)), np.zeros((2, 2, 5), bool))
+
+
+def test_a_target_that_is_always_worse_leaves_a12_an_interval():
+    one, other = sides(c=5, noise=0.001)
+    found = measure_gap(one, GapSide("twin", "TWIN", other.values - 0.5)).a12
+    assert found.estimate == 0.0
+    assert found.low == 0.0
+    assert found.high == pytest.approx(1 - 0.025 ** (1 / 5))

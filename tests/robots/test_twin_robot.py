@@ -82,6 +82,15 @@ def test_a_trial_is_a_function_of_twin_arena_and_number():
         assert str(other) != str(first)
 
 
+@pytest.mark.parametrize("family", ["close", "same"])
+def test_the_number_of_a_trial_is_checked(family):
+    robot = open_twin(sample_twin(family, 1), paper_arena())
+    with pytest.raises(ValueError, match="-1"):
+        robot.number = -1
+    with pytest.raises(ValueError, match="-2"):
+        open_twin(sample_twin(family, 1), paper_arena(), number=-2)
+
+
 def test_looking_changes_nothing():
     blind, looking = (TwinRobot(sample_twin("noisy-ir", 1), paper_arena()) for _ in range(2))
     for _ in range(5):

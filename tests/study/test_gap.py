@@ -210,3 +210,18 @@ def test_why_needs_numbers_to_switch_and_noise_to_tell(some):
         why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 2))))
     with pytest.raises(StudyError, match="one trial"):
         why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 1))))
+
+
+@pytest.mark.long
+def test_a_slippery_twin_is_a_gap_and_one_of_the_family_same_is_none(tmp_path):
+    pytest.importorskip("mujoco", reason="twins need the extra twin")
+    from realitygap.robots.twin import sample_twin
+
+    found = {}
+    for family in ("slippery", "same"):
+        file = tmp_path / f"{family}.toml"
+        file.write_text(sample_twin(family, 1).to_toml(), "utf-8")
+        found[family] = gap_between("sim", f"twin:{file}", n_controllers=8, trials=4).study.result
+    assert found["slippery"].labels == ("SIM", "TWIN")
+    assert found["slippery"].excludes_no_gap
+    assert not found["same"].excludes_no_gap

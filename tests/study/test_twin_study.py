@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +160,40 @@ def test_a_platform_without_a_file_is_no_twin() -> None:
     assert TwinPlatform().label == "TWIN"
     with pytest.raises(ValueError, match="sha256"):
         TwinPlatform(sha256="short")
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for child processes in /proc")
+def test_ctrl_c_ends_a_study_on_a_twin_in_the_middle_of_a_run(file: Path, tmp_path: Path) -> None:
+    text = f"""
+    [study]
+    name = "long"
+    replicates = 1
+    [platform.twin]
+    steps = 20_000
+    [[condition]]
+    name = "same"
+    platform = "twin:{file}"
+    """
+    (tmp_path / "long.toml").write_text(text)
+    command = [sys.executable, "-m", "realitygap", "run", "long.toml", "--out", "r", "--threads", "1"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        children: list[int] = []
+        until = time.monotonic() + 120
+        while not children and time.monotonic() < until:
+            time.sleep(0.2)
+            found = Path(f"/proc/{process.pid}/task").glob("*/children")
+            pids = [int(pid) for listed in found for pid in listed.read_text().split()]
+            children = [pid for pid in pids if "twin_worker" in Path(f"/proc/{pid}/cmdline").read_text()]
+        time.sleep(5)  # the twin is up, and at work
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        _, said = process.communicate(timeout=60)
+        assert time.monotonic() - began < 30
+    assert children
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    for pid in children:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)

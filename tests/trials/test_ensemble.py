@@ -88,3 +88,15 @@ def test_sets_that_do_not_fit_are_refused(ensemble):
         ensemble.replay([START], np.ones((1, 5, 2)), {"drive.track": [-0.1]}, 1)
     with pytest.raises(ValueError, match="commands has shape"):
         ensemble.replay([START] * 2, np.ones((1, 5, 2)), {}, 1)
+
+
+def test_numbers_that_no_set_names_are_the_robots_whatever_ranges_are_given() -> None:
+    wide = {"drive.gain_left": (0.5, 1.5), "drive.track": (0.1, 0.2), "contact.friction": (0.0, 1.0)}
+    starts, commands = np.array([[0.5, 0.3, 0.0]]), np.tile([0.5, 0.3], (1, 8, 1))
+    plain, ranged = (
+        SimEnsemble(SimPlatform(noise=False), paper_arena(), ranges=ranges).replay(
+            starts, commands, {"drive.lag": np.array([0.1])}, 0
+        )
+        for ranges in (None, wide)
+    )
+    assert ranged.poses == pytest.approx(plain.poses, abs=1e-5)

@@ -181,7 +181,7 @@ def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, F
 
 def _ridge(design: Floats, wanted: Floats) -> Floats:
     gram = design.T @ design
-    return np.linalg.solve(gram + 1e-3 * np.diag(np.diag(gram) + 1e-9), design.T @ wanted)
+    return np.asarray(np.linalg.solve(gram + 1e-3 * np.diag(np.diag(gram) + 1e-9), design.T @ wanted))
 
 
 def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:

@@ -230,7 +230,8 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
 def _blocks(values: NDArray[np.floating]) -> NDArray[np.floating]:
     m, k, t = values.shape[:3]
     whole = t - t % BLOCK
-    return values[:, :, :whole].reshape(m, k, whole // BLOCK, BLOCK, *values.shape[3:]).mean(axis=3)
+    parts = values[:, :, :whole].reshape(m, k, whole // BLOCK, BLOCK, *values.shape[3:])
+    return np.asarray(parts.mean(axis=3))
 
 
 def _wheels(rehearsal: Rehearsal) -> _Columns:

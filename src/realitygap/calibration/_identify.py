@@ -16,7 +16,7 @@ from ._simulate import Floats
 TELLS = 0.5  # of the prior's interval: a posterior wider than this is said not to be identified
 LEARNED = 20.0  # times the prior's precision: a parameter that would be known if the others were
 UNLEARNED = 6.0  # times the prior's precision along a direction: below it that direction is not known
-TOGETHER = 0.25  # share of a direction from which on a parameter belongs to it
+TOGETHER = 0.1  # share of a direction from which on a parameter belongs to it
 PRIOR_PRECISION = 12.0  # of an even prior over 0..1
 
 

@@ -94,7 +94,7 @@ def misfits(
     found = []
     for kind, (off_sum, expected_sum, total, *own_sums) in sums.items():
         if kind in TOLERATED:
-            share = (off_sum - expected_sum) / max(total, 1e-12)
+            share = (off_sum - expected_sum) / total
             p = float(np.mean(np.array(own_sums) >= off_sum))
             found.append(Misfit(kind, float(share), TOLERATED[kind], p))
     return found

@@ -22,6 +22,7 @@ from ._simulate import simulate
 from ._study import new_study, run
 from ._transfer import transfer
 from ._trials import trials
+from ._try import try_genome
 from ._twin import twin
 
 app = typer.Typer(
@@ -70,3 +71,4 @@ app.command("trials")(trials)
 app.command("gap")(gap)
 app.command("plan")(plan)
 app.command("transfer")(transfer)
+app.command("try")(try_genome)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import typer
 
 from realitygap.trials import RobotsOwnSenses
+from realitygap.world import INCH
 
 from ._operator import pick_cells
 
@@ -59,3 +62,19 @@ class TerminalAttendant(RobotsOwnSenses):
             cells = pick_cells(self._arena)
             if cells is not None:
                 return tuple(cells)
+
+
+class PlacingAttendant(TerminalAttendant):
+    """Puts the robot at the start of each trial, too, and says so."""
+
+    def place(self, plan: TrialPlan, start: Pose) -> None:
+        """Asks for it, and waits."""
+        x, y, heading = start.x / INCH, start.y / INCH, math.degrees(start.heading)
+        typer.prompt(
+            f"Put the robot {x:.1f} in from the left and {y:.1f} in from the lower wall, its front {heading:.0f} "
+            "degrees counter-clockwise from the long wall, with a fresh sheet below. Enter",
+            default="",
+            show_default=False,
+            err=True,
+        )
+        super().place(plan, start)

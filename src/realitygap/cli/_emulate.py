@@ -91,6 +91,10 @@ def emulate(
     """
     if robot != "scribbler":
         raise RobotError(f"Unknown robot {robot!r}. Known: scribbler.")
+    if speed == 0 and witness is None:
+        raise RobotError(
+            "With --speed 0 a witness lets time pass. Add --witness PORT, or give another speed."
+        )
     if link is not None and tcp is not None:
         raise RobotError(
             "--link goes with a pseudo-terminal, and --tcp asks for a TCP port. Give one of them."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from realitygap.errors import StudyError
 if TYPE_CHECKING:
     from realitygap.gap import Estimate, GapResult, Why
     from realitygap.study import GapPlan
+    from realitygap.trials import Attendant
 
 
 class Seen(StrEnum):
@@ -116,6 +118,7 @@ def gap(
                 why=why,
                 processes=processes,
                 witness=witness,
+                attendant=_attendant(target, witness, arena),
                 seed=seed,
                 results=out,
                 tell=bar.show,
@@ -144,6 +147,19 @@ def gap(
     _print(result)
     if found.why is not None:
         _print_why(found.why)
+
+
+def _attendant(target: str, witness: str | None, arena: str) -> Attendant | None:
+    """Somebody at the terminal, where a robot has no witness and there is a terminal."""
+    from ._calibrate import _is_led
+
+    if not _is_led(target, witness) or not sys.stdin.isatty():
+        return None
+    from realitygap.world import load_arena
+
+    from ._calibrate_attendant import PlacingAttendant
+
+    return PlacingAttendant(load_arena(arena))
 
 
 _ROWS = (

@@ -59,6 +59,9 @@ def transfer(
     processes: Annotated[
         int | None, typer.Option(min=1, help="Of a twin: trials at once. [default: all processors]")
     ] = None,
+    witness: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulator in another program.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Evolve in simulation, spend a few trials on a target, and see which strategy makes the most of them.
@@ -77,14 +80,16 @@ def transfer(
 
     In Python: realitygap.study.transfer("sim-paper", target, "all", 20, out="results/transfer")
     """
-    from realitygap.study import choose_condition, open_target, strategy_names
+    from realitygap.study import choose_condition, strategy_names
     from realitygap.study import transfer as carry_out
+
+    from ._target import opened_target
 
     names = strategy_names(strategy or "all")
     arena = choose_condition(study, condition, seed).arena.arena()
     folder = out or Path("results/transfer")
     try:
-        with open_target(to, arena, processes=processes) as target:
+        with opened_target(to, arena, witness=witness, processes=processes) as target:
             result = carry_out(
                 study,
                 target,

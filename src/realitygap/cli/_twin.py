@@ -33,7 +33,7 @@ def families(
 
     Example: realitygap twin families worn
 
-    In Python: realitygap.robots.twin.FAMILIES
+    In Python: realitygap.robots.twin.family_rows("worn")
     """
     from realitygap.robots.twin import FAMILIES, family_rows
 

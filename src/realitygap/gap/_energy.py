@@ -14,7 +14,7 @@ ALPHA = 0.05
 
 
 def energy_distances(source: Values, target: Values) -> Values:
-    """(c,) energy distance between both sides of each controller: 2 E|X - Y| - E|X - X'| - E|Y - Y'|.
+    """(c,) energy distance between both sides of each controller: `2 E|X - Y| - E|X - X'| - E|Y - Y'|`.
 
     Args:
         source: (c, r, d) behaviors, such as visited cells as 0 and 1: then distances are roots of the number of

@@ -21,7 +21,8 @@ class Equivalence:
 
     Attributes:
         difference: Mean difference.
-        low, high: Its interval of 90 %, which lies within the margin where equivalence is shown.
+        low: Lower end of its interval of 90 %, which lies within the margin where equivalence is shown.
+        high: Upper end.
         p: The larger of both p; nan without a margin.
         equivalent: Whether it is shown; None without a margin.
         power: How often so many controllers show it where there is no difference; nan without a margin.

@@ -12,7 +12,7 @@ from ._bootstrap import SMALLEST_N, bootstrap, bootstrap_mean, interval
 from ._correlation import reliability, spearman, trials_for_reliability
 from ._energy import ALPHA, energy_distances, energy_test, smallest_energy_p
 from ._equivalence import POWER, prove_equivalence
-from ._estimate import Estimate
+from ._estimate import CONFIDENCE, Estimate
 from ._level import mean_difference, rms_of, shares_above, square_differences
 from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor
 from ._result import GapResult
@@ -144,7 +144,14 @@ class _Work:
 
     def a12(self) -> Estimate:
         shares = shares_above(self.source.values, self.target.values)
-        return self._estimate(float(shares.mean()), bootstrap_mean(shares, self.n_resamples, self.rng))
+        value = float(shares.mean())
+        if self.n >= SMALLEST_N and value in (0.0, 1.0):
+            # all samples are alike; so many controllers could have come out so of a share a little off: Clopper &
+            # Pearson (1934)
+            off = 1 - ((1 - CONFIDENCE) / 2) ** (1 / self.n)
+            low, high = (1 - off, 1.0) if value else (0.0, off)
+            return Estimate(value, low, high, self.n)
+        return self._estimate(value, bootstrap_mean(shares, self.n_resamples, self.rng))
 
     # --- order ----------------------------------------------------------------------------------------------
 

@@ -28,7 +28,8 @@ class Needed:
         trials: Of each controller on each platform.
         controllers: None where 100,000 would not do.
         power: How often simulated studies of this size find it.
-        low, high: Its interval of 95 %.
+        low: Lower end of its interval of 95 %.
+        high: Upper end.
     """
 
     trials: int

@@ -11,7 +11,7 @@ from ._side import Values
 def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
     """(b,) mean over controllers of the largest difference on the target to one that the simulator orders otherwise.
 
-    For each controller i the largest |target_i - target_j| over all j with (source_i < source_j) differing from
+    For each controller i the largest `|target_i - target_j|` over all j with (source_i < source_j) differing from
     (target_i < target_j); 0 where the simulator orders all as the target does. It is in the unit of the *target's*
     quality, so the order of arguments matters.
 

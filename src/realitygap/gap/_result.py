@@ -22,7 +22,8 @@ class GapResult:
     Differences are target less simulator: below 0 where the target does worse than the simulator says.
 
     Attributes:
-        source, target: Names of the simulator and of the target.
+        source: Name of the simulator.
+        target: Name of the target.
         labels: Of both: SIM, TWIN, EMULATED or REAL.
         trials: Of each controller on both.
         rms: Root mean square over controllers of the difference of means, the variance of noise taken out.

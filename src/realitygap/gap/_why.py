@@ -43,21 +43,23 @@ class Why:
     @property
     def advice(self) -> str:
         """What to change next, in a sentence or two."""
-        shown = [k for k in self.order if (self.falls[k].low or 0.0) > 0]
         left = (
             f" What is left with the whole fit, {self.after} RMS, lies outside these numbers."
             if (self.after.low or 0.0) > 0
             else " With the whole fit no gap is shown."
         )
-        if not shown:
-            return (
-                "Change this next: nothing that was fitted; no part is shown to carry any of the gap. More trials or "
-                f"controllers would show smaller parts.{left}"
-            )
-        first = shown[0]
+        first = self.order[0]
+        fall = self.falls[first]
+        if (fall.estimate or 0.0) <= 0:
+            return f"Change this next: nothing that was fitted, which makes the gap no smaller.{left}"
+        sure = (
+            ""
+            if (fall.low or 0.0) > 0
+            else "; that is not shown to be more than chance, more controllers would"
+        )
         return (
-            f"Change this next: {self.parts[first]}, which carries {self.falls[first]} of the RMS gap of "
-            f"{self.before.estimate:.3f}.{left}"
+            f"Change this next: {self.parts[first]}, which carries most, {fall} of the RMS gap of "
+            f"{self.before.estimate:.3f}{sure}.{left}"
         )
 
     def to_dict(self) -> dict[str, Any]:

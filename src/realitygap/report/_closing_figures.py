@@ -74,7 +74,7 @@ def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") 
         for observe in summary["plan"]["observations"]:
             _budget_lines(axes, summary, family, observe)
         axes.set_xlabel("trials for calibrating", labelpad=2)
-        _title(axes, family, f"{len(_of(summary, family))} twins")
+        _title(axes, family, _twins(len(_of(summary, family))))
 
     with house_style():
         figure, panels = _panels(width, len(families), 1.9)
@@ -138,12 +138,12 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
             axes.set_ylim(0, 1)
             draw_line(axes, [0, 1], [0, 1], color=Ink.MUTED, linewidth=0.7)
             draw_line(
-                axes, xs, ys, linestyle="none", marker="o", markersize=2.0, markeredgewidth=0,
+                axes, xs, ys, linestyle="none", marker="o", markersize=3.0, markeredgewidth=0,
                 color=COLORS.get(kind, Ink.PEN3), alpha=0.45,
             )  # fmt: skip
             axes.set_xlabel("coverage, SIM", labelpad=2)
             title = "as it is" if kind == "none" else f"calibrated, {kind}"
-            _title(axes, title, f"{len(xs)} points, {len(means)} twins")
+            _title(axes, title, f"{len(xs)} points, {_twins(len(means))}")
         panels[0].set_ylabel("coverage, TWIN", labelpad=3)
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
@@ -182,14 +182,14 @@ def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strat
             color = Ink.OURS if row["strategy"].startswith("posterior") else Ink.RUN
             spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values[row["strategy"]]))
             draw_line(
-                axes, values[row["strategy"]], place + spread, linestyle="none", marker="o", markersize=2.2,
+                axes, values[row["strategy"]], place + spread, linestyle="none", marker="o", markersize=3.0,
                 markeredgewidth=0, color=color, alpha=0.45,
             )  # fmt: skip
             if row["low"] is not None:
                 draw_line(axes, [row["low"], row["high"]], [place, place], color=color, linewidth=2.0)
             draw_line(axes, [row["estimate"]], [place], color=color, marker="o", markersize=6)
         axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
-        _title(axes, "Transfer by strategy", f"{max(row['n'] for row in rows)} twins")
+        _title(axes, "Transfer by strategy", _twins(max(row["n"] for row in rows)))
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
@@ -228,7 +228,7 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
                     color = COLORS.get(kind, Ink.PEN3)
                     spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values))
                     draw_line(
-                        axes, values, place + spread, linestyle="none", marker="o", markersize=2.4,
+                        axes, values, place + spread, linestyle="none", marker="o", markersize=3.0,
                         markeredgewidth=0, color=color, alpha=0.5,
                     )  # fmt: skip
                     middle = float(np.median(values))
@@ -247,6 +247,10 @@ def _of(summary: Summary, family: str) -> list[Summary]:
     return [
         twin for twin in summary["twins"] if twin["family"] == family and twin["rms"]["estimate"] is not None
     ]
+
+
+def _twins(n: int) -> str:
+    return "1 twin" if n == 1 else f"{n} twins"
 
 
 def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, Summary]]:

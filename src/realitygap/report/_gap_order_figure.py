@@ -36,8 +36,8 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     order = _order_in_words(gap)
     caption = (
         f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
-        f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. On "
-        f"the line there is no gap. {order}"
+        f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. "
+        f"On the line there is no gap. {order}"
     )
     alt = f"Scatter of {source.n} controllers: coverage on {source.name} against coverage on {target.name}. {order}"
     with house_style():

@@ -1,6 +1,6 @@
 """Platforms, whatever can try a controller, and the contract of a robot."""
 
-from . import scribbler
+from . import scribbler, twin
 from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
 from ._jyro import STEP_S, JyroPlatform
@@ -34,4 +34,5 @@ __all__ = [
     "hash_elsewhere",
     "read_recording",
     "scribbler",
+    "twin",
 ]

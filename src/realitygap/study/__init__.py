@@ -25,6 +25,7 @@ from ._template import study_template
 from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
+from ._try_on import try_on
 from ._why import PARTS, calibration_of, part_of, why_gap
 from ._wrapped_targets import Guide, StoppedByPerson
 
@@ -94,6 +95,7 @@ __all__ = [
     "summarize_closing",
     "task_settings",
     "transfer",
+    "try_on",
     "usable_processors",
     "why_gap",
 ]

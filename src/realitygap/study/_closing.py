@@ -15,6 +15,7 @@ from realitygap.errors import RobotError, from_extra, whole_number
 from realitygap.records import write_whole
 from realitygap.trials import Target, TwinTarget
 
+from ._calibrate_all import calibrate_all
 from ._closing_plan import STUDY, ClosingPlan, TwinName, adopt_plan
 from ._closing_summary import summarize_closing
 from ._closing_twin import ClosingTwin
@@ -115,8 +116,6 @@ def _carry_out(
     plan: ClosingPlan, name: TwinName, folder: Path, show: Callable[[], None] | None = None
 ) -> None:
     """One twin, in this process; the twin itself is in another."""
-    from ._calibrate_all import calibrate_all
-
     arena = choose_condition(STUDY, None, plan.seed).arena.arena()
 
     def open_twin(file: Path) -> Target:

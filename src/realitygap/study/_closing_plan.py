@@ -43,7 +43,8 @@ class ClosingPlan:
         observations: What is seen of these trials.
         controllers: Held out: half of them random, half champions of runs of their own.
         trials: Of each of them, in simulation and on the twin.
-        transfer_budget: Trials on the twin for each strategy of transfer; a calibration by as many.
+        transfer_budget: Trials on the twin for each strategy of transfer; half of them calibrate for `posterior`, which
+            chooses by the others.
         replicates: Of each transfer, with evolution of their own.
         fresh_trials: By which what a strategy chose is judged.
         runs: Evolutions in simulation of each replicate.
@@ -98,10 +99,11 @@ class ClosingPlan:
 SMALL = ClosingPlan(
     families=("worn", "delayed"),
     twins=1,
+    first_seed=1,
     budgets=(0, 10),
     controllers=8,
     trials=4,
-    transfer_budget=10,
+    transfer_budget=20,
     replicates=1,
     fresh_trials=4,
     runs=20,

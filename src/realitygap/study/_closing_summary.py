@@ -25,6 +25,9 @@ FALLS = {"track": 0.6, "cells": 0.4}
 STRETCH = 0.8
 """The same with `track`, where all goes well."""
 
+NEAR_END = 0.05
+"""Of a prior's width: what is nearer to an end of it lies at that end."""
+
 LEAST_SRCC = 0.95
 MOST_MMRV = 2.0
 LEAST_OVER_DIRECT = 0.8
@@ -139,10 +142,10 @@ def _calibrated(unit: Row, before: Row) -> Row:
 
 
 def _is_at_end(fitted: Row) -> bool:
-    """Whether a parameter is told and lies at an end of what was thought possible: it wants to go on."""
-    width = fitted["prior_high"] - fitted["prior_low"]
-    near = min(fitted["estimate"] - fitted["prior_low"], fitted["prior_high"] - fitted["estimate"])
-    return bool(fitted["identified"] and near < 0.05 * width)
+    """Whether a parameter is told and lies at an end of what was thought possible that is not 0: it wants to go on."""
+    low, high = fitted["prior_low"], fitted["prior_high"]
+    ways = [abs(fitted["estimate"] - end) for end in (low, high) if end != 0]
+    return bool(fitted["identified"] and min(ways) < NEAR_END * (high - low))
 
 
 def _measures(unit: Row) -> Row:

@@ -22,7 +22,7 @@ from realitygap.world import Calibration, load_calibration
 from ._closing_plan import CONTROLLERS_SEED, STUDY, ClosingPlan, TwinName
 from ._transfer import choose_condition, transfer
 from ._transfer_attempt import plans_of
-from ._transfer_calibrated import fitted_condition
+from ._transfer_calibrated import SELECTING, fitted_condition
 from ._transfer_simulated import crossed_cells, evolve_champions, try_repeatedly
 from ._transfer_target import KeptTarget
 
@@ -163,12 +163,13 @@ class ClosingTwin:
     # --- transfer -------------------------------------------------------------------------------------------
 
     def _transfer(self, target: Target) -> dict[str, Any]:
-        """Each strategy at equal budget; `posterior` for each way to observe."""
+        """Each strategy at equal budget; `posterior` for each way to observe, calibrated by its share of the budget."""
         budget = self.plan.transfer_budget
         rows = self._strategies(target, "any", STRATEGIES, None)
         for observe in self.plan.observations:
-            self._calibration(target, observe, budget)
-            file = self.folder / "calibrations" / f"{self.name}-{observe}-{budget}.toml"
+            calibrating = budget - budget // SELECTING
+            self._calibration(target, observe, calibrating)
+            file = self.folder / "calibrations" / f"{self.name}-{observe}-{calibrating}.toml"
             (row,) = self._strategies(target, observe, ("posterior",), file)
             rows.append({**row, "strategy": f"posterior, {observe}"})
         return {"budget": budget, "label": target.label, "strategies": rows}

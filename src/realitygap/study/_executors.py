@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
@@ -10,6 +9,9 @@ from typing import Any, Protocol
 
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
+from realitygap.trials import close_twins, usable_processors
+
+__all__ = ["ChunkTask", "Executor", "Listener", "Threads", "usable_processors"]
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,5 @@ class Threads:
             except BaseException:
                 for future in under_way:
                     future.cancel()
+                close_twins()  # else a chunk would be carried out to its end
                 raise
-
-
-def usable_processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

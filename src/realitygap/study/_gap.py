@@ -55,10 +55,12 @@ class GapStudy:
 
     Attributes:
         result: All measures.
-        source, target: Trials of both sides.
+        source: Trials in simulation.
+        target: Trials on the target.
         controllers: Row k of both is of controller k.
         arena: Where.
-        source_trials, target_trials: Trial after trial of controller after controller.
+        source_trials: Trial after trial of controller after controller.
+        target_trials: Likewise.
         maps: Where trials go on both sides.
         replay: Open-loop replays; None where nobody saw the target's robot.
         observe: How much was seen of the target.

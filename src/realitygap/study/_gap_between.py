@@ -9,7 +9,7 @@ from pathlib import Path
 from realitygap.errors import StudyError
 from realitygap.gap import Why
 from realitygap.records import OBSERVATIONS, Observe
-from realitygap.trials import Target
+from realitygap.trials import Attendant, Target
 from realitygap.world import Arena, Calibration, load_arena
 
 from ._controllers import sample_controllers
@@ -51,6 +51,7 @@ def gap_between(
     why: bool = False,
     processes: int | None = None,
     witness: str | None = None,
+    attendant: Attendant | None = None,
     seed: int = 1,
     results: str | Path | None = None,
     tell: Tell | None = None,
@@ -72,6 +73,7 @@ def gap_between(
         why: Whether to find what each part of the model carries; the simulator has to be a calibration then.
         processes: Of a twin.
         witness: Of an emulated robot in another program: HOST:PORT.
+        attendant: Of a robot: who places it and says what it drew, where no witness does.
         seed: Of everything.
         results: A file where the target's trials are kept.
         tell: Called as trials are done.
@@ -97,8 +99,8 @@ def gap_between(
     chosen = sample_controllers(controllers, n_controllers, seed)
     there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
     with (
-        _open(sim, place, noise, 2 * seed, None, None) as source,
-        _open(target, place, noise, 2 * seed + 1, processes, witness) as costly,
+        _open(sim, place, noise, 2 * seed) as source,
+        _open(target, place, noise, 2 * seed + 1, processes, witness, attendant) as costly,
     ):
         _refuse_more_than_is_seen(costly, observe)
         found = study_gap(
@@ -123,15 +125,25 @@ def gap_between(
 
 
 def _misspecified(calibration: Calibration | None) -> bool | None:
-    """What the predictive check of a whole calibration said; only that one fits trials as wholes."""
-    return calibration.misspecified if calibration is not None and calibration.kind == "all" else None
+    """What the predictive check of a calibration said; that of a part can find fault, and acquits of nothing."""
+    if calibration is None:
+        return None
+    return calibration.misspecified if calibration.kind == "all" else calibration.misspecified or None
 
 
 def _open(
-    spec: str, arena: Arena, noise: float | None, key: int, processes: int | None, witness: str | None
+    spec: str,
+    arena: Arena,
+    noise: float | None,
+    key: int,
+    processes: int | None = None,
+    witness: str | None = None,
+    attendant: Attendant | None = None,
 ) -> Target:
     level = (PAPERS_NOISE if spec == "jyro" else 0.0) if noise is None else noise
-    return open_target(spec, arena, processes=processes, witness=witness, noise=level, key=key)
+    return open_target(
+        spec, arena, processes=processes, witness=witness, attendant=attendant, noise=level, key=key
+    )
 
 
 def _refuse_more_than_is_seen(target: Target, observe: Observe) -> None:

@@ -14,14 +14,16 @@ from realitygap.runs import Condition
 from realitygap.trials import Target
 from realitygap.world import Calibration, load_calibration
 
+from ._calibrate_all import calibrate_all
 from ._transfer_attempt import Attempt
 from ._transfer_noise import needs_sim
 from ._transfer_select import best_on_target
 from ._transfer_simulated import Champion
 from ._transfer_target import KeptTarget
 
-SELECTING = 5
-"""One trial in so many is kept for choosing among champions where calibrating is on the budget."""
+SELECTING = 2
+"""One trial in so many is kept for choosing among champions where calibrating is on the budget: a fit that is a little
+wrong costs less where its champions are tried, and one by half of the trials is hardly worse."""
 
 
 def calibrated(attempt: Attempt) -> Champion:
@@ -102,8 +104,6 @@ class Calibrating:
         path = self.folder / f"{name}.toml"
         if path.exists():
             return load_calibration(path)
-        from ._calibrate_all import calibrate_all
-
         self.tell(f"calibrating by {n} trials, {self.observe} observed")
         trials = self.folder / f"{name}.jsonl"
         with KeptTarget(self.target, trials, n, self.first_number, observe=self.observe) as kept:

@@ -19,6 +19,7 @@ from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
+from ._processors import usable_processors
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sim import SimTrials
@@ -31,6 +32,7 @@ from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
+from ._twin_trials import close_twins
 
 __all__ = [
     "PATH_PARTS",
@@ -73,6 +75,7 @@ __all__ = [
     "WitnessOperator",
     "carry_out_on_robot",
     "cell_at",
+    "close_twins",
     "counters_of",
     "drive_trial",
     "jyro_rules",
@@ -91,4 +94,5 @@ __all__ = [
     "trajectories_of",
     "trial_seed",
     "try_genomes",
+    "usable_processors",
 ]

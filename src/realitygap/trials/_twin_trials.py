@@ -127,6 +127,15 @@ def _number(key: int, counter: NDArray[np.uint32]) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")
 
 
+def close_twins() -> None:
+    """End the processes of all twins on which studies are carried out, whatever they are at."""
+    with _lock:
+        pools = list(_pools.values())
+        _last.clear()
+    for pool in pools:
+        pool.close()
+
+
 def _shared_pool(platform: TwinPlatform, arena: Arena) -> TwinPool:
     with _lock:
         name = (platform.file, platform.sha256, arena)

@@ -74,7 +74,7 @@ class TwinWheels(Settings):
         0.0758, description="Where the third support touches the floor, ahead of the pen [m]."
     )
     caster_friction: Annotated[float, Field(ge=0, le=2)] = Field(
-        0.02, description="Between it and the floor: mu; little, as it rolls."
+        0.0, description="Between it and the floor: mu; 0 where it rolls freely."
     )
     skid: Offset = Field(
         -0.065, description="What touches the floor where it tips to the other end, likewise [m]."

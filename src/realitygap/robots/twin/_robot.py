@@ -82,13 +82,22 @@ class TwinRobot:
                 "realitygap.trials.open_twin."
             )
         self.model, self.arena = model, arena
-        self.number = whole_number("number", number, 0)
+        self.number = number
         self.step_s = model.step_s
         self.n_sensors = len(model.ir.mount)
         self.clock = TwinClock(self.wait)
         self._physics = Physics(model, arena)
         self._is_open = True
         self.reset()
+
+    @property
+    def number(self) -> int:
+        """Of the trial that the next `reset` begins."""
+        return self._number
+
+    @number.setter
+    def number(self, number: int) -> None:
+        self._number = whole_number("number", number, 0, 2**63 - 1)
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin trial `number` at a pose, or at the arena's start; the heading is that of the body's x."""

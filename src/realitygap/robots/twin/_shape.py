@@ -88,7 +88,8 @@ def _chassis(model: TwinModel) -> Iterator[str]:
     for x, lift, friction in ((wheels.caster, 0.0, wheels.caster_friction), (wheels.skid, TIPS, 0.1)):
         yield (
             f'<geom type="sphere" size="{SUPPORT}" pos="{_row(x, 0, floor + SUPPORT + lift)}" group="{ROBOT}" '
-            f'conaffinity="1" mass="0" priority="1" friction="{friction} .0001 .0001" rgba=".3 .3 .3 1"/>'
+            f'condim="{3 if friction else 1}" conaffinity="1" mass="0" priority="1" '
+            f'friction="{friction} .0001 .0001" rgba=".3 .3 .3 1"/>'
         )
 
 

@@ -1,0 +1,135 @@
+"""The study of many twins: tables, figures and sentences of the page "Closing the gap".
+
+    uv run python docs/make_closing.py results/closing-the-gap
+
+Takes the results of `realitygap run closing-the-gap`, whole or as far as they are, and writes into docs/data/closing
+tables, the sentences of words.md and summary.json, and into docs/images/closing the figures. Every number of the page
+comes from there. The study itself takes hours and is not run here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from realitygap.report import (
+    FAMILY_HEAD,
+    GOAL_HEAD,
+    STRATEGY_HEAD,
+    TWIN_HEAD,
+    WHY_HEAD,
+    draw_closing,
+    family_table,
+    goal_table,
+    strategy_table,
+    twin_table,
+    why_table,
+)
+from realitygap.study import summarize_closing
+
+HERE = Path(__file__).parent
+TABLES = HERE / "data" / "closing"
+FIGURES = HERE / "images" / "closing"
+NOTHING = "none"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A CSV file with at least one row: a table of nothing says so."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(head)
+    listed = list(rows) or [[NOTHING, *[""] * (len(head) - 1)]]
+    writer.writerows(listed)
+    return file.getvalue()
+
+
+def sentences(summary: dict[str, Any]) -> str:
+    """What the page says in numbers, as paragraphs of Markdown."""
+    plan, goals = summary["plan"], summary["goals"]
+    done = (
+        f"All {summary['n_units']} parts of the study are done."
+        if summary["n_done"] == summary["n_units"]
+        else f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
+    )
+    size = (
+        f"{plan['twins']} twins of each of the families {', '.join(plan['families'])} (seeds from {plan['first_seed']} "
+        f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated "
+        f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with "
+        f"{plan['transfer_budget']} trials, {plan['replicates']} replicates and "
+        f"{plan['fresh_trials']} fresh trials. {done}"
+    )
+    counted = (
+        f"{summary['n_counted']} of {len(summary['twins'])} twins differ from the simulator as it is by more than "
+        f"three standard errors, and count. Goals are judged at {summary['budget']} trials."
+    )
+    if (plan["twins"], len(plan["families"])) < (10, 4):
+        counted += " **This is less than the whole study: it shows that all of it works, and nothing else.**"
+    met = [goal["name"] for goal in goals if goal["met"]]
+    missed = [goal["name"] for goal in goals if goal["met"] is False]
+    verdict = f"Met: {'; '.join(met) or NOTHING}.\n\nMissed: {'; '.join(missed) or NOTHING}."
+    return "\n\n".join([size, counted, verdict, *_reasons(summary)]) + "\n"
+
+
+def _reasons(summary: dict[str, Any]) -> list[str]:
+    """Of each goal of the gap that is missed: in which families, and what its calibrations say of themselves."""
+    found = []
+    for goal in summary["goals"]:
+        if goal["met"] is not False or not goal["why"]:
+            continue
+        twins = goal["why"]
+        families = sorted({each["family"] for each in twins})
+        text = f"*{goal['name']}* is missed by {len(twins)} of {goal['n']} twins ({', '.join(families)})"
+        checked = [each for each in twins if each.get("misspecification_p") is not None]
+        if checked:
+            flagged = sum(bool(each["misspecified"]) for each in checked)
+            ends = sorted({name for each in checked for name in each["at_prior_end"]})
+            text += (
+                f": the posterior predictive check flags {flagged} of {len(checked)}; at an end of what was thought "
+                f"possible lie {', '.join(f'`{name}`' for name in ends) or 'no parameters'}"
+            )
+        found.append(text + ".")
+    return found
+
+
+def slim(summary: dict[str, Any]) -> str:
+    """The summary as JSON, without what is only drawn."""
+    twins = [
+        {key: value for key, value in twin.items() if key not in ("means", "seconds")}
+        for twin in summary["twins"]
+    ]
+    for twin in twins:
+        twin["calibrated"] = [
+            {key: value for key, value in each.items() if key != "means"} for each in twin["calibrated"]
+        ]
+    return json.dumps({**summary, "twins": twins}, indent=1) + "\n"
+
+
+def main() -> None:
+    """Write all that the page takes."""
+    parser = argparse.ArgumentParser(description="Tables, figures and sentences of the study of many twins.")
+    parser.add_argument("folder", type=Path, help="results of `realitygap run closing-the-gap`")
+    summary = summarize_closing(parser.parse_args().folder)
+    TABLES.mkdir(parents=True, exist_ok=True)
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    texts = {
+        TABLES / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
+        TABLES / "families.csv": table(FAMILY_HEAD, family_table(summary)),
+        TABLES / "strategies.csv": table(STRATEGY_HEAD, strategy_table(summary)),
+        TABLES / "twins.csv": table(TWIN_HEAD, twin_table(summary)),
+        TABLES / "why.csv": table(WHY_HEAD, why_table(summary)),
+        TABLES / "words.md": sentences(summary),
+        TABLES / "summary.json": slim(summary),
+    }
+    texts |= {FIGURES / f"{name}.svg": drawing.svg + "\n" for name, drawing in draw_closing(summary).items()}
+    for path, text in texts.items():
+        path.write_text(text, "utf-8")
+        print(f"Written: {path}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""`realitygap try`: a genome from a file, driven on any platform."""
+
+from __future__ import annotations
+
+import json
+import statistics
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from realitygap.errors import StudyError
+
+
+def try_genome(
+    genome: Annotated[
+        Path, typer.Argument(metavar="GENOME", help="A file of realitygap export or transfer.")
+    ],
+    on: Annotated[
+        str,
+        typer.Option("--on", metavar="PLATFORM", help="jyro, sim, sim:FILE, twin:FILE or scribbler:PORT."),
+    ],
+    trials: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 1,
+    steps: Annotated[int, typer.Option(min=1, help="Commands in each.")] = 100,
+    observe: Annotated[str, typer.Option(help="What is seen of them: cells, encoders or track.")] = "cells",
+    arena: Annotated[str, typer.Option(metavar="NAME", help="Name or file of an arena.")] = "paper",
+    witness: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulator in another program.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of a simulator's noise.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", metavar="FILE", help="Keep the trials, one a line, as they come."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the coverage as JSON.")] = False,
+) -> None:
+    """Drive the controller of a genome's file on a platform, and say how much of the arena it covers.
+
+    What evolved anywhere drives anywhere: in simulation, on a twin, and over the wire on a robot or an emulated one.
+    With -o, trials that are in the file already are not driven again.
+
+    Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
+
+    Example: realitygap try champion.json --on "scribbler:emulator://s2?fluke=2&speed=off&twin=worn-1.toml"
+
+    In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
+    """
+    from realitygap.errors import did_you_mean
+    from realitygap.evolution import Genome
+    from realitygap.records import OBSERVATIONS
+    from realitygap.study import try_on
+    from realitygap.world import load_arena
+
+    from ._target import opened_target
+
+    if observe not in OBSERVATIONS:
+        raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
+    controller = Genome.load(genome)
+    with opened_target(on, load_arena(arena), witness=witness, seed=seed) as target:
+        tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
+        n_cells = target.arena.grid.n_cells
+        coverage = [len(trial.cells) / n_cells for trial in tried]
+        if as_json:
+            typer.echo(json.dumps({"target": target.name, "label": target.label, "coverage": coverage}))
+            return
+        mean = statistics.fmean(coverage)
+        typer.echo(
+            f"{target.name} ({target.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
+            f"{mean:.3f} of {n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"
+        )

@@ -1,0 +1,45 @@
+"""One controller on a target, again and again; its trials can be kept as they come."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from realitygap.errors import RecordError
+from realitygap.evolution import Genome
+from realitygap.records import ObservationsFile, Observe, ObservedTrial
+from realitygap.trials import Target, TrialPlan
+
+from ._targets import observations_head
+
+
+def try_on(
+    target: Target,
+    genome: Genome,
+    *,
+    trials: int = 1,
+    steps: int = 100,
+    observe: Observe = "cells",
+    out: str | Path | None = None,
+) -> list[ObservedTrial]:
+    """Drive a controller on a target.
+
+    Args:
+        target: Where.
+        genome: The controller.
+        trials: How many; trial k has the number k.
+        steps: Commands in each.
+        observe: How much is seen of them.
+        out: A file for the trials, as they come; those that are in it are not driven again.
+
+    Raises:
+        RecordError: The file is of another controller or target, or cannot be written.
+        RobotError: The robot failed; what is in the file is safe.
+    """
+    file = None if out is None else ObservationsFile(out, observations_head(target, observe))
+    done = {} if file is None else {trial.number: trial for trial in file.trials}
+    if any(trial.genome != genome.to_json() for trial in done.values()):
+        raise RecordError(f"{out} has trials of another controller. Name another file.")
+    missing = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials) if k not in done]
+    keep = None if file is None else lambda _, trial: file.append(trial)
+    done |= {trial.number: trial for trial in target.carry_out(missing, observe, keep)}
+    return [done[k] for k in range(trials)]

@@ -1,0 +1,90 @@
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.errors import RealityGapError, RecordError, StudyError
+
+SMALL = ["--budget", "3", "--runs", "4", "--repeats", "1", "--fresh-trials", "2"]
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, [str(each) for each in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    out = tmp_path_factory.mktemp("transfer") / "travels"
+    result = run("transfer", "sim-paper", "--to", "jyro", "--strategy", "select", *SMALL, "-o", out)
+    assert "sim-paper, coverage-sim: from simulation (SIM) to jyro (SIM)" in result.output
+    assert "--replicates says more of a strategy" in result.output
+    return out
+
+
+def test_json_is_the_result_in_the_folder(folder):
+    arguments = [
+        "transfer",
+        "sim-paper",
+        "--to",
+        "jyro",
+        "--strategy",
+        "select",
+        *SMALL,
+        "-o",
+        folder,
+        "--json",
+    ]
+    found = json.loads(run(*arguments).stdout)
+    assert found == json.loads((folder / "result.json").read_text())
+    (row,) = found["strategies"]
+    assert set(row["quality"]) == set(row["regret"]) == {"estimate", "low", "high", "n"}
+
+
+def test_a_champion_travels_over_the_wire_and_back(folder, tmp_path):
+    champion = folder / "champions" / "select-3-0.json"
+    kept = tmp_path / "wire.jsonl"
+    wire = ["try", champion, "--on", "scribbler:emulator://s2?fluke=2&speed=off", "--steps", "20"]
+    first = json.loads(run(*wire, "--json", "-o", kept).stdout)
+    assert first["label"] == "EMULATED"
+    assert len(first["coverage"]) == 1
+    again = json.loads(run(*wire, "--json", "-o", kept).stdout)  # nothing is driven
+    assert again == first
+    back = json.loads(run("try", champion, "--on", "sim", "--steps", "20", "--json").stdout)
+    assert back["label"] == "SIM"
+    # the emulated robot is `sim` behind the wire: 20 commands end nearly where they do in simulation
+    assert back["coverage"][0] == pytest.approx(first["coverage"][0], abs=3 / 72)
+
+
+def test_mistakes_are_said_in_words(folder, tmp_path):
+    champion = folder / "champions" / "select-3-0.json"
+    with pytest.raises(StudyError, match="Did you mean 'plain'"):
+        run("transfer", "sim-paper", "--to", "jyro", "--strategy", "plane", "-o", tmp_path)
+    with pytest.raises(StudyError, match="is no platform for trials"):
+        run("try", champion, "--on", "simm")
+    with pytest.raises(RealityGapError, match="Could not read"):
+        run("try", tmp_path / "none.json", "--on", "sim")
+    with pytest.raises(RecordError, match="belongs to another transfer"):
+        run("transfer", "sim-paper", "--to", "sim", "--strategy", "select", *SMALL, "-o", folder)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["paper", "--twins", "3"], "Of no meaning for the study 'paper': --twins"),
+        (
+            ["closing-the-gap", "--replicates", "3"],
+            "Of no meaning for the study 'closing-the-gap': --replicates",
+        ),
+        (["closing-the-gap", "--families", "warn"], "unknown 'warn'. Did you mean 'worn'"),
+        (["closing-the-gap", "--budgets", "ten"], "expected numbers of trials, such as 0,10,20,40"),
+        (["closing-the-gap", "--observe", "all"], "unknown 'all'"),
+    ],
+)
+def test_options_of_closing_the_gap_are_checked_before_anything_is_run(arguments, text, tmp_path):
+    with pytest.raises(StudyError, match=text):
+        run("run", *arguments, "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,42 @@
+"""What parts of the model carry, and what to change next."""
+
+import numpy as np
+import pytest
+
+from realitygap.gap import Estimate, Why, explain_gap
+
+
+def squares(falls, noise=0.0, c=12, draws=3):
+    """(d, 4, c) of two parts that take so much of a gap of 0.3 each."""
+    rng = np.random.default_rng(1)
+    rms = 0.3 - np.array([falls[0] * (k & 1) + falls[1] * (k >> 1) for k in range(4)])
+    return np.maximum(rms[None, :, None] + noise * rng.normal(size=(draws, 1, c)), 0) ** 2
+
+
+def test_parts_carry_what_they_take_and_add_up():
+    found = explain_gap(squares((0.2, 0.05)), ("motor", "body"), (3, 1))
+    assert [each.estimate for each in found.falls] == pytest.approx([0.2, 0.05])
+    assert found.before.estimate == pytest.approx(0.3)
+    assert found.after.estimate == pytest.approx(0.05)
+    assert found.order == [0, 1]
+    assert found.advice.startswith("Change this next: motor, which carries most, 0.200 [0.200, 0.200]")
+    assert "lies outside these numbers" in found.advice
+    assert found.to_dict()["parts"]["motor"]["numbers"] == 3
+
+
+def test_draws_from_the_posterior_widen_the_intervals():
+    spread = squares((0.1, 0.0))
+    spread[1:, 1] = np.array([0.15, 0.25])[:, None] ** 2
+    low, high = (
+        getattr(explain_gap(spread, ("motor", "body"), (1, 1)).falls[0], end) for end in ("low", "high")
+    )
+    assert high - low > 0.05
+
+
+def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_advised():
+    unsure = Estimate(0.02, -0.01, 0.05, 9)
+    whole, none = Estimate(0.1, 0.05, 0.2, 9), Estimate(0.0, 0.0, 0.01, 9)
+    assert "not shown to be more than chance" in Why(("motor",), (unsure,), (1,), whole, none).advice
+    harm = Estimate(-0.02, -0.03, -0.01, 9)
+    advice = Why(("motor",), (harm,), (1,), whole, whole).advice
+    assert advice.startswith("Change this next: nothing that was fitted")

@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from realitygap.calibration import (
+    evidence_of,
+    fit_all,
+    numbers_of,
+    ranges_of,
+    scribbler_prior,
+    values_of,
+)
+from realitygap.evolution import Genome
+from realitygap.robots import SimPlatform
+from realitygap.study import calibrate_all
+from realitygap.study._calibrate_all import all_plans
+from realitygap.trials import SimEnsemble, SimTarget
+from realitygap.world import paper_arena
+
+ARENA = paper_arena()
+
+
+def test_without_trials_a_robot_stays_as_its_file_has_it():
+    calibration = calibrate_all(SimTarget(SimPlatform(), ARENA), budget=0)
+    plain = SimPlatform().robot.numbers()
+    assert calibration.trials == 0
+    assert calibration.numbers == {name: plain[name] for name in calibration.numbers}
+    assert {len(draws) for draws in calibration.draws.values()} == {1}
+
+
+def test_a_robot_is_found_and_trials_are_kept_as_they_come():
+    numbers = {"drive.gain_left": 0.85, "drive.gain_right": 0.85, "drive.track": 0.14, "range.0.decay": 0.1}
+    target = SimTarget(
+        SimPlatform(set=numbers | {f"range.{k}.decay": 0.1 for k in range(3)}), ARENA, name="other"
+    )
+    kept = []
+    calibration = calibrate_all(
+        target, observe="track", budget=4, effort="small", keep=kept.append, threads=1
+    )
+    found = {fitted.name: fitted for fitted in calibration.fitted}
+    assert len(kept) == calibration.trials == 4
+    assert found["drive.gain"].estimate == pytest.approx(0.85, rel=0.05)
+    assert found["drive.track"].estimate == pytest.approx(0.14, rel=0.07)
+    assert found["drive.gain"].identified
+    assert calibration.target == "other"
+    assert {len(draws) for draws in calibration.draws.values()} == {500}
+    SimPlatform(set=calibration.numbers)  # numbers that a robot can have
+
+
+def test_trials_are_the_same_for_the_same_seed_and_touch_nothing_at_the_start():
+    robot = SimPlatform().robot
+    plans, again, others = (all_plans(ARENA, robot, 5, seed) for seed in (1, 1, 2))
+    assert [plan.number for plan in plans] == list(range(5))
+    assert [plan.genome is None for plan in plans] == [True, False, True, False, True]
+    assert plans[0].start == again[0].start
+    assert np.array_equal(plans[0].commands, again[0].commands)
+    assert not np.array_equal(plans[0].commands, others[0].commands)
+    for plan in plans[::2]:
+        assert robot.radius < plan.start.x < 42 * 0.0254 - robot.radius
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("observe", ["cells", "encoders", "track"])
+def test_intervals_of_robots_from_the_prior_cover_as_often_as_they_say(observe):
+    """Simulation-based calibration (Talts et al. 2018) at a reduced size: 12 robots, 20 trials of each."""
+    platform = SimPlatform()
+    prior = scribbler_prior(platform.robot)
+    ensemble = SimEnsemble(platform, ARENA, ranges=ranges_of(prior, platform.robot))
+    inside = []
+    for k in range(12):
+        standard = np.clip(np.random.default_rng(k).normal(size=(1, len(prior))), -3, 3)
+        numbers = numbers_of(prior, values_of(prior, standard), platform.robot)
+        truth = {name: float(value[0]) for name, value in numbers.items()}
+        with SimTarget(SimPlatform(set=truth), ARENA, key=k) as target:
+            trials = target.carry_out(all_plans(ARENA, platform.robot, 20, k), observe)
+        genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
+        evidence = evidence_of(trials, genomes, ARENA.grid.n_cells)
+        places = fit_all(
+            evidence,
+            lambda one, some, key: ensemble.summarize(one.play, some, key, one.of, keep=one.keep),
+            prior,
+            platform.robot,
+            seed=k,
+            effort="small",
+        ).places
+        low, high = np.quantile(places, [0.05, 0.95], axis=0)
+        inside.append((low <= standard[0]) & (standard[0] <= high))
+    # 300 intervals of 90 %, those of one robot alike: 0.84 to 0.96 is three standard errors were they independent 1.7.
+    assert 0.83 <= np.mean(inside) <= 0.97

@@ -44,16 +44,21 @@ def test_all_commands_are_known():
         "audit-distance",
         "audit-results",
         "bench",
+        "calibrate",
         "digest",
         "emulate",
         "export",
+        "gap",
         "new-study",
+        "plan",
         "report",
         "robot",
         "run",
         "show",
         "simulate",
+        "transfer",
         "trials",
+        "twin",
     ]
 
 

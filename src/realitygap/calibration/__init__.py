@@ -1,6 +1,8 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
 from ._abc import Effort, Posterior, fit_all
+from ._contact import fit_contact
+from ._contact_plans import contact_plans
 from ._evidence import Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
 from ._ir_checks import Independence, independence, predictive_p
@@ -8,6 +10,7 @@ from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
 from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
+from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
 from ._predictive import Misfit, misfits
@@ -32,17 +35,20 @@ __all__ = [
     "SensorFit",
     "Simulate",
     "Vectors",
+    "contact_plans",
     "distance_of",
     "end_pose_of",
     "evidence_of",
     "excitation",
     "fit_all",
+    "fit_contact",
     "fit_motion",
     "fit_path",
     "fit_sensor",
     "independence",
     "information_of",
     "misfits",
+    "motion_plans",
     "moved_in",
     "next_trials",
     "numbers_of",

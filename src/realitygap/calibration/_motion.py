@@ -208,7 +208,7 @@ def _report(
     for name in MOTION_NOISE:
         best[name] = float(np.median(draws[name])) if found[name].identified else own[name]
     fitted = tuple(
-        _fitted(problem.known[name], best[name], draws[name], found[name], observe) for name in draws
+        fitted_parameter(problem.known[name], best[name], draws[name], found[name], observe) for name in draws
     )
     numbers = robot_numbers(
         problem.known, problem.robot, {name: np.array([value]) for name, value in best.items()}
@@ -231,9 +231,10 @@ def _rms(off: Floats, seen: Bools) -> list[float]:
     ]
 
 
-def _fitted(
+def fitted_parameter(
     parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
 ) -> Fitted:
+    """A parameter with its 90 % interval, and advice where it is not identified."""
     low, high = np.quantile(draws, [0.05, 0.95])
     return Fitted(
         name=parameter.name,

@@ -219,16 +219,18 @@ class _TrialsBar:
         self._tasks: dict[tuple[str, int], Any] = {}
 
     def __enter__(self) -> _TrialsBar:
-        self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        if self._progress.live.is_started:  # else it would print an empty line
+            self._progress.stop()
 
     def show(self, name: str, done: int, total: int) -> None:
         """So many trials are done."""
         if not self._console.is_terminal:
             return
+        if not self._progress.live.is_started:
+            self._progress.start()
         key = (name, total)
         if key not in self._tasks or self._progress.tasks[self._tasks[key]].completed > done:
             self._tasks[key] = self._progress.add_task(name, total=total)
@@ -340,4 +342,8 @@ def _print_plan(found: GapPlan, least: float, power: float) -> None:
         typer.echo(
             f"Fewest trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} controllers with "
             f"{found.best.trials} each."
+        )
+    if found.question == "effect":
+        typer.echo(
+            "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."
         )

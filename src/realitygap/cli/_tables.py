@@ -92,10 +92,9 @@ def calibration_table(calibration: Calibration) -> Table:
     table.add_column("parameter", overflow="fold")
     table.add_column("estimate", justify="right", no_wrap=True)
     table.add_column("90 % interval", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
     table.add_column("identified", no_wrap=True)
     for each in calibration.fitted:
-        cells = [each.name, f"{each.estimate:.4g}", f"{each.low:.4g} to {each.high:.4g}", each.unit]
+        cells = [each.name, f"{each.estimate:.4g} {each.unit}".rstrip(), f"{each.low:.3g} to {each.high:.3g}"]
         table.add_row(*(Text(cell) for cell in cells), Text("yes" if each.identified else "no"))
     return table
 

@@ -46,7 +46,9 @@ def families(
             raise RealityGapError(str(error)) from error
     if as_json:
         typer.echo(json.dumps(rows, indent=2))
-    elif rows:
+    elif not rows:
+        typer.echo(f"{name} draws what every twin does: realitygap twin families every")
+    else:
         _print_rows([{key: _text(value) for key, value in row.items()} for row in rows])
 
 

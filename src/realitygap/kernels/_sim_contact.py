@@ -15,80 +15,20 @@ import numpy as np
 
 from ._compile import kernel, stage
 from ._lanes import LANES, fill, keep_where_low
-from ._math import TWO_PI, sin_cos_of_turns
-from ._sim_drive import arc_step
-from ._sim_lanes import NEAR
-from ._sim_near import (
-    TOUCHES,
-    beyond_box,
-    beyond_ends,
-    beyond_face,
-    box_from_corner,
-    copy_poses,
-    flag_near,
-    flag_near_disc,
-    gather,
-    list_near,
-    look_ahead,
-    scatter,
-    sizes_asked,
-    swept,
-)
-from ._sim_outline import PER_CORNER
-from ._sim_rays import see_plane
+from ._math import TWO_PI
+from ._sim_drive import AXLE, arc_step
+from ._sim_near import TOUCHES, copy_poses, flag_near_shapes, sizes_asked, to_axles
 from ._sim_shape import FREEZE, SLIDE, WHEELS
-from ._sim_touch import touch
+from ._sim_touch import count_touching, touch
+from ._sim_turn import sin_cos_of, sin_cos_of_small, turned_by
+from ._sim_walls import choose_walls, clearance
 
-FAR = 1e9  # farther than any wall [m]
 CLEAR = 2e-6  # how far a body that was pushed is free [m]: above what rounding does in single precision
 LEAST_GIVE = 0.05  # of what a body gives without friction: less would throw it far off
 MOST_TURN = 0.25  # by which one push turns a body [rad]
 STALL_SHARE = 0.5  # of what was asked, of which less is done where a robot stalls
 SLIGHT = 0.05  # of all that was asked, below which nothing stalls
 N_RESCUES = 4  # straight pushes at the end of a step before it is refused
-
-
-@stage
-def _nearer(center, along, across, forward, left, radius, low):
-    for lane in range(LANES):
-        gap = center[lane] + along[lane] * forward[lane] + across[lane] * left[lane] - radius[lane]
-        nearest = low[lane]
-        low[lane] = gap if gap < nearest else nearest
-
-
-@stage
-def _nearer_of_two(center, along, across, forward, left, other_forward, other_left, radius, low):
-    for lane in range(LANES):
-        a = along[lane]
-        b = across[lane]
-        c = center[lane]
-        one = c + a * forward[lane] + b * left[lane] - radius[lane]
-        two = c + a * other_forward[lane] + b * other_left[lane] - radius[lane]
-        nearest = low[lane]
-        gap = one if one < two else two
-        low[lane] = gap if gap < nearest else nearest
-
-
-@stage
-def clearance(shape, lanes, pose):
-    """How far each body at `pose` is from the nearest wall of a room [m], below zero inside one; to `lanes.low`."""
-    real = lanes.low.dtype.type
-    p, spare = lanes.p, lanes.spare
-    fill(lanes.low, real(FAR))
-    if shape.enclosed:
-        for w in range(shape.n_walls):
-            plane = shape.row_plane + 3 * w
-            see_plane(p[plane], p[plane + 1], p[plane + 2], pose, spare[0], spare[1], spare[2])
-            for part in range(shape.part_corners.size):
-                n, first = shape.part_corners[part], shape.row_part[part]
-                radius = first + 2 * n
-                for k in range(n >> 1):
-                    row = first + 4 * k
-                    _nearer_of_two(
-                        spare[0], spare[1], spare[2], p[row], p[row + 1], p[row + 2], p[row + 3], p[radius], lanes.low
-                    )  # fmt: skip
-                if n & 1:
-                    _nearer(spare[0], spare[1], spare[2], p[radius - 2], p[radius - 1], p[radius], lanes.low)
 
 
 @stage
@@ -99,46 +39,11 @@ def _flag_touching(low, flag):
 
 
 @stage
-def _flag_near_shapes(shape, lanes, flag):
-    """Flag robots that some obstacle or open wall is near enough to be met by in the step."""
-    real = lanes.low.dtype.type
-    p, spare = lanes.p, lanes.spare
-    x, y, far, most, apart, box, sides = (
-        spare[1], spare[2], spare[3], spare[4], spare[5], spare[6:10], spare[10:14],
-    )  # fmt: skip
-    moved, bounds = lanes.moved, p[shape.row_bounds : shape.row_bounds + 4]
-    swept(moved[0], moved[1], moved[2], moved[3], p[shape.row_reach], bounds, box)
-    look_ahead(
-        lanes.moved[0], lanes.moved[2], p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far
-    )
-    for q in range(shape.row_shape.size):
-        n, first = shape.shape_corners[q], shape.row_shape[q]
-        radius = first + PER_CORNER * n
-        if n == 1:
-            flag_near_disc(p[first], p[first + 1], p[radius], x, y, far, flag)
-        else:
-            fill(most, real(-FAR))
-            fill(apart, real(-FAR))
-            for side in range(4):
-                fill(sides[side], real(-FAR if side & 1 else FAR))
-            for corner in range(n):
-                row = first + PER_CORNER * corner
-                beyond_face(p[row], p[row + 1], p[row + 2], p[row + 3], x, y, most)
-                box_from_corner(
-                    p[row], p[row + 1], p[row + 2], p[row + 3], x, y, lanes.pose, box, sides, apart
-                )
-            if n == 2:
-                beyond_ends(p[first], p[first + 1], p[first + 2], p[first + 3], p[first + 4], x, y, most)
-            beyond_box(box, sides, apart)
-            flag_near(most, apart, p[radius], far, flag)
-
-
-@stage
 def _go_part(shape, length, turn, part, pose):
     """Part of a motion, from where the axles are."""
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     real = x.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         dx, dy, turned, s, c = arc_step(
             length[k] * real(part), turn[k] * real(part), heading[k], sine[k], cosine[k]
         )
@@ -151,7 +56,7 @@ def _go_part(shape, length, turn, part, pose):
 
 @stage
 def _note_touch(gap, low):
-    for k in range(NEAR):
+    for k in range(LANES):
         least = low[k]
         now = gap[k]
         low[k] = now if now < least else least
@@ -163,7 +68,7 @@ def _push(gap, facing, beside, point_x, point_y, friction, long, lat, ang, pose,
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
     real = gap.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         a = facing[k]
         b = beside[k]
         c_x = point_x[k]
@@ -208,9 +113,11 @@ def _push(gap, facing, beside, point_x, point_y, friction, long, lat, ang, pose,
         f_y = f_y * lat[k] * limit
         x[k] = x[k] + (f_x * c - f_y * s)
         y[k] = y[k] + (f_x * s + f_y * c)
-        angle = heading[k] + spin * limit * real(1.0 / TWO_PI)
+        spin = spin * limit
+        angle = heading[k] + spin * real(1.0 / TWO_PI)
         angle = angle - np.floor(angle + real(0.5))
-        new_s, new_c = sin_cos_of_turns(angle)
+        by_s, by_c = sin_cos_of_small(spin)
+        new_s, new_c = turned_by(s, c, by_s, by_c)
         heading[k] = angle
         sine[k] = new_s
         cosine[k] = new_c
@@ -221,7 +128,7 @@ def _push_straight(gap, facing, beside, pose):
     """Move bodies that touch something straight away from it."""
     x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
     real = gap.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         now = gap[k]
         deep = real(CLEAR) - now if now <= real(0.0) else real(0.0)
         x[k] = x[k] + deep * (facing[k] * cosine[k] - beside[k] * sine[k])
@@ -233,7 +140,7 @@ def _put_back_places(gap, before, pose):
     keep = gap
     real = gap.dtype.type
     x, y, old_x, old_y = pose.x, pose.y, before.x, before.y
-    for k in range(NEAR):
+    for k in range(LANES):
         now_x = x[k]
         now_y = y[k]
         was_x = old_x[k]
@@ -248,7 +155,7 @@ def _put_back_turns(gap, before, pose):
     real = gap.dtype.type
     heading, sine, cosine = pose.heading, pose.sine, pose.cosine
     old_heading, old_sine, old_cosine = before.heading, before.sine, before.cosine
-    for k in range(NEAR):
+    for k in range(LANES):
         now = heading[k]
         now_s = sine[k]
         now_c = cosine[k]
@@ -268,7 +175,7 @@ def _note_done(length, turn, before, pose, went, turned):
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
     old_sine, old_cosine = before.sine, before.cosine
-    for k in range(NEAR):
+    for k in range(LANES):
         c = real(0.5) * (cosine[k] + old_cosine[k])
         s = real(0.5) * (sine[k] + old_sine[k])
         forward = (x[k] - old_x[k]) * c + (y[k] - old_y[k]) * s
@@ -282,7 +189,7 @@ def _note_done(length, turn, before, pose, went, turned):
 def _judge(reach, length, turn, went, turned, low, stall):
     """0 where a robot stalls: less was done than a share of what was asked, and it touched something."""
     real = low.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         asked = length[k]
         around = turn[k]
         slight = real(SLIGHT) * (asked + around)
@@ -294,19 +201,10 @@ def _judge(reach, length, turn, went, turned, low, stall):
         stall[k] = real(0.0) if (low[k] <= real(0.0)) & blocked else real(1.0)
 
 
-@stage
-def _clear(row, value):
-    real = row.dtype.type
-    for k in range(NEAR):
-        row[k] = real(value)
-
-
 @kernel
-def _answer_part(shape, near, sweep):
+def _answer_part(shape, p, near, sweep):
     """Give way after a part of a step, `sweep` times before; returns whether what touches then is of interest."""
-    p, row = near.p, shape.row_contact
-    if sweep == 0:
-        _note_touch(near.gap, near.low)
+    row = shape.row_contact
     if shape.contact == FREEZE:
         return False
     if shape.contact == SLIDE:
@@ -333,28 +231,25 @@ def _leave_free(near, sweep):
 
 
 @kernel
-def _resolve(shape, near):
+def _resolve(shape, lanes, near):
     """Carry out a step of robots that may touch something.
 
     In parts; in each of them, and once more at the end, the bodies give way until nothing touches, or long enough.
     All is one loop for the sake of a single place that asks what touches: that is most of the code.
     """
-    length, turn = near.spare[20], near.spare[21]
-    went, turned = near.done[0], near.done[1]
-    reach = near.p[shape.row_reach]
-    _clear(length, 0.0)
-    _clear(turn, 0.0)
-    _clear(went, 0.0)
-    _clear(turned, 0.0)
+    p, reach = lanes.p, lanes.p[shape.row_reach]
+    length, turn, went, turned = near.effort[0], near.effort[1], near.effort[2], near.effort[3]
+    for k in range(4):
+        fill(near.effort[k], reach.dtype.type(0.0))
     copy_poses(near.pose, near.start)
     early = shape.substeps
     if shape.mixing == WHEELS:
         early = shape.late_substeps if shape.late else 0
     last = early + shape.substeps
-    part, sweep, n_touching = 0, 0, 0
+    part, sweep = 0, 0
     while True:
         row = 2 if part >= early else 0
-        asked, around = near.moved[row], near.moved[row + 1]
+        asked, around = lanes.moved[row], lanes.moved[row + 1]
         if sweep == 0 and part < last:
             if part == 0 or part == early:
                 sizes_asked(asked, around, reach, length, turn)
@@ -363,17 +258,23 @@ def _resolve(shape, near):
         if shape.contact == FREEZE and shape.mixing != WHEELS and part == early - 1:
             part += 1  # Jyro looks where a step ends, and not before it turns there
             continue
-        n_touching = touch(shape, near)
+        if part == last and shape.enclosed:
+            clearance(shape, p, near.pose, near, near.gap)
+            if shape.row_shape.size == 0 and count_touching(near.gap) == 0:
+                break
+            choose_walls(shape, p, near)
+        n_touching = touch(shape, p, near)
         again = False
         if n_touching > 0:
-            again = _answer_part(shape, near, sweep) if part < last else _leave_free(near, sweep)
+            _note_touch(near.gap, near.low)
+            again = _answer_part(shape, p, near, sweep) if part < last else _leave_free(near, sweep)
         if again:
             sweep += 1
             continue
         if part < last and shape.contact != FREEZE:
             _note_done(asked, around, near.before, near.pose, went, turned)
         part, sweep = part + 1, 0
-        if part > last or (part == last and (shape.contact == FREEZE or n_touching == 0)):
+        if part > last or (part == last and shape.contact == FREEZE):
             break
     if shape.contact == FREEZE:
         _put_back_places(near.low, near.start, near.pose)
@@ -386,30 +287,64 @@ def _resolve(shape, near):
 @stage
 def _stall_of_touch(low, stall):
     real = low.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         stall[k] = real(0.0) if low[k] <= real(0.0) else real(1.0)
+
+
+@stage
+def _begin(flag, low):
+    real = low.dtype.type
+    for lane in range(LANES):
+        low[lane] = real(0.0) if flag[lane] == real(TOUCHES) else real(1.0)
+
+
+@stage
+def _end(flag, touched, stall, axle, pose, low, proposed):
+    """Where flagged robots that touched something are after the step; 0 to `low` where they stall, 1 elsewhere."""
+    real = low.dtype.type
+    x, y, heading = pose.x, pose.y, pose.heading
+    to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
+    to_sine, to_cosine = proposed.sine, proposed.cosine
+    for lane in range(LANES):
+        angle = heading[lane]
+        s, c = sin_cos_of(angle)
+        new_x = x[lane] - axle[lane] * c
+        new_y = y[lane] - axle[lane] * s
+        free_x = to_x[lane]
+        free_y = to_y[lane]
+        free_angle = to_heading[lane]
+        free_s = to_sine[lane]
+        free_c = to_cosine[lane]
+        stalls = stall[lane]
+        met = (flag[lane] > real(0.0)) & (touched[lane] <= real(0.0))
+        low[lane] = stalls if met else real(1.0)
+        to_x[lane] = new_x if met else free_x
+        to_y[lane] = new_y if met else free_y
+        to_heading[lane] = angle if met else free_angle
+        to_sine[lane] = s if met else free_s
+        to_cosine[lane] = c if met else free_c
 
 
 @kernel
 def _meet(shape, lanes, near):
-    """Carry out the step of the lanes flagged in the first row of `spare`, NEAR of them at a time."""
-    flag = lanes.spare[0]
-    n_flagged = 0
-    for lane in range(LANES):
-        n_flagged += 1 if flag[lane] > 0 else 0
-    if n_flagged > NEAR:
-        for first in range(0, LANES, NEAR):
-            for k in range(NEAR):
-                near.lane[k] = first + k
-            gather(shape, lanes, near, True)
-            _resolve(shape, near)
-            scatter(shape, lanes, near, NEAR)
+    """Carry out the step of the lanes flagged in the first row of `spare`."""
+    flag, axle = lanes.spare[0], lanes.p[shape.row_drive + AXLE]
+    if not _any(flag):
         return
-    n, _ = list_near(flag, 0, near.lane)
-    if n > 0:
-        gather(shape, lanes, near, False)
-        _resolve(shape, near)
-        scatter(shape, lanes, near, n)
+    if shape.enclosed:
+        choose_walls(shape, lanes.p, near)
+    to_axles(lanes.pose, axle, near.pose)
+    _begin(flag, near.low)
+    _resolve(shape, lanes, near)
+    _end(flag, near.low, near.gap, axle, near.pose, lanes.low, lanes.proposed)
+
+
+@kernel
+def _any(flag):
+    n = 0
+    for lane in range(LANES):
+        n += 1 if flag[lane] > 0 else 0
+    return n > 0
 
 
 @stage
@@ -438,8 +373,9 @@ def _accept(pose, proposed):
 @stage
 def settle(shape, lanes, near):
     """Go where the step would end as far as contact allows."""
-    clearance(shape, lanes, lanes.proposed)
     pose, proposed, low = lanes.pose, lanes.proposed, lanes.low
+    to_axles(proposed, lanes.p[shape.row_drive + AXLE], near.pose)
+    clearance(shape, lanes.p, near.pose, near, low)
     if shape.contact == FREEZE and shape.row_shape.size == 0:
         _note_stalls(low, lanes.stalled, lanes.n_stalls)
         keep_where_low(low, pose.x, proposed.x)
@@ -450,7 +386,7 @@ def settle(shape, lanes, near):
         return
     _flag_touching(low, lanes.spare[0])
     if shape.row_shape.size > 0:
-        _flag_near_shapes(shape, lanes, lanes.spare[0])
+        flag_near_shapes(shape, lanes, lanes.spare[0])
     _meet(shape, lanes, near)
     _note_stalls(low, lanes.stalled, lanes.n_stalls)
     _accept(pose, proposed)

@@ -6,8 +6,9 @@ import numpy as np
 
 from ._compile import inlined, stage
 from ._lanes import LANES, copy_row
-from ._math import TWO_PI, exp, normal, sin_cos_of_turns
+from ._math import TWO_PI, exp, normal
 from ._sim_shape import DRIVE_NUMBERS, INDEPENDENT
+from ._sim_turn import sin_cos_of, turned_by
 from ._trial import as_command, draw_lanes
 
 SPEED, TRACK, AXLE, TURN_RATE, GAIN_LEFT, GAIN_RIGHT, BIAS_LEFT, BIAS_RIGHT = range(8)
@@ -285,18 +286,27 @@ def arc_step(length, turn, heading, sine, cosine):
     """
     real = type(length)
     half = real(0.5) * turn
-    s, c = sin_cos_of_turns(half)
+    s, c = sin_cos_of(half)
     angle = half * real(TWO_PI)
     small = abs(angle) < real(SMALL_TURN)
     chord = length * (
         real(1.0) - angle * angle * real(1.0 / 6.0) if small else s / (real(1.0) if small else angle)
     )
-    dx = chord * (cosine * c - sine * s)
-    dy = chord * (sine * c + cosine * s)
+    middle_s, middle_c = turned_by(sine, cosine, s, c)
     turned = heading + turn
     turned = turned - np.floor(turned + real(0.5))
-    new_sine, new_cosine = sin_cos_of_turns(turned)
-    return dx, dy, turned, new_sine, new_cosine
+    new_sine, new_cosine = turned_by(middle_s, middle_c, s, c)
+    return chord * middle_c, chord * middle_s, turned, new_sine, new_cosine
+
+
+@stage
+def _face(pose):
+    """Sines and cosines anew from the headings, so that errors do not add up over steps."""
+    heading, sine, cosine = pose.heading, pose.sine, pose.cosine
+    for lane in range(LANES):
+        s, c = sin_cos_of(heading[lane])
+        sine[lane] = s
+        cosine[lane] = c
 
 
 @stage
@@ -338,7 +348,7 @@ def _straight_then_turn(length, turn, axle, pose, proposed):
         turned = heading[lane] + turn[lane]
         turned = turned - np.floor(turned + real(0.5))
         to_heading[lane] = turned
-        sine_now, cosine_now = sin_cos_of_turns(turned)
+        sine_now, cosine_now = sin_cos_of(turned)
         to_x[lane] = x[lane] + length[lane] * cosine[lane] + axle[lane] * (cosine[lane] - cosine_now)
         to_y[lane] = y[lane] + length[lane] * sine[lane] + axle[lane] * (sine[lane] - sine_now)
         to_sine[lane] = sine_now
@@ -359,8 +369,10 @@ def drive(shape, rules, key, lanes, step):
     moved, axle = lanes.moved, lanes.p[shape.row_drive + AXLE]
     if shape.mixing == INDEPENDENT:
         _straight_then_turn(moved[0], moved[3], axle, lanes.pose, lanes.proposed)
-    elif shape.late:
+        return
+    if shape.late:
         _arc(moved[0], moved[1], axle, lanes.pose, lanes.proposed)
         _arc_on(moved[2], moved[3], axle, lanes.proposed)
     else:
         _arc(moved[2], moved[3], axle, lanes.pose, lanes.proposed)
+    _face(lanes.proposed)

@@ -15,7 +15,6 @@ from ._sim_outline import bounds_of, outline_of, place_obstacle, reach_of
 from ._sim_senses import Senses, make_senses, start_senses
 from ._wiring import Wiring, make_wiring
 
-NEAR = 32  # trials in contact that are worked on side by side
 N_SPARE = 24  # rows for what stages work out on the way
 
 
@@ -76,23 +75,23 @@ class SimRoom(NamedTuple):
 
 
 class Near(NamedTuple):
-    """The trials of a block whose robots may touch something in a step, gathered. Poses are of the axle."""
+    """What contact works out for a block of trials in a step. Poses are of the axle."""
 
-    p: Rows  # as in `SimLanes`, of which what contact needs
-    lane: NDArray[np.int32]  # (NEAR,) where each comes from
     pose: Poses
     before: Poses  # at the beginning of a part of the step
     start: Poses  # at the beginning of the step
-    moved: Rows  # (4,) as in `SimLanes`
     gap: Row  # of the deepest contact [m]; the rest is of it too
     facing: Row  # its normal, towards the body: ahead and left
     beside: Row
     point_x: Row  # where the body is met
     point_y: Row
     low: Row  # the least gap met so far
-    done: Rows  # (2,) carried out: length and turn
+    effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
+    gaps: Rows  # (n_walls,) how far the body is from each wall [m]
+    walls: Rows  # (8,) of the nearest two: normal x, y, offset and gap
     seen: Rows  # (5 * most corners of an obstacle,) its corners and normals from the body
     best: Rows  # (9,) of `_sim_touch`
+    face: Rows  # (6,) of `_sim_touch`: x, y, normal x, y, length, gap
     spare: Rows  # (N_SPARE,)
 
 
@@ -125,33 +124,33 @@ def make_sim_trace(shape, n_inputs, n_steps, n_kept, dtype):
 
 
 def make_near(shape, dtype):
-    """Room for trials in contact."""
+    """Room for the contact of a block of trials."""
 
     def row():
-        return np.zeros(NEAR, dtype)
+        return np.zeros(LANES, dtype)
 
     def poses():
         return Poses(*(row() for _ in Poses._fields))
 
     def rows(n):
-        return np.zeros((n, NEAR), dtype)
+        return np.zeros((n, LANES), dtype)
 
     return Near(
-        p=rows(shape.n_all_rows),
-        lane=np.zeros(NEAR, np.int32),
         pose=poses(),
         before=poses(),
         start=poses(),
-        moved=rows(4),
         gap=row(),
         facing=row(),
         beside=row(),
         point_x=row(),
         point_y=row(),
         low=row(),
-        done=rows(2),
+        effort=rows(4),
+        gaps=rows(shape.n_walls),
+        walls=rows(8),
         seen=rows(5 * int(shape.shape_corners.max(initial=1))),
         best=rows(9),
+        face=rows(6),
         spare=rows(N_SPARE),
     )
 

@@ -1,114 +1,40 @@
-"""Robots that may touch something in a step, gathered from a block, so that only they pay for contact."""
+"""Which robots may touch something in a step, so that only blocks with such robots pay for contact."""
 
 from __future__ import annotations
 
-from ._compile import kernel, stage
-from ._lanes import LANES
+from ._compile import stage
+from ._lanes import LANES, fill
 from ._math import TWO_PI
-from ._sim_lanes import NEAR
-from ._sim_shape import WHEELS
+from ._sim_outline import PER_CORNER
+from ._sim_support import FAR
 
-FAR = 1e9  # farther than anything [m]
 IS_NEAR, TOUCHES = 1.0, 2.0  # flags of robots that may touch something in a step, or do so at its end
 
 
-@kernel
-def list_near(flag, first, near_lane):
-    """List lanes that are flagged, from `first` on, at most NEAR; returns how many, and where to go on.
-
-    Where most lanes are, it lists all, in their order: rows are then copied many at a time.
-    """
-    n = 0
-    lane = first
-    while lane < LANES and n < NEAR:
-        if flag[lane] > 0:
-            near_lane[n] = lane
-            n += 1
-        lane += 1
-    for k in range(n, NEAR):
-        near_lane[k] = near_lane[max(n - 1, 0)]
-    return n, lane
-
-
 @stage
-def _copy_side_by_side(source, first, target):
-    for k in range(NEAR):
-        target[k] = source[first + k]
-
-
-@kernel
-def _copy_rows(source, lane, together, rows, to_rows, target):
-    for row in range(rows, to_rows):
-        if together:
-            _copy_side_by_side(source[row], lane[0], target[row])
-        else:
-            for k in range(NEAR):
-                target[row, k] = source[row, lane[k]]
-
-
-@stage
-def _to_axle(x, y, sine, cosine, axle, to_x, to_y):
-    for k in range(NEAR):
-        to_x[k] = x[k] + axle[k] * cosine[k]
-        to_y[k] = y[k] + axle[k] * sine[k]
+def to_axles(pose, axle, other):
+    """The same poses, from the axles."""
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    to_x, to_y, to_heading, to_sine, to_cosine = other.x, other.y, other.heading, other.sine, other.cosine
+    for lane in range(LANES):
+        s = sine[lane]
+        c = cosine[lane]
+        to_x[lane] = x[lane] + axle[lane] * c
+        to_y[lane] = y[lane] + axle[lane] * s
+        to_heading[lane] = heading[lane]
+        to_sine[lane] = s
+        to_cosine[lane] = c
 
 
 @stage
 def copy_poses(pose, other):
     """The same poses in another place."""
-    for k in range(NEAR):
+    for k in range(LANES):
         other.x[k] = pose.x[k]
         other.y[k] = pose.y[k]
         other.heading[k] = pose.heading[k]
         other.sine[k] = pose.sine[k]
         other.cosine[k] = pose.cosine[k]
-
-
-@kernel
-def gather(shape, lanes, near, together):
-    """Copy what contact needs of the lanes that `near.lane` lists; poses become those of the axle."""
-    lane = near.lane
-    for part in range(shape.part_corners.size):
-        radius = shape.row_part[part] + 2 * shape.part_corners[part]
-        _copy_rows(lanes.p, lane, together, radius, radius + 1, near.p)
-    _copy_rows(lanes.p, lane, together, shape.row_contact, shape.row_contact + 4, near.p)
-    axle = shape.row_drive + 2
-    _copy_rows(lanes.p, lane, together, axle, axle + 1, near.p)
-    _copy_rows(lanes.p, lane, together, shape.row_outline[0], shape.row_ray, near.p)
-    if shape.row_shape.size > 0:
-        _copy_rows(lanes.p, lane, together, shape.row_shape[0], shape.n_all_rows, near.p)
-    _copy_rows(lanes.moved, lane, together, 0, 4, near.moved)
-    pose = lanes.pose
-    real = near.low.dtype.type
-    for k in range(NEAR):
-        near.low[k] = real(0.0) if lanes.spare[0, lane[k]] == real(TOUCHES) else real(FAR)
-        near.pose.x[k] = pose.x[lane[k]]
-        near.pose.y[k] = pose.y[lane[k]]
-        near.pose.heading[k] = pose.heading[lane[k]]
-        near.pose.sine[k] = pose.sine[lane[k]]
-        near.pose.cosine[k] = pose.cosine[lane[k]]
-    _to_axle(
-        near.pose.x, near.pose.y, near.pose.sine, near.pose.cosine, near.p[axle], near.pose.x, near.pose.y
-    )
-
-
-@kernel
-def scatter(shape, lanes, near, n):
-    """Where flagged robots are after the step, and 0 to `lanes.low` where they stall, 1 elsewhere."""
-    real = lanes.low.dtype.type
-    axle = near.p[shape.row_drive + 2]
-    to = lanes.proposed
-    for k in range(n):
-        lane = near.lane[k]
-        if lanes.spare[0, lane] == real(0.0):
-            continue
-        lanes.low[lane] = near.gap[k]
-        if near.low[k] <= real(0.0) or shape.mixing == WHEELS:
-            to.x[lane] = near.pose.x[k] - axle[k] * near.pose.cosine[k]
-            to.y[lane] = near.pose.y[k] - axle[k] * near.pose.sine[k]
-            to.heading[lane] = near.pose.heading[k]
-            to.sine[lane] = near.pose.sine[k]
-            to.cosine[lane] = near.pose.cosine[k]
 
 
 @stage
@@ -262,6 +188,41 @@ def look_ahead(first, second, reach, axle, pose, from_x, from_y, far):
 def sizes_asked(asked, around, reach, length, turn):
     """What a part of a step asks for, as lengths [m]: straight on, and of the farthest point by turning."""
     real = length.dtype.type
-    for lane in range(NEAR):
+    for lane in range(LANES):
         length[lane] = length[lane] + abs(asked[lane])
         turn[lane] = turn[lane] + abs(around[lane]) * (real(TWO_PI) * reach[lane])
+
+
+@stage
+def flag_near_shapes(shape, lanes, flag):
+    """Flag robots that some obstacle or open wall is near enough to be met by in the step."""
+    real = lanes.low.dtype.type
+    p, spare = lanes.p, lanes.spare
+    x, y, far, most, apart, box, sides = (
+        spare[1], spare[2], spare[3], spare[4], spare[5], spare[6:10], spare[10:14],
+    )  # fmt: skip
+    moved, bounds = lanes.moved, p[shape.row_bounds : shape.row_bounds + 4]
+    swept(moved[0], moved[1], moved[2], moved[3], p[shape.row_reach], bounds, box)
+    look_ahead(
+        lanes.moved[0], lanes.moved[2], p[shape.row_reach], p[shape.row_drive + 2], lanes.pose, x, y, far
+    )
+    for q in range(shape.row_shape.size):
+        n, first = shape.shape_corners[q], shape.row_shape[q]
+        radius = first + PER_CORNER * n
+        if n == 1:
+            flag_near_disc(p[first], p[first + 1], p[radius], x, y, far, flag)
+        else:
+            fill(most, real(-FAR))
+            fill(apart, real(-FAR))
+            for side in range(4):
+                fill(sides[side], real(-FAR if side & 1 else FAR))
+            for corner in range(n):
+                row = first + PER_CORNER * corner
+                beyond_face(p[row], p[row + 1], p[row + 2], p[row + 3], x, y, most)
+                box_from_corner(
+                    p[row], p[row + 1], p[row + 2], p[row + 3], x, y, lanes.pose, box, sides, apart
+                )
+            if n == 2:
+                beyond_ends(p[first], p[first + 1], p[first + 2], p[first + 3], p[first + 4], x, y, most)
+            beyond_box(box, sides, apart)
+            flag_near(most, apart, p[radius], far, flag)

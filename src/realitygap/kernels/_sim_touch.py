@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from ._compile import kernel, stage
-from ._sim_lanes import NEAR
+from ._lanes import LANES, copy_row, fill
 from ._sim_outline import PER_CORNER
-
-FAR = 1e9  # farther than any wall [m]
+from ._sim_support import FAR, low_height, lowest
+from ._sim_walls import touch_walls
 
 # Of parallel faces each is met at corners that follow from the other's: their normals are turned by so much
 # [rad] for the search, so that none of the corners is met by chance.
@@ -26,179 +26,9 @@ OVERHANG = 1e-3
 
 
 @stage
-def clear_touch(near):
-    """Nothing is near."""
-    real = near.gap.dtype.type
-    gap = near.gap
-    for k in range(NEAR):
-        gap[k] = real(FAR)
-
-
-@stage
-def _see(normal_x, normal_y, offset, pose, center, along, across):
-    x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
-    for k in range(NEAR):
-        n_x = normal_x[k]
-        n_y = normal_y[k]
-        center[k] = n_x * x[k] + n_y * y[k] - offset[k]
-        along[k] = n_x * cosine[k] + n_y * sine[k]
-        across[k] = n_y * cosine[k] - n_x * sine[k]
-
-
-@stage
-def _first(value, low):
-    real = low.dtype.type
-    for k in range(NEAR):
-        low[k] = real(value)
-
-
-@stage
-def _lower(along, across, x, y, low, point_x, point_y):
-    """Keep the corner that lies lowest along a normal."""
-    for k in range(NEAR):
-        c_x = x[k]
-        c_y = y[k]
-        height = along[k] * c_x + across[k] * c_y
-        least = low[k]
-        p_x = point_x[k]
-        p_y = point_y[k]
-        lower = height < least
-        low[k] = height if lower else least
-        point_x[k] = c_x if lower else p_x
-        point_y[k] = c_y if lower else p_y
-
-
-@stage
-def _lower_of_two(along, across, x, y, other_x, other_y, low, point_x, point_y):
-    for k in range(NEAR):
-        c_x = x[k]
-        c_y = y[k]
-        d_x = other_x[k]
-        d_y = other_y[k]
-        one = along[k] * c_x + across[k] * c_y
-        two = along[k] * d_x + across[k] * d_y
-        least = low[k]
-        p_x = point_x[k]
-        p_y = point_y[k]
-        second = two < one
-        height = two if second else one
-        c_x = d_x if second else c_x
-        c_y = d_y if second else c_y
-        lower = height < least
-        low[k] = height if lower else least
-        point_x[k] = c_x if lower else p_x
-        point_y[k] = c_y if lower else p_y
-
-
-@stage
-def _lowest(p, outline, n, along, across, low, point_x, point_y):
-    _first(FAR, low)
-    for pair in range(n >> 1):
-        row = outline + 2 * PER_CORNER * pair
-        _lower_of_two(
-            along, across, p[row], p[row + 1], p[row + PER_CORNER], p[row + PER_CORNER + 1], low, point_x, point_y
-        )  # fmt: skip
-    if n & 1:
-        row = outline + PER_CORNER * (n - 1)
-        _lower(along, across, p[row], p[row + 1], low, point_x, point_y)
-
-
-@stage
-def _deeper_in_wall(low, center, radius, along, across, x, y, near_gap, facing, beside, point_x, point_y):
-    for k in range(NEAR):
-        gap = low[k] + center[k] - radius[k]
-        a = along[k]
-        b = across[k]
-        c_x = x[k] - radius[k] * a
-        c_y = y[k] - radius[k] * b
-        least = near_gap[k]
-        f = facing[k]
-        g = beside[k]
-        p_x = point_x[k]
-        p_y = point_y[k]
-        deeper = gap < least
-        near_gap[k] = gap if deeper else least
-        facing[k] = a if deeper else f
-        beside[k] = b if deeper else g
-        point_x[k] = c_x if deeper else p_x
-        point_y[k] = c_y if deeper else p_y
-
-
-@stage
-def _height(along, across, x, y, low):
-    """How low the lowest corner lies along a normal."""
-    for k in range(NEAR):
-        height = along[k] * x[k] + across[k] * y[k]
-        least = low[k]
-        low[k] = height if height < least else least
-
-
-@stage
-def _height_of_two(along, across, x, y, other_x, other_y, low):
-    for k in range(NEAR):
-        a = along[k]
-        b = across[k]
-        one = a * x[k] + b * y[k]
-        two = a * other_x[k] + b * other_y[k]
-        least = low[k]
-        height = two if two < one else one
-        low[k] = height if height < least else least
-
-
-@stage
-def _low_height(p, outline, n, along, across, low):
-    _first(FAR, low)
-    for pair in range(n >> 1):
-        row = outline + 2 * PER_CORNER * pair
-        _height_of_two(along, across, p[row], p[row + 1], p[row + PER_CORNER], p[row + PER_CORNER + 1], low)
-    if n & 1:
-        row = outline + PER_CORNER * (n - 1)
-        _height(along, across, p[row], p[row + 1], low)
-
-
-@stage
-def _nearer_wall(low, center, along, across, best, best_center, best_along, best_across):
-    for k in range(NEAR):
-        c = center[k]
-        a = along[k]
-        b = across[k]
-        gap = low[k] + c
-        least = best[k]
-        b_c = best_center[k]
-        b_a = best_along[k]
-        b_b = best_across[k]
-        deeper = gap < least
-        best[k] = gap if deeper else least
-        best_center[k] = c if deeper else b_c
-        best_along[k] = a if deeper else b_a
-        best_across[k] = b if deeper else b_b
-
-
-@stage
-def touch_walls(shape, near):
-    """Deepen the touch by the walls of an enclosed room: where, is asked of the nearest wall only."""
-    p, spare = near.p, near.spare
-    center, along, across, low, x, y = spare[0], spare[1], spare[2], spare[3], spare[4], spare[5]
-    best, best_center, best_along, best_across = spare[8], spare[9], spare[10], spare[11]
-    for part in range(shape.part_corners.size):
-        n, outline = shape.part_corners[part], shape.row_outline[part]
-        _first(FAR, best)
-        for w in range(shape.n_walls):
-            plane = shape.row_plane + 3 * w
-            _see(p[plane], p[plane + 1], p[plane + 2], near.pose, center, along, across)
-            _low_height(p, outline, n, along, across, low)
-            _nearer_wall(low, center, along, across, best, best_center, best_along, best_across)
-        _lowest(p, outline, n, best_along, best_across, low, x, y)
-        _deeper_in_wall(
-            low, best_center, p[shape.row_part[part] + 2 * n], best_along, best_across, x, y,
-            near.gap, near.facing, near.beside, near.point_x, near.point_y,
-        )  # fmt: skip
-
-
-@stage
 def _corner_to_body(x, y, normal_x, normal_y, pose, to_x, to_y, to_normal_x, to_normal_y):
     from_x, from_y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
-    for k in range(NEAR):
+    for k in range(LANES):
         d_x = x[k] - from_x[k]
         d_y = y[k] - from_y[k]
         to_x[k] = d_x * cosine[k] + d_y * sine[k]
@@ -210,7 +40,7 @@ def _corner_to_body(x, y, normal_x, normal_y, pose, to_x, to_y, to_normal_x, to_
 @stage
 def _tilt(normal_x, normal_y, tilt, tilted_x, tilted_y):
     real = tilted_x.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         n_x = normal_x[k]
         n_y = normal_y[k]
         tilted_x[k] = n_x + real(tilt) * n_y
@@ -218,34 +48,60 @@ def _tilt(normal_x, normal_y, tilt, tilted_x, tilted_y):
 
 
 @stage
+def _keep_face(low, x, y, normal_x, normal_y, length, best_x, best_y, best_a, best_b, best_length, best):
+    """Keep the face that has the other outline farthest in front of it; `low` is how low that lies along its normal."""
+    for k in range(LANES):
+        from_x = x[k]
+        from_y = y[k]
+        a = normal_x[k]
+        b = normal_y[k]
+        size = length[k]
+        gap = low[k] - (a * from_x + b * from_y)
+        most = best[k]
+        o_x = best_x[k]
+        o_y = best_y[k]
+        o_a = best_a[k]
+        o_b = best_b[k]
+        o_size = best_length[k]
+        better = gap > most
+        best[k] = gap if better else most
+        best_x[k] = from_x if better else o_x
+        best_y[k] = from_y if better else o_y
+        best_a[k] = a if better else o_a
+        best_b[k] = b if better else o_b
+        best_length[k] = size if better else o_size
+
+
+@stage
 def _consider_face(
-    x, y, end_x, end_y, normal_x, normal_y, length, sign, q_x, q_y,
+    x, y, normal_x, normal_y, length, sign, q_x, q_y,
     score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y,
 ):  # fmt: skip
-    """Keep a face if it has the other outline farther in front of it than any before.
+    """Keep a face if it has the other outline farther in front of it than the one before.
 
     Args:
-        x, y, end_x, end_y, normal_x, normal_y, length: The face.
+        x, y, normal_x, normal_y, length: The face.
         sign: 1 for a face of the obstacle, -1 for one of the body.
         q_x, q_y: The other's corner that is lowest over it.
-        score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y: Of the best one so far: score, separation, how far
+        score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y: Of the one before: score, separation, how far
             the end is passed, normal towards the body, point on the body, and the way to it from the end.
     """
     real = x.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         a = normal_x[k]
         b = normal_y[k]
         low_x = q_x[k]
         low_y = q_y[k]
         from_x = x[k]
         from_y = y[k]
-        to_x = end_x[k]
-        to_y = end_y[k]
+        size = length[k]
+        to_x = from_x - b * size
+        to_y = from_y + a * size
         off_x = low_x - from_x
         off_y = low_y - from_y
         gap = a * off_x + b * off_y
         along = a * off_y - b * off_x
-        past = along - length[k]
+        past = along - size
         beyond = past > real(0.0)
         over = past if past > -along else -along
         over = over if over > real(0.0) else real(0.0)
@@ -289,7 +145,7 @@ def _consider_face(
 def _begin_pair(x, y, q_x, q_y, score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y):
     """Of two corners, which is all that two discs have."""
     real = x.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         score[k] = real(-FAR)
         apart[k] = real(1.0)
         at_end[k] = real(1.0)
@@ -308,7 +164,7 @@ def _deeper_in_shape(
 ):  # fmt: skip
     """Keep the deeper contact; of two as deep, the one more to the left, so that no order of shapes decides."""
     real = near_gap.dtype.type
-    for k in range(NEAR):
+    for k in range(LANES):
         d_x = way_x[k]
         d_y = way_y[k]
         size = np.sqrt(d_x * d_x + d_y * d_y)
@@ -341,7 +197,7 @@ def _apart_by_corner(x, y, normal_x, normal_y, bounds, sides, apart):
     real = x.dtype.type
     least_x, most_x, least_y, most_y = bounds[0], bounds[1], bounds[2], bounds[3]
     low_x, high_x, low_y, high_y = sides[0], sides[1], sides[2], sides[3]
-    for k in range(NEAR):
+    for k in range(LANES):
         u = x[k]
         v = y[k]
         a = normal_x[k]
@@ -368,7 +224,7 @@ def _apart_by_sides(bounds, sides, radius, apart):
     real = apart.dtype.type
     least_x, most_x, least_y, most_y = bounds[0], bounds[1], bounds[2], bounds[3]
     low_x, high_x, low_y, high_y = sides[0], sides[1], sides[2], sides[3]
-    for k in range(NEAR):
+    for k in range(LANES):
         ahead = low_x[k] - most_x[k]
         behind = least_x[k] - high_x[k]
         left = low_y[k] - most_y[k]
@@ -381,13 +237,13 @@ def _apart_by_sides(bounds, sides, radius, apart):
 
 
 @stage
-def _count_not_apart(shape, near, m, radius):
+def _count_not_apart(shape, p, near, m, radius):
     """In how many lanes the box around the body is not apart from the obstacle whose m corners are in `seen`."""
     seen, spare = near.seen, near.spare
-    bounds, sides, apart = near.p[shape.row_bounds : shape.row_bounds + 4], spare[8:12], spare[12]
-    _first(-FAR, apart)
+    bounds, sides, apart = p[shape.row_bounds : shape.row_bounds + 4], spare[8:12], spare[12]
+    fill(apart, apart.dtype.type(-FAR))
     for side in range(4):
-        _first(-FAR if side & 1 else FAR, sides[side])
+        fill(sides[side], apart.dtype.type(-FAR if side & 1 else FAR))
     for corner in range(m):
         to = PER_CORNER * corner
         _apart_by_corner(seen[to], seen[to + 1], seen[to + 2], seen[to + 3], bounds, sides, apart)
@@ -395,10 +251,23 @@ def _count_not_apart(shape, near, m, radius):
     return count_touching(apart)
 
 
+@stage
+def _farthest_face(p, corners, n, others, other, m, low, face):
+    """Of an outline's n faces that which has the other outline of m corners farthest in front of it, into `face`."""
+    fill(face[5], low.dtype.type(-FAR))
+    for corner in range(n):
+        row = corners + PER_CORNER * corner
+        low_height(others, other, m, p[row + 2], p[row + 3], low)
+        _keep_face(
+            low, p[row], p[row + 1], p[row + 2], p[row + 3], p[row + 4],
+            face[0], face[1], face[2], face[3], face[4], face[5],
+        )  # fmt: skip
+
+
 @kernel
-def touch_shape(shape, near, q):
+def touch_shape(shape, p, near, q):
     """Deepen the touch by one obstacle or open wall."""
-    p, spare, seen, best = near.p, near.spare, near.seen, near.best
+    spare, seen, best, face = near.spare, near.seen, near.best, near.face
     low, x, y, t_x, t_y = spare[3], spare[4], spare[5], spare[6], spare[7]
     m, first = shape.shape_corners[q], shape.row_shape[q]
     for corner in range(m):
@@ -406,63 +275,31 @@ def touch_shape(shape, near, q):
         _corner_to_body(
             p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, seen[to], seen[to + 1], seen[to + 2], seen[to + 3]
         )  # fmt: skip
-    if _count_not_apart(shape, near, m, p[first + PER_CORNER * m]) == 0:
+        copy_row(p[row + 4], seen[to + 4])
+    if _count_not_apart(shape, p, near, m, p[first + PER_CORNER * m]) == 0:
         return
     for part in range(shape.part_corners.size):
         n, outline = shape.part_corners[part], shape.row_outline[part]
         _begin_pair(
-            p[outline],
-            p[outline + 1],
-            seen[0],
-            seen[1],
-            best[0],
-            best[1],
-            best[2],
-            best[3],
-            best[4],
-            best[5],
-            best[6],
-            best[7],
-            best[8],
-        )
+            p[outline], p[outline + 1], seen[0], seen[1],
+            best[0], best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
+        )  # fmt: skip
         if m > 1:
-            for corner in range(m):
-                row = PER_CORNER * corner
-                end = row + PER_CORNER if corner + 1 < m else 0
-                _tilt(seen[row + 2], seen[row + 3], -TILT, t_x, t_y)
-                _lowest(p, outline, n, t_x, t_y, low, x, y)
-                _consider_face(
-                    seen[row], seen[row + 1], seen[end], seen[end + 1], seen[row + 2], seen[row + 3],
-                    p[first + row + 4], 1, x, y,
-                    best[0], best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
-                )  # fmt: skip
+            _farthest_face(seen, 0, m, p, outline, n, low, face)
+            _tilt(face[2], face[3], -TILT, t_x, t_y)
+            lowest(p, outline, n, t_x, t_y, low, x, y)
+            _consider_face(
+                face[0], face[1], face[2], face[3], face[4], 1, x, y,
+                best[0], best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
+            )  # fmt: skip
         if n > 1:
-            for corner in range(n):
-                row = outline + PER_CORNER * corner
-                end = row + PER_CORNER if corner + 1 < n else outline
-                _tilt(p[row + 2], p[row + 3], TILT, t_x, t_y)
-                _lowest(seen, 0, m, t_x, t_y, low, x, y)
-                _consider_face(
-                    p[row],
-                    p[row + 1],
-                    p[end],
-                    p[end + 1],
-                    p[row + 2],
-                    p[row + 3],
-                    p[row + 4],
-                    -1,
-                    x,
-                    y,
-                    best[0],
-                    best[1],
-                    best[2],
-                    best[3],
-                    best[4],
-                    best[5],
-                    best[6],
-                    best[7],
-                    best[8],
-                )
+            _farthest_face(p, outline, n, seen, 0, m, low, face)
+            _tilt(face[2], face[3], TILT, t_x, t_y)
+            lowest(seen, 0, m, t_x, t_y, low, x, y)
+            _consider_face(
+                face[0], face[1], face[2], face[3], face[4], -1, x, y,
+                best[0], best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
+            )  # fmt: skip
         _deeper_in_shape(
             best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
             p[shape.row_part[part] + 2 * n], p[first + PER_CORNER * m],
@@ -471,7 +308,7 @@ def touch_shape(shape, near, q):
 
 
 @kernel
-def touch(shape, near):
+def touch(shape, p, near):
     """The deepest contact of each body at `near.pose`: gap [m], normal and point in the body's frame.
 
     Args:
@@ -481,11 +318,11 @@ def touch(shape, near):
     Returns:
         In how many lanes bodies touch or overlap something.
     """
-    clear_touch(near)
+    fill(near.gap, near.gap.dtype.type(FAR))
     if shape.enclosed:
-        touch_walls(shape, near)
+        touch_walls(shape, p, near)
     for q in range(shape.row_shape.size):
-        touch_shape(shape, near, q)
+        touch_shape(shape, p, near, q)
     return count_touching(near.gap)
 
 
@@ -494,6 +331,6 @@ def count_touching(gap):
     """In how many lanes the gap is zero or less."""
     real = gap.dtype.type
     n = np.int32(0)
-    for k in range(NEAR):
+    for k in range(LANES):
         n = np.int32(n + np.int32(gap[k] <= real(0.0)))
     return n

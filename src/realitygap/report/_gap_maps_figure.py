@@ -32,9 +32,9 @@ def draw_gap_maps(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
     )
     caption = (
         f"Share of trials that cross each cell: {source.n} controllers, {source.trials} trials each on {source.name} "
-        f"({source.label}) and {target.trials} on {target.name} ({target.label}); full color is {most:.2f}. Right: where "
-        f"the target’s trials go more often (blue) or less often (orange); full color is {apart:.2f}. Energy distance of "
-        f"visited cells {energy}{words}."
+        f"({source.label}) and {target.trials} on {target.name} ({target.label}); full color is {most:.2f}. Right: "
+        f"where the target’s trials go more often (blue) or less often (orange); full color is {apart:.2f}. Energy "
+        f"distance of visited cells {energy}{words}."
     )
     alt = f"Maps of visited cells on {source.name} and on {target.name}, and their difference of up to {apart:.2f}."
     panels: list[tuple[str, Any, float]] = [

@@ -35,9 +35,9 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     size = min(width - 0.75, _MOST_ACROSS)
     order = _order_in_words(gap)
     caption = (
-        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}, across) "
-        f"and {target.trials} on {target.name} ({target.label}, up), with intervals of 95 % of each mean by t. On the "
-        f"line there is no gap. {order}"
+        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
+        f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. On "
+        f"the line there is no gap. {order}"
     )
     alt = f"Scatter of {source.n} controllers: coverage on {source.name} against coverage on {target.name}. {order}"
     with house_style():
@@ -117,7 +117,8 @@ def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
         f"{source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals of 95 % for "
         f"each by itself. Blue: the level, {level}.{band}"
     )
-    alt = f"Differences of {source.n} controllers from {differences.min():.2f} to {differences.max():.2f}; mean {level}."
+    span = f"{differences.min():.2f} to {differences.max():.2f}"
+    alt = f"Differences of {source.n} controllers from {span}; mean {level}."
     with house_style():
         figure = new_figure(width, 2.6)
         axes = place_axes(figure, 0.6, 0.12, width - 0.68, 2.1)

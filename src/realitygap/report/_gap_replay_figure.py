@@ -19,10 +19,10 @@ def draw_gap_replay(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
     last = replay.distance.shape[1] - 1
     ends = float(replay.distance[:, last].mean()), float(replay.noise_distance[:, last].mean())
     caption = (
-        f"Open-loop replay: the commands of {replay.n} trials on {gap.target.name} ({gap.target.label}) given to the robot "
-        f"of {gap.source.name} ({gap.source.label}) from the same start, four times each. Line: how far the two robots "
-        f"are apart after each step, mean, with the 10th to 90th percentile of trials; thin: between two replays, which "
-        f"noise alone drives apart. After {last} steps {ends[0]:.2f} m and {ends[1]:.2f} m."
+        f"Open-loop replay: the commands of {replay.n} trials on {gap.target.name} ({gap.target.label}) given to the "
+        f"robot of {gap.source.name} ({gap.source.label}) from the same start, four times each. Line: how far the two "
+        f"robots are apart after each step, mean, with the 10th to 90th percentile of trials; thin: between two replays, "
+        f"which noise alone drives apart. After {last} steps {ends[0]:.2f} m and {ends[1]:.2f} m."
     )
     alt = (
         f"Curves of the distance between target and replay, which reaches {ends[0]:.2f} m after {last} steps."

@@ -23,8 +23,8 @@ def draw_gap_why(why: Why, gap: GapStudy, *, width: float = WIDE) -> Drawing:
     caption = (
         f"What each part of the model carries of the RMS gap in coverage to {gap.target.name} ({gap.target.label}): "
         f"{why.before} with the robot’s defaults (SIM), {why.after} with the fit, {why.before.n} controllers. Bars: "
-        "Shapley values over all 64 choices of parts, whose sum is the fall; lines: intervals of 95 %, controllers drawn "
-        "anew and, with them, the posterior of the fit."
+        "Shapley values over all 64 choices of parts, whose sum is the fall; lines: intervals of 95 %, controllers "
+        "drawn anew and, with them, the posterior of the fit."
     )
     alt = "Bars: " + "; ".join(f"{why.parts[k]} {why.falls[k]}" for k in order) + "."
     with house_style():

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from realitygap.calibration import ruled
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.records import (
+    OBSERVATIONS,
     Observations,
     ObservationsFile,
     Observe,
@@ -19,16 +21,31 @@ from realitygap.records import (
     read_observations,
     write_whole,
 )
-from realitygap.robots import DEFAULT_ROBOT
+from realitygap.robots import DEFAULT_ROBOT, SimPlatform
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
+from ._calibrate_all import calibrate_all, calibration_of
 from ._calibrate_kinds import KINDS, Kind, Parts
 from ._targets import observations_head
-from ._wrapped_targets import Guide, GuidedTarget, ResumableTarget, RuledTarget, is_whole
+from ._wrapped_targets import (
+    PATH,
+    CountingTarget,
+    Guide,
+    GuidedTarget,
+    ResumableTarget,
+    RuledTarget,
+    is_whole,
+)
 
 SEED_STRIDE = 10_000
 """Between the numbers of trials of calibrations with different seeds."""
+
+ALL = "all"
+"""The kind that fits everything at once."""
+
+BUDGET_OF_ALL = 20
+"""Trials where no budget is given."""
 
 Tell = Callable[[int, int], None]
 """Told of how many of how many trials are there."""
@@ -65,27 +82,60 @@ def calibrate(
         RobotError: The robot failed; what was recorded is kept.
         StoppedByPerson: The guide was told to stop; what was recorded is kept.
     """
-    made = _kind(kind)
-    base = load_robot(robot)
-    if budget is not None and budget < made.least:
+    _refuse(kind, target, robot, observe, budget)
+    around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
+    if trials_file is None:
+        return _calibrated(kind, around, robot, observe, budget, seed, tell)
+    with ObservationsFile(trials_file, observations_head(target, observe, str(robot))) as file:
+        return _calibrated(kind, ResumableTarget(around, file), robot, observe, budget, seed, tell)
+
+
+def _calibrated(
+    kind: str,
+    target: Target,
+    robot: str | Path,
+    observe: Observe,
+    budget: int | None,
+    seed: int,
+    tell: Tell | None,
+) -> Calibration:
+    if kind == ALL:
+        n = BUDGET_OF_ALL if budget is None else budget
+        counted = CountingTarget(target, n, tell)
+        try:
+            made = calibrate_all(counted, robot=load_robot(robot), observe=observe, budget=n, seed=seed)
+        except ValueError as error:
+            raise StudyError(str(error)) from error
+        return _calibration(kind, _parts_of(made), robot, target.name, target.label, observe, made.trials)
+    plans = _plans(KINDS[kind], target.arena, load_robot(robot), budget)
+    numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
+    trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
+    parts = _fit(kind, trials, robot, target.arena, observe, seed)
+    return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
+
+
+def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
+    """Return where a calibration can be carried out.
+
+    Raises:
+        StudyError: It cannot be.
+    """
+    _check_kind(kind)
+    base, made = load_robot(robot), KINDS.get(kind)
+    if made is not None and budget is not None and budget < made.least:
         raise StudyError(
             f"--budget is {budget}, and a calibration of {kind} takes at least {made.least} trials."
+        )
+    if made is not None and observe not in made.observes:
+        raise StudyError(
+            f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
+            f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
         )
     if len(base.range) != target.n_sensors:
         raise StudyError(
             f"{target.name} has {target.n_sensors} range sensors and robot {base.name!r} {len(base.range)}. Build on "
             "the robot that it is (--base ROBOT)."
         )
-    plans = _plans(made, target.arena, base, budget)
-    around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
-    if trials_file is None:
-        trials = _carry_out(around, plans, observe, seed, tell)
-    else:
-        head = observations_head(target, observe, str(robot))
-        with ObservationsFile(trials_file, head) as file:
-            trials = _carry_out(ResumableTarget(around, file), plans, observe, seed, tell)
-    parts = _fit(kind, trials, robot, target.arena, observe, seed)
-    return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
 
 
 def calibrate_from(
@@ -104,12 +154,14 @@ def calibrate_from(
         StudyError: There is no such kind, or the file has nothing to fit it to.
         RecordError: The file cannot be read.
     """
-    _kind(kind)
+    _check_kind(kind)
     found = read_observations(data)
     robot = found.head.robot if robot is None else robot
     arena = Arena.from_dict(dict(found.head.arena))
     seen = observe or found.head.observe
-    trials = list(_last_of_each(found))
+    if OBSERVATIONS.index(seen) > OBSERVATIONS.index(found.head.observe):
+        raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
+    trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
     parts = _fit(kind, trials, robot, arena, seen, seed)
     made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, len(trials))
     return made.model_copy(update={"notes": (*made.notes, found.problem)}) if found.problem else made
@@ -129,10 +181,9 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
     write_whole(path, calibration.model_copy(update={"robot": robot}).to_toml().encode())
 
 
-def _kind(kind: str) -> Kind:
-    if kind not in KINDS:
-        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, KINDS)}")
-    return KINDS[kind]
+def _check_kind(kind: str) -> None:
+    if kind not in (*KINDS, ALL):
+        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, (*KINDS, ALL))}")
 
 
 def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
@@ -142,33 +193,52 @@ def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> S
         raise StudyError(str(error)) from error
 
 
-def _carry_out(
-    target: Target, plans: Sequence[TrialPlan], observe: Observe, seed: int, tell: Tell | None
-) -> list[ObservedTrial]:
-    plans = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
-    done: set[int] = set()
-
-    def count(k: int, trial: ObservedTrial) -> None:
-        done.add(k)
-        if tell is not None:
-            tell(len(done), len(plans))
-
-    return target.carry_out(plans, observe, count)
-
-
 def _fit(
-    kind: str, trials: Sequence[ObservedTrial], robot: str | Path, arena: Arena, observe: Observe, seed: int
+    kind: str,
+    trials: Sequence[ObservedTrial],
+    robot: str | Path,
+    arena: Arena,
+    observe: Observe,
+    seed: int,
 ) -> Parts:
+    base = load_robot(robot)
     try:
-        return KINDS[kind].fit(trials, load_robot(robot), arena, observe, seed)
+        if kind != ALL:
+            return KINDS[kind].fit(trials, base, arena, observe, seed)
+        step_s = trials[0].step_s if trials else base.step_s
+        made = calibration_of(
+            trials, SimPlatform(robot=base, step_s=step_s), arena, robot_name=base.name, target="", label="SIM",
+            observe=observe, seed=seed,
+        )  # fmt: skip
+        return _parts_of(made)
     except ValueError as error:
         raise StudyError(str(error)) from error
+
+
+def _parts_of(made: Calibration) -> Parts:
+    return Parts(
+        made.fitted,
+        made.numbers,
+        made.draws,
+        made.method,
+        made.notes,
+        made.misspecified,
+        made.misspecification_p,
+        made.evidence,
+    )
 
 
 def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:
     """Trials that were cut off, and those of which a later one with the same number took the place, are left out."""
     whole = [trial for trial in found.trials if is_whole(trial)]
     return list({(trial.purpose, trial.number, trial.start): trial for trial in whole}.values())
+
+
+def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+    """A trial with no more than was to be observed."""
+    if observe != "track" and len(trial.poses):
+        trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
+    return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
 
 
 def _calibration(

@@ -30,7 +30,7 @@ from realitygap.calibration import (
 from realitygap.errors import whole_number
 from realitygap.evolution import Genome
 from realitygap.records import Observe, ObservedTrial
-from realitygap.robots import SimPlatform
+from realitygap.robots import Label, SimPlatform
 from realitygap.trials import SimEnsemble, Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
@@ -98,13 +98,39 @@ def calibrate_all(
         say(f"{len(chosen)} more trials, chosen")
         trials += target.carry_out(chosen, observe, told)
     parts = fit.parts(trials, effort)
+    name = robot if isinstance(robot, str) else platform.robot.name
+    return _calibration(parts, name, target.name, target.label, observe, len(trials))
+
+
+def calibration_of(
+    trials: Sequence[ObservedTrial],
+    platform: SimPlatform,
+    arena: Arena,
+    *,
+    robot_name: str,
+    target: str,
+    label: Label,
+    observe: Observe,
+    seed: int = 0,
+    effort: Effort = "full",
+    tell: Callable[[str], None] | None = None,
+    threads: int | None = None,
+) -> Calibration:
+    """The calibration from trials that were recorded; arguments as in `calibrate_all`, and what the file says of them."""
+    parts = _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
+    return _calibration(parts, robot_name, target, label, observe, len(trials))
+
+
+def _calibration(
+    parts: Parts, robot: str, target: str, label: Label, observe: Observe, n_trials: int
+) -> Calibration:
     return Calibration(
         kind="all",
-        robot=robot if isinstance(robot, str) else platform.robot.name,
-        target=target.name,
-        label=target.label,
+        robot=robot,
+        target=target,
+        label=label,
         observe=observe,
-        trials=len(trials),
+        trials=n_trials,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         method=parts.method,
         fitted=parts.fitted,
@@ -127,30 +153,6 @@ def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> li
     ]
     plans = [plan for k in range(len(given)) for plan in (given[k], *driven[k : k + 1])]
     return [TrialPlan(**{**vars(plan), "number": k}) for k, plan in enumerate(plans)]
-
-
-def fit_everything(
-    trials: Sequence[ObservedTrial],
-    robot: RobotModel,
-    arena: Arena,
-    seed: int = 0,
-    *,
-    effort: Effort = "full",
-    tell: Callable[[str], None] | None = None,
-    threads: int | None = None,
-) -> Parts:
-    """The fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
-
-    Raises:
-        ValueError: Trials with commands of several lengths of time.
-    """
-    times = sorted({trial.step_s for trial in trials})
-    if len(times) > 1:
-        raise ValueError(
-            f"The trials' commands last {times[0]:g} to {times[-1]:g} s, expected one length of time. Fit them apart."
-        )
-    platform = SimPlatform(robot=robot, **({"step_s": times[0]} if times else {}))
-    return _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
 
 
 class _Fit:

@@ -12,18 +12,22 @@ from numpy.typing import NDArray
 
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
+    MotionFit,
     Moved,
     Placement,
     SensorFit,
+    Simulate,
+    fit_motion,
     fit_path,
     fit_sensor,
+    motion_plans,
     path_plans,
     placements_of,
     sensor_plans,
 )
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.robots import Command, SimPlatform
-from realitygap.trials import SimRobot, TrialPlan
+from realitygap.trials import SimEnsemble, SimRobot, TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
 
@@ -49,11 +53,13 @@ class Kind:
         plans: Trials for an arena, a robot and a budget.
         fit: From trials, the robot to build on, the arena, how much was observed, and the seed of draws.
         least: Trials that it takes.
+        observes: How much has to be observed for anything to be told.
     """
 
     plans: Callable[[Arena, RobotModel, int | None], Sequence[TrialPlan]]
     fit: Callable[[Sequence[ObservedTrial], RobotModel, Arena, Observe, int], Parts]
-    least: int
+    least: int = 1
+    observes: tuple[Observe, ...] = OBSERVATIONS
 
 
 # path
@@ -187,28 +193,40 @@ def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]
     }
 
 
-# all
+# motion
 
 
-def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    from ._calibrate_all import all_plans
-
-    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
+def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return motion_plans(arena, robot) if budget is None else motion_plans(arena, robot, budget)
 
 
-def _fit_all(
+def _fit_motion(
     trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
-    from ._calibrate_all import fit_everything
+    moving = _of_purpose(trials, "motion")
+    fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
+    return _parts_of(fit)
 
-    return fit_everything(trials, robot, arena, seed)
+
+def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedTrial]:
+    """The trials that were carried out for it; all with commands where none was."""
+    return [trial for trial in trials if trial.purpose == purpose] or [
+        trial for trial in trials if len(trial.commands)
+    ]
 
 
-ALL_TRIALS = 20
-"""Of a calibration of everything, when nothing is said."""
+def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
+    step_s = trials[0].step_s if trials else robot.step_s
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena).replay
+
+
+def _parts_of(fit: MotionFit) -> Parts:
+    return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
+
 
 KINDS: dict[str, Kind] = {
-    "path": Kind(_path_plans, _fit_path, 2),
-    "sensors": Kind(_sensor_plans, _fit_sensors, 1),
-    "all": Kind(_all_plans, _fit_all, 1),
+    "path": Kind(_path_plans, _fit_path, least=2),
+    "sensors": Kind(_sensor_plans, _fit_sensors),
+    "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
 }
+"""Those whose trials are known before the first of them; `all` chooses trials by what came before."""

@@ -131,9 +131,7 @@ def _open(
     spec: str, arena: Arena, noise: float | None, key: int, processes: int | None, witness: str | None
 ) -> Target:
     level = (PAPERS_NOISE if spec == "jyro" else 0.0) if noise is None else noise
-    more = {"processes": processes, "witness": witness}
-    given = {name: value for name, value in more.items() if value is not None}
-    return open_target(spec, arena, noise=level, key=key, **given)
+    return open_target(spec, arena, processes=processes, witness=witness, noise=level, key=key)
 
 
 def _refuse_more_than_is_seen(target: Target, observe: Observe) -> None:

@@ -63,6 +63,34 @@ class _Around:
         self.close()
 
 
+class CountingTarget(_Around):
+    """Says after each trial how many of how many are there.
+
+    Args:
+        target: What carries out trials.
+        n: How many there will be.
+        count: Told of how many there are, and of n.
+    """
+
+    def __init__(self, target: Target, n: int, count: Callable[[int, int], None] | None) -> None:
+        super().__init__(target)
+        self._n, self._count, self._done = n, count, 0
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`."""
+
+        def one_more(k: int, trial: ObservedTrial) -> None:
+            self._done += 1
+            if self._count is not None:
+                self._count(min(self._done, self._n), self._n)
+            if tell is not None:
+                tell(k, trial)
+
+        return self.target.carry_out(plans, observe, one_more)
+
+
 class RuledTarget(_Around):
     """The ends of paths are read with a ruler where less than a camera is to be observed."""
 

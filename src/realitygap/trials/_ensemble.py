@@ -135,6 +135,7 @@ class SimEnsemble:
         self.threads = _processors() if threads is None else whole_number("threads", threads, 1)
         self._ranges = {name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()}
         self._scenes: dict[tuple[object, ...], SimScene] = {}
+        self._own = self._make_scene(("stall",), {})
         self._no_genome = Population(3, 2, NeatSettings.named("default"), bias=False).ask()[0]
         self._scene(("stall",))
 
@@ -230,7 +231,9 @@ class SimEnsemble:
         first = (play.genomes or (self._no_genome,))[0]
         scene = self._scene(paper_inputs(first.rules), given)
         networks = decode_all(play.genomes or (first,))
-        work = _Work(scene, play, first.rules, first.bias_value, networks, key, tuple(keep), same_noise)
+        work = _Work(
+            scene, self._own, play, first.rules, first.bias_value, networks, key, tuple(keep), same_noise
+        )
         size = max(1, CHUNK_BYTES // (work.bytes_of_trial * len(play.starts)))
         size = max(1, min(size, -(-m // self.threads)))
         chunks = [range(at, min(at + size, m)) for at in range(0, m, size)]
@@ -271,6 +274,7 @@ class _Work:
     """Trials in the form that the kernel reads."""
 
     scene: SimScene
+    own: SimScene  # with the numbers as the platform has them, where no set says otherwise
     play: Play
     neat: NeatRules
     bias_value: float
@@ -323,13 +327,15 @@ class _Work:
         self, given: Mapping[str, NDArray[np.float64]], m: int, k: int, counters: NDArray[np.uint32]
     ) -> NDArray[np.float32]:
         scene = self.scene
-        draws = Draws({name: value for name, value in scene.numbers.items() if name not in given})
+        own = {name: value for name, value in self.own.numbers.items() if name in scene.rows}
+        draws = Draws({name: value for name, value in own.items() if name not in given})
         values = dict(zip(draws.names, draws.draw(self.key, counters).T, strict=True))
         for name, start in zip(START, self.play.starts.T, strict=True):
             values[name] = np.tile(start, m)
         for name, value in given.items():
             values[name] = np.broadcast_to(value, (m, k)).reshape(-1)
-        table = np.repeat(scene.table(scene.fixed), m * k, axis=1)
+        fixed = {name: value for name, value in self.own.fixed.items() if name in scene.rows}
+        table = np.repeat(scene.table({**scene.fixed, **fixed}), m * k, axis=1)
         table[[scene.rows[name] for name in values]] = scene.rows_of(values)
         return table.astype(np.float32, copy=False)
 

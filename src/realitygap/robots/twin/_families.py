@@ -246,7 +246,7 @@ def _drawn(how: Range | Value, random: np.random.Generator) -> Value:
         return how
     if isinstance(how.low, int) and isinstance(how.high, int):
         return int(random.integers(how.low, how.high + 1))
-    return float(f"{random.uniform(how.low, how.high):.4g}")
+    return float(f"{random.uniform(how.low, how.high):.5g}")
 
 
 def _put(values: dict[str, Any], path: list[str], value: Value) -> None:

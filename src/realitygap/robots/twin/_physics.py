@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 SETTLING = 20  # steps in which a robot that was put down comes to rest
 GROUPS = 6  # of MuJoCo
+SETBACK = 0.01  # behind its mount, where rays of a sensor begin: what touches the mount is still ahead [m]
 EYE_ABOVE = 0.05  # of the floor, where sensors look [m]
 
 
@@ -50,6 +51,9 @@ class Physics:
         self.mj_data = self._mujoco.MjData(self.mj_model)
         self.radius = model.wheels.diameter / 2
         self._place, self._speed, self._control = self.mj_data.qpos, self.mj_data.qvel, self.mj_data.ctrl
+        kinds = self._mujoco.mjtWarning
+        lost = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        self._lost = [self.mj_data.warning[kind] for kind in lost]
         self._seen = np.zeros(GROUPS, np.uint8)
         self._seen[WALL] = 1
 
@@ -84,10 +88,7 @@ class Physics:
         self._control[0] = left / self.radius
         self._control[1] = right / self.radius
         self._mujoco.mj_step(self.mj_model, self.mj_data, nstep=steps)
-        if (
-            not math.isfinite(self._place[0])
-            or self.mj_data.warning[self._mujoco.mjtWarning.mjWARN_BADQACC].number
-        ):
+        if any(warning.number for warning in self._lost):  # then it has begun anew, somewhere else
             raise RobotError(
                 "The twin's physics came apart: its file asks for more than steps of 5 ms can follow. Use softer "
                 "motors (motors.stiffness, motors.torque) or a heavier body."
@@ -126,14 +127,28 @@ class Physics:
         sine, cosine = math.sin(here.heading), math.cos(here.heading)
         point = np.array([here.x + cosine * x - sine * y, here.y + sine * x + cosine * y, EYE_ABOVE])
         angles = directions + here.heading
+        back = float(angles.mean())
+        point[:2] -= SETBACK * math.cos(back), SETBACK * math.sin(back)
         n = len(angles)
         rays = np.zeros((n, 3))
         np.cos(angles, out=rays[:, 0])
         np.sin(angles, out=rays[:, 1])
         hit, far, normal = np.empty(n, np.int32), np.empty(n), np.zeros(3 * n)
         self._mujoco.mj_multiRay(
-            self.mj_model, self.mj_data, point, rays.ravel(), self._seen, True, -1, hit, far, normal, n, reach
+            self.mj_model,
+            self.mj_data,
+            point,
+            rays.ravel(),
+            self._seen,
+            True,
+            -1,
+            hit,
+            far,
+            normal,
+            n,
+            reach + SETBACK,
         )
-        met = (far >= 0) & (far < reach)
+        far = np.where(far < 0, reach, np.maximum(far - SETBACK, 0.0))
+        met = far < reach
         cosines = np.where(met, np.abs((rays * normal.reshape(n, 3)).sum(axis=1)), 0.0)
         return np.where(met, far, reach), cosines

@@ -1,0 +1,85 @@
+"""Whether a robot that drives straight into a wall aligns with it or stalls: a check on friction without a simulator.
+
+The wall's push, tilted by friction, passes the axle on one side or on the other: the robot aligns where
+a + atan(mu) < atan(c_x / |c_y|), with a between its heading and the wall, and c where it touches, from its axle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from realitygap.records import ObservedTrial
+from realitygap.world import Arena, RobotModel
+
+from ._simulate import Bools, Floats, plain_numbers
+
+TOUCHES_M = 0.006
+ALIGNED = math.radians(1.0)  # turned by so much in the step after the first touch
+HEAD_ON = math.radians(85.0)  # nearer to head on two corners touch
+
+
+@dataclass(frozen=True)
+class Encounters:
+    """First touches of robots that drove straight on.
+
+    Attributes:
+        margin: (e,) atan(c_x / |c_y|) - a [rad]: it aligns where friction's angle is less.
+        aligned: (e,) whether it turned towards the wall.
+    """
+
+    margin: Floats
+    aligned: Bools
+
+    def agreeing(self, friction: float) -> int:
+        """How many did what the rule says at this friction."""
+        return int(((self.margin > math.atan(friction)) == self.aligned).sum())
+
+
+def encounters_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Encounters:
+    """All first touches in trials with poses, on which another step of the same command follows."""
+    outline = np.array([point for part in robot.body for point in part.outline()])
+    axle = plain_numbers(robot)["drive.axle"]
+    margins, aligned = [], []
+    for trial in trials:
+        for row in _straight_rows(trial):
+            touch = _touch(trial.poses[row], outline, arena)
+            if touch is None or _touch(trial.poses[row - 1], outline, arena) is not None:
+                continue
+            ahead = math.copysign(1.0, trial.commands[row, 0]) * robot.drive.ahead
+            wall, (x, y) = touch
+            angle = abs(wall)
+            if ahead * (x - axle) <= 0 or angle > HEAD_ON:
+                continue
+            margins.append(math.atan2(abs(x - axle), abs(y)) - angle)
+            turned = trial.poses[row + 1, 2] - trial.poses[row, 2]
+            aligned.append(abs(math.remainder(wall + turned, math.pi)) < angle - ALIGNED)
+    return Encounters(np.array(margins), np.array(aligned, np.bool_))
+
+
+def _straight_rows(trial: ObservedTrial) -> list[int]:
+    """Rows before which and after which the same straight command was given."""
+    if not len(trial.poses):
+        return []
+    move, turn = trial.commands.T
+    same = (turn[1:] == 0) & (turn[:-1] == 0) & (move[1:] == move[:-1]) & (np.abs(move[1:]) > 0.5)
+    return [int(k) + 1 for k in np.flatnonzero(same)]
+
+
+def _touch(pose: Floats, outline: Floats, arena: Arena) -> tuple[float, tuple[float, float]] | None:
+    """Heading against the wall that is touched [rad, -pi / 2..pi / 2], and where on the body [m], in its own frame."""
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    points = pose[:2] + outline @ np.array([[cos, sin], [-sin, cos]])
+    for x1, y1, x2, y2 in arena.segments:
+        way = np.array([x2 - x1, y2 - y1])
+        length = float(np.hypot(*way))
+        off = points - (x1, y1)
+        away = np.abs(off[:, 0] * way[1] - off[:, 1] * way[0]) / length
+        nearest = int(np.argmin(away))
+        if away[nearest] < TOUCHES_M:
+            angle = math.remainder(pose[2] - math.atan2(way[1], way[0]), math.pi)
+            return angle, (float(outline[nearest, 0]), float(outline[nearest, 1]))
+    return None

@@ -1,0 +1,163 @@
+"""Trials that excite a robot's drive away from walls, and come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from realitygap.trials import TrialPlan
+from realitygap.world import Arena, Pose, RobotModel
+
+from ._simulate import Floats, plain_numbers
+
+STEPS = 100  # of a trial
+N_PLANS = 10
+STILL = 3  # commands to stand before it drives: what poses scatter by then is the camera's
+ROOM_M = 0.03  # kept to walls by a robot as its file has it
+TOO_FAST = 1.25  # a robot may be that much faster than its file says
+SPEEDS = (1.0, 0.75, 0.5, 0.33, 0.2)
+SLOW = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15, 0.18, 0.22, 0.26, 0.3)
+
+Commands = list[tuple[float, float]]
+
+
+def motion_plans(
+    arena: Arena, robot: RobotModel, n: int = N_PLANS, *, first_number: int = 0
+) -> list[TrialPlan]:
+    """Trials to fit a drive to: straight runs, turns in place, arcs, steps of the command, slow commands, mixed.
+
+    Whatever is driven is driven back at once, so that a robot which is not quite as its file says stays where there is
+    room: for each gain alone, for both wheels, track and axle (straight and around), lag and delay (steps of the
+    command), dead band (slow commands), noise that grows with the way and with the time (fast and slow), the battery
+    (trials of 100 commands).
+
+    Args:
+        arena: Trials begin in the middle of the largest free place on a grid in it, along its longer side.
+        robot: As its file has it.
+        n: How many trials; the first five are each of one kind.
+        first_number: Of the first trial.
+
+    Raises:
+        ValueError: There is no room for the robot to turn in place.
+    """
+    start, room = roomiest_place(arena, robot)
+    reach = max(room[0] / TOO_FAST, 0.0), max(room[1] / TOO_FAST, 0.0)
+    step_m = plain_numbers(robot)["drive.speed"] * robot.step_s
+    kinds: list[Callable[[np.random.Generator, float, float], Commands]] = [
+        _straight,
+        _spin,
+        _arc,
+        _changes,
+        _slow,
+    ]
+    plans = []
+    for k in range(n):
+        rng = np.random.default_rng(k)
+        commands: Commands = [(0.0, 0.0)] * STILL
+        while len(commands) < STEPS:
+            kind = kinds[k] if k < len(kinds) else kinds[int(rng.integers(len(kinds)))]
+            away = kind(rng, step_m, reach[0] if k in (0, 2) else reach[1])
+            commands += away + [(-move, -turn) for move, turn in reversed(away)]
+            if rng.random() < 0.2:
+                commands.append((0.0, 0.0))
+        plans.append(
+            TrialPlan(
+                start,
+                commands=np.array(commands[:STEPS]),
+                steps=STEPS,
+                number=first_number + k,
+                purpose="motion",
+            )
+        )
+    return plans
+
+
+def _signed(rng: np.random.Generator, value: float) -> float:
+    return value if rng.random() < 0.5 else -value
+
+
+def _within(speed: float, step_m: float, reach: float, most: int) -> int:
+    """How many steps of a speed there is room for."""
+    return int(np.clip(reach / max(abs(speed) * step_m, 1e-9), 1, most))
+
+
+def _straight(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
+    speed = _signed(rng, float(rng.choice(SPEEDS)))
+    return [(speed, 0.0)] * _within(speed, step_m, reach, 6)
+
+
+def _spin(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
+    return [(0.0, _signed(rng, float(rng.choice(SPEEDS))))] * int(rng.integers(2, 7))
+
+
+def _arc(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
+    speed, turn = _signed(rng, float(rng.uniform(0.3, 0.7))), _signed(rng, float(rng.uniform(0.1, 0.3)))
+    return [(speed, turn)] * _within(speed, step_m, reach, 4)
+
+
+def _changes(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
+    """Another command at every step, each of which could be carried out to the end within reach."""
+    most = min(1.0, reach / step_m)
+    return [
+        (_signed(rng, float(rng.uniform(0.2, 1.0)) * most), _signed(rng, float(rng.uniform(0.0, 0.6))))
+        for _ in range(2)
+    ]
+
+
+def _slow(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
+    speed = _signed(rng, float(rng.choice(SLOW)))
+    return [(speed, 0.0) if rng.random() < 0.5 else (0.0, speed)] * 2
+
+
+def roomiest_place(arena: Arena, robot: RobotModel) -> tuple[Pose, tuple[float, float]]:
+    """Where a robot has most room, heading along it, and how far it can go along and across whatever its heading [m].
+
+    Raises:
+        ValueError: There is no room for the robot to turn in place.
+    """
+    lines = np.array(arena.segments)
+    x, y = (np.unique(lines[:, [axis, axis + 2]]) for axis in (0, 1))
+    sides = [np.linspace(side[0], side[-1], 41)[1:-1] for side in (x, y)]
+    points = np.array([(px, py) for px in sides[0] for py in sides[1]])
+    away = _away(points, lines)
+    middle = np.array([(x[0] + x[-1]) / 2, (y[0] + y[-1]) / 2])
+    near_middle = np.hypot(*(points - middle).T)
+    best = int(np.lexsort((near_middle, -np.round(away, 4)))[0])
+    at = points[best]
+    across = float(away[best]) - robot.radius - ROOM_M
+    if across <= 0:
+        raise ValueError(
+            f"Arena {arena.name!r} has no place with {robot.radius + ROOM_M:.2f} m to each side, expected one: the "
+            "robot has to turn in place without touching anything."
+        )
+    turns = (0.0, np.pi / 2)
+    lengths = [_free_line(at, heading, lines, robot.radius + ROOM_M) for heading in turns]
+    which = int(np.argmax(lengths))
+    return Pose(float(at[0]), float(at[1]), turns[which]), (max(lengths[which], across), across)
+
+
+def _free_line(at: Floats, heading: float, lines: Floats, room: float) -> float:
+    """How far it goes straight, ahead as well as back, with so much room to each side [m]."""
+    far = np.arange(0.0, 2.0, 0.01)
+    path = np.array([np.cos(heading), np.sin(heading)])
+    free = [_away(at + sign * far[:, None] * path, lines) >= room for sign in (1, -1)]
+    blocked = np.flatnonzero(~(free[0] & free[1]))
+    return (
+        float(far[blocked[0] - 1])
+        if len(blocked) and blocked[0] > 0
+        else float(far[-1])
+        if not len(blocked)
+        else 0.0
+    )
+
+
+def _away(points: Floats, lines: Sequence[Sequence[float]] | Floats) -> Floats:
+    """(n,) distance from each point to the nearest wall [m]."""
+    nearest = np.full(len(points), np.inf)
+    for x1, y1, x2, y2 in lines:
+        way = np.array([x2 - x1, y2 - y1])
+        off = points - (x1, y1)
+        at = np.clip(off @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.hypot(*(off - at[:, None] * way).T))
+    return nearest

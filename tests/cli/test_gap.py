@@ -1,0 +1,96 @@
+"""`realitygap gap` and `realitygap plan` as a user meets them."""
+
+import json
+import sys
+import warnings
+
+import pytest
+
+from realitygap.cli import main
+from realitygap.gap import MEASURES
+from tests.cli.test_commands import realitygap
+
+SMALL = ("gap", "sim", "jyro", "--n-controllers", "6", "--trials", "3")
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """A command in this process, which has compiled already: status, output and errors."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+
+    def run(*words, cwd=tmp_path):
+        monkeypatch.chdir(cwd)
+        monkeypatch.setattr(sys, "argv", ["realitygap", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        written = capsys.readouterr()
+        return ended.value.code or 0, written.out, written.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gap")
+    more = ("--margin", "0.05", "--observe", "track", "--report", "gap.html", "-o", "trials.jsonl", "--json")
+    done = realitygap(*SMALL, *more, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_json_has_every_measure_with_estimate_low_high_and_n(printed):
+    _, found = printed
+    for name in MEASURES:
+        assert {"estimate", "low", "high", "n"} <= set(found[name]), name
+    assert found["misspecified"] is None
+    assert "SIM jyro" in found["verdict"]
+
+
+def test_the_page_and_the_trials_are_kept(printed):
+    folder, _ = printed
+    assert (folder / "gap.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+    assert len((folder / "trials.jsonl").read_text("utf-8").splitlines()) == 1 + 6 * 3
+
+
+def test_the_same_command_again_takes_the_kept_trials(printed, command):
+    folder, found = printed
+    more = ("--margin", "0.05", "--observe", "track", "-o", "trials.jsonl", "--json")
+    assert json.loads(command(*SMALL, *more, cwd=folder)[1]) == found
+
+
+def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
+    folder, _ = printed
+    code, out, _ = command("plan", "--effect", "0.05", "--from", "trials.jsonl", cwd=folder)
+    assert code == 0
+    assert "6 controllers, 3 trials each" in out
+    assert "Fewest trials on the target" in out
+
+
+def test_the_table_ends_with_the_verdict(command):
+    code, out, err = command("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
+    assert (code, err) == (0, "")
+    assert out.rstrip().splitlines()[-1].startswith("Between SIM sim and SIM sim, ")
+
+
+@pytest.mark.parametrize(
+    ("words", "texts"),
+    [
+        (("gap", "sim", "jyrro"), ("no platform", "jyro")),
+        (("gap", "sim", "jyro", "--why"), ("realitygap calibrate all --robot jyro",)),
+        (("gap", "sim", "jyro", "--margin", "-1"), ("--margin is -1", "above 0")),
+        (("gap", "sim", "jyro", "--report", "gap.pdf"), (".html",)),
+        (("gap", "sim", "jyro", "--controllers", "nobody"), ("Unknown study 'nobody'",)),
+        (("gap", "sim:nowhere.toml", "jyro"), ("nowhere.toml",)),
+        (("gap", "sim", "jyro", "--arena", "nowhere"), ("nowhere",)),
+        (("plan",), ("expected one of --effect, --margin and --correlation",)),
+        (("plan", "--effect", "0.1", "--margin", "0.1"), ("--effect, --margin",)),
+        (("plan", "--effect", "0"), ("effect is 0",)),
+        (("plan", "--effect", "0.1", "--from", "nothing.jsonl"), ("no file nothing.jsonl",)),
+    ],
+)
+def test_what_cannot_be_is_one_message(words, texts, command):
+    code, _, err = command(*words)
+    assert code == 1
+    assert err.count("realitygap: ") == 1
+    for text in texts:
+        assert text in err

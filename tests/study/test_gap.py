@@ -1,0 +1,212 @@
+"""The same controllers on both sides of a gap, resumable, with what is not the transfer gap kept apart."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from realitygap.errors import RecordError, StudyError
+from realitygap.gap import GapSide
+from realitygap.robots import SimPlatform
+from realitygap.study import (
+    PARTS,
+    Controller,
+    gap_between,
+    open_target,
+    part_of,
+    run_gap,
+    sample_controllers,
+    study_gap,
+    why_gap,
+)
+from realitygap.trials import SimTarget
+from realitygap.world import Calibration, paper_arena
+
+ARENA = paper_arena()
+
+
+@dataclass
+class Counted:
+    """A target that counts what it is asked, and stops working after so many trials."""
+
+    target: SimTarget
+    fails_after: int = 10**9
+    asked: list[int] = field(default_factory=list)
+
+    def __getattr__(self, name):
+        return getattr(self.target, name)
+
+    def carry_out(self, plans, observe, tell=None):
+        trials = []
+        for k, plan in enumerate(plans):
+            if len(self.asked) >= self.fails_after:
+                raise RecordError("the power went")
+            self.asked.append(plan.number)
+            trials += self.target.carry_out([plan], observe)
+            if tell is not None:
+                tell(k, trials[-1])
+        return trials
+
+
+@pytest.fixture(scope="module")
+def some():
+    return sample_controllers("random", 6, 1)
+
+
+def sim(key=1, **settings):
+    return SimTarget(SimPlatform(set=settings), ARENA, key=key, name="sim")
+
+
+# --- controllers --------------------------------------------------------------------------------------------
+
+
+def test_random_controllers_are_a_function_of_the_seed_and_those_of_fewer_are_the_first():
+    many, few = sample_controllers("random", 12, 3), sample_controllers("random", 5, 3)
+    assert [each.genome for each in few] == [each.genome for each in many[:5]]
+    assert few[0].genome != sample_controllers("random", 5, 4)[0].genome
+
+
+def test_champions_of_a_study_have_the_score_they_were_selected_for_and_a_fresh_one():
+    found = sample_controllers("paper", 8, 1)
+    assert all(each.kind == "champion" and each.selected_on == "jyro" for each in found)
+    assert np.mean([each.selected_score - each.fresh_score for each in found]) > 0
+    assert found[0].name == "coverage-10/0"
+
+
+def test_champions_of_results_are_drawn_from_all_runs(tmp_path):
+    from realitygap.study import run_study
+
+    folder = run_study("paper", tmp_path / "results", replicates=3).folder.path
+    found = sample_controllers(str(folder), 6, 1)
+    assert len({each.name for each in found}) == 6
+    assert found == sample_controllers(folder, 6, 1)
+    with pytest.raises(StudyError, match="Run more replicates"):
+        sample_controllers(folder, 1_000)
+
+
+def test_a_study_that_is_not_there_is_refused():
+    with pytest.raises(StudyError, match="Unknown study"):
+        sample_controllers("papper", 3)
+
+
+# --- trials -------------------------------------------------------------------------------------------------
+
+
+def test_two_sims_show_no_gap_and_never_draw_the_same_noise(some):
+    found = study_gap(sim(), sim(), some, trials=4, margin=0.05)
+    assert not found.result.excludes_no_gap
+    assert found.result.equivalence.more["equivalent"] is True
+    assert not np.array_equal(found.source.values, found.target.values)
+
+
+def test_30_pairs_of_sims_exclude_no_gap_at_most_4_times():
+    # each interval of 95 % excludes it in 1 of 20: more than 4 of 30 in 1 of 60 tries
+    excluded = 0
+    for seed in range(30):
+        controllers = sample_controllers("random", 12, seed)
+        level = run_gap(sim(2 * seed), sim(2 * seed + 1), controllers, trials=5, seed=seed)
+        excluded += level.excludes_no_gap or not level.level.low <= 0 <= level.level.high
+    assert excluded <= 4
+
+
+def test_jyro_is_a_real_gap():
+    found = gap_between("sim", "jyro", n_controllers=12, trials=4, margin=0.02)
+    assert found.study.result.excludes_no_gap
+    assert found.study.result.energy.more["p"] < 0.01
+    assert found.study.result.equivalence.more["equivalent"] is not True
+
+
+def test_trials_go_round_the_controllers(some):
+    target = Counted(sim())
+    run_gap(sim(), target, some[:3], trials=2)
+    assert np.diff(target.asked).tolist() == [4096, 4096, 1 - 2 * 4096, 4096, 4096]
+
+
+def test_what_is_kept_is_not_carried_out_again_and_comes_out_the_same(some, tmp_path):
+    path = tmp_path / "trials.jsonl"
+    whole = run_gap(sim(), sim(), some, trials=3)
+    with pytest.raises(RecordError, match="power"):
+        run_gap(sim(), Counted(sim(), fails_after=7), some, trials=3, results=path)
+    again = Counted(sim())
+    assert run_gap(sim(), again, some, trials=3, results=path).to_json() == whole.to_json()
+    assert len(again.asked) == 18 - 7
+    more = Counted(sim())
+    run_gap(sim(), more, some, trials=4, results=path)
+    assert len(more.asked) == 6
+
+
+def test_a_file_of_another_target_is_refused(some, tmp_path):
+    path = tmp_path / "trials.jsonl"
+    run_gap(sim(), sim(), some, trials=2, results=path)
+    with pytest.raises(RecordError, match="something else"):
+        run_gap(sim(), open_target("jyro", ARENA), some, trials=2, results=path)
+
+
+def test_replays_are_measured_where_the_robot_is_seen(some):
+    found = study_gap(sim(), sim(**{"drive.track": 0.2}), some, trials=2, observe="track")
+    assert found.replay.distance[:, 0] == pytest.approx(np.zeros(12), abs=1e-6)
+    assert found.replay.heading[:, 10].mean() > 5 * found.replay.noise_heading[:, 10].mean()
+    assert found.target.ends.shape == (6, 2, 2)
+    assert study_gap(sim(), sim(), some, trials=2).replay is None
+
+
+def test_luck_and_what_was_evolved_apart_are_no_part_of_the_transfer_gap(some):
+    champions = [
+        Controller(each.genome, f"c/{k}", selected_score=0.5, fresh_score=0.4, selected_on="sim")
+        for k, each in enumerate(some)
+    ]
+    plain = run_gap(sim(), sim(), some, trials=2)
+    apart = run_gap(sim(), sim(), champions, trials=2, reevolved=champions)
+    assert apart.luck.estimate == pytest.approx(0.1)
+    assert apart.reevolved.estimate == pytest.approx(apart.level.estimate, abs=0.03)
+    assert plain.luck.estimate is None
+    assert plain.reevolved.estimate is None
+    assert apart.rms == plain.rms
+
+
+def test_why_without_a_calibration_says_how_to_make_one():
+    with pytest.raises(StudyError, match="calibrate all"):
+        gap_between("sim", "jyro", why=True)
+
+
+# --- why ----------------------------------------------------------------------------------------------------
+
+
+def test_every_number_of_the_robot_is_of_one_part():
+    parts = {part_of(name) for name in SimPlatform().robot.numbers()}
+    assert parts == set(PARTS)
+    assert part_of("drive.track") == "turn per step"
+    assert part_of("drive.lag") == "motor"
+    assert part_of("range.0.burst") == "sensor noise"
+
+
+def test_the_part_that_differs_carries_the_gap():
+    controllers = sample_controllers("random", 10, 1)
+    hidden = {"drive.track": 0.21}
+    target = study_gap(sim(), sim(7, **hidden), controllers, trials=8).target
+    calibration = Calibration(
+        kind="all", robot="scribbler-s2-fluke2", target="sim", label="SIM", observe="track", trials=1,
+        date="2026-01-01", method="known", numbers={**hidden, "contact.friction": 0.3},
+        draws={"drive.track": (0.209, 0.211), "contact.friction": (0.3, 0.3)},
+    )  # fmt: skip
+    found = why_gap(calibration, ARENA, [each.genome for each in controllers], target, draws=2, trials=4)
+    falls = dict(zip(found.parts, found.falls, strict=True))
+    assert found.after.estimate < 0.5 * found.before.estimate
+    assert falls["turn per step"].estimate == pytest.approx(
+        found.before.estimate - found.after.estimate, abs=1e-6
+    )
+    assert falls["contact"].estimate == 0.0  # the fit did not change it
+    assert falls["body"].estimate == 0.0
+    assert "Change this next: " in found.advice
+
+
+def test_why_needs_numbers_to_switch_and_noise_to_tell(some):
+    nothing = Calibration(
+        kind="all", robot="scribbler-s2-fluke2", target="sim", label="SIM", observe="cells", trials=1,
+        date="2026-01-01", method="known",
+    )  # fmt: skip
+    genomes = [each.genome for each in some]
+    with pytest.raises(StudyError, match="changes no number"):
+        why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 2))))
+    with pytest.raises(StudyError, match="one trial"):
+        why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 1))))

@@ -199,7 +199,7 @@ def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
 def _step_by_step(t: int, rehearsal: Rehearsal) -> _Columns:
     """All that is seen of trials with t given commands, from afar."""
     columns = _Columns()
-    columns.add("reading", rehearsal.readings[:, :, :t])
+    columns.add("readings", rehearsal.readings[:, :, :t])
     columns.add("stall", rehearsal.stalled[:, :, :t])
     columns.add("cell", rehearsal.cells, 0)
     columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
@@ -212,7 +212,7 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     stalled = rehearsal.stalled[:, :, :t, None].astype(np.float32)
     commands = rehearsal.commands
     columns = _Columns()
-    columns.add("reading", _blocks(readings), BLOCK)
+    columns.add("readings", _blocks(readings), BLOCK)
     columns.add("stall", _blocks(stalled), BLOCK)
     columns.add("command", _blocks(commands), BLOCK)
     columns.add("cell", rehearsal.cells, 0)
@@ -223,7 +223,7 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     )
     for lag in (0, 1, 2, 4):
         a, b = seen[:, :, : t - lag], seen[:, :, lag:]
-        columns.add("reading", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
+        columns.add("readings", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
     return columns
 
 

@@ -116,7 +116,7 @@ def calibration_of(
     tell: Callable[[str], None] | None = None,
     threads: int | None = None,
 ) -> Calibration:
-    """The calibration from trials that were recorded; arguments as in `calibrate_all`, and what the file says of them."""
+    """The calibration from trials that were recorded; arguments as in `calibrate_all`, and what the file says."""
     parts = _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
     return _calibration(parts, robot_name, target, label, observe, len(trials))
 

@@ -31,8 +31,19 @@ LEAST_STEPS = 5  # of a trial that tells anything
 
 # The least that can be told apart of each kind, as standard deviation: below it a simulator without noise would be
 # refuted by rounding.
-FINEST = {"ahead": 2e-4, "aside": 2e-4, "turn": 1e-3, "reading": 0.02, "readings": 0.02, "stall": 0.02, "wheels": 1e-4, "cell": 0.05,
-          "command": 0.02, "coverage": 0.01}  # fmt: skip
+FINEST = {
+    "ahead": 2e-4,
+    "aside": 2e-4,
+    "turn": 1e-3,
+    "reading": 0.02,
+    "readings": 0.02,
+    "stall": 0.02,
+    "wheels": 1e-4,
+    "cell": 0.05,
+    "command": 0.02,
+    "coverage": 0.01,
+}
+"""Of each kind of entry, in its unit; `readings` are those seen from afar, of a robot that is not put back."""
 
 
 @dataclass(frozen=True)

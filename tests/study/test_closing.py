@@ -87,7 +87,7 @@ def test_a_useless_calibration_misses_them_and_says_on_which_twins(tmp_path):
     summary = carry_out(tmp_path, Twins(right=False))
     missed = goals_of(summary)["fall of the RMS gap, track"]
     assert missed["met"] is False
-    assert {each["twin"] for each in missed["why"]} == {"slow-1000", "blind-1000"}
+    assert {each["twin"] for each in missed["why"]} == {"slow-1", "blind-1"}
     assert abs(missed["figure"]) < 0.3
 
 

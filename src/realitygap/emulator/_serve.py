@@ -265,6 +265,7 @@ class WitnessDoor:
         self.address = f"{HOST}:{self._listening.getsockname()[1]}"
         self._selector: selectors.BaseSelector | None = None
         self._clients: dict[socket.socket, bytearray] = {}
+        self._holder: socket.socket | None = None  # who holds an emulator's time that passes by itself
 
     def watch(self, selector: selectors.BaseSelector) -> None:
         """New clients may come."""
@@ -296,13 +297,20 @@ class WitnessDoor:
         while b"\n" in held:
             line, _, rest = bytes(held).partition(b"\n")
             held[:] = rest
-            client.sendall(answer_witness(self._witness, line))
+            waited = self._witness.waits
+            answer = answer_witness(self._witness, line)
+            if self._witness.waits and not waited:
+                self._holder = client
+            client.sendall(answer)
 
     def _forget(self, client: socket.socket) -> None:
         if self._selector is not None:
             with contextlib.suppress(KeyError, ValueError):
                 self._selector.unregister(client)
         self._clients.pop(client, None)
+        if client is self._holder:
+            self._holder = None
+            self._witness.waits = False
         client.close()
 
     def close(self) -> None:
@@ -343,8 +351,7 @@ class Server:
         self.emulator, self._channel, self._speed = emulator, channel, speed
         self.name = channel.name
         self._lock = RLock()
-        self._waits = speed == 0
-        self.witness = DirectWitness(emulator, self._lock, waits=self._waits)
+        self.witness = DirectWitness(emulator, self._lock, waits=speed == 0, speed=speed)
         self._watch, self._watch_s, self._watched = watch, watch_s, 0.0
         try:
             self._door = None if witness is None else WitnessDoor(self.witness, witness)
@@ -366,7 +373,11 @@ class Server:
         self._stopped = False
         self._is_away = False
         self._thread: Thread | None = None
-        self._begun = 0.0 if self._waits else time.monotonic() - emulator.now / speed
+        self._begun: float | None = None  # when its time would have begun; None while it waits
+
+    @property
+    def _waits(self) -> bool:
+        return self.witness.waits
 
     def start(self) -> Server:
         """Serve in a thread of its own until `close`."""
@@ -429,7 +440,9 @@ class Server:
 
     def _behind(self) -> float:
         """How far the emulator's time is behind [real s]."""
-        return time.monotonic() - self._begun - self.emulator.now / self._speed
+        return (
+            0.0 if self._begun is None else time.monotonic() - self._begun - self.emulator.now / self._speed
+        )
 
     def _take(self, who: object, ready: object) -> None:
         if who is None:
@@ -465,7 +478,10 @@ class Server:
 
     def _catch_up(self) -> None:
         if self._waits:
+            self._begun = None
             return
+        if self._begun is None:
+            self._begun = time.monotonic() - self.emulator.now / self._speed
         self.emulator.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
 
     def _exchange(self) -> None:

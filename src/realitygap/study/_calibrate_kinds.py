@@ -26,6 +26,7 @@ from realitygap.calibration import (
     path_plans,
     placements_of,
     sensor_plans,
+    step_of,
 )
 from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.robots import Command, SimPlatform
@@ -235,7 +236,7 @@ def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedT
 
 
 def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
-    step_s = trials[0].step_s if trials else robot.step_s
+    step_s = step_of(trials) if trials else robot.step_s
     return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena).replay
 
 

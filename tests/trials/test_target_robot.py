@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -248,3 +250,16 @@ def test_commands_last_as_long_however_fast_the_emulator_is(speed: str) -> None:
         (trial,) = target.carry_out([FORWARD], "track")
     assert (trial.end, trial.step_s) == ("step limit", 0.5)
     np.testing.assert_allclose(trial.poses, expected.poses, atol=1e-3)
+
+
+def test_a_robot_that_was_left_driving_too_fast_for_the_machine_answers_all_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
+    file = tmp_path / "close.toml"
+    file.write_text(sample_twin("close", 1).to_toml())
+    with emulator("--twin", str(file), "--speed", "1000") as (port, witness):
+        with socket.create_connection(("127.0.0.1", int(port.rpartition(":")[2]))) as left:
+            left.sendall(bytes([109, 255, 100, 0, 0, 0, 0, 0, 0]))  # SET_MOTORS, to turn on the spot
+            time.sleep(0.5)
+        with open_target(port, ARENA, witness=witness) as target:
+            (trial,) = target.carry_out([FORWARD], "track")
+    assert (trial.end, trial.step_s) == ("step limit", 0.5)

@@ -24,6 +24,8 @@ PIECE = 1 << 16
 LONGEST_REQUEST = 1 << 16  # bytes of a line that a witness may send
 SILENT_S = 0.002  # for so long a client says nothing that waits for more of an answer
 ANSWER_S = 5.0  # within which an answer comes, by the emulator's time
+LONGEST_S = 0.05  # of real time that physics may take at once
+PASSED_AT_ONCE_NS = SECOND // 4  # of the emulator's time, before it is looked whether they took so long
 IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
 
 
@@ -482,7 +484,13 @@ class Server:
             return
         if self._begun is None:
             self._begun = time.monotonic() - self.emulator.now / self._speed
-        self.emulator.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
+        until = nanoseconds((time.monotonic() - self._begun) * self._speed)
+        latest = time.monotonic() + LONGEST_S
+        while self.emulator.now_ns < until:
+            self.emulator.advance_to(min(until, self.emulator.now_ns + PASSED_AT_ONCE_NS))
+            if time.monotonic() > latest:  # its body takes longer: time passes as fast as that can, and it answers
+                self._begun = time.monotonic() - self.emulator.now / self._speed
+                return
 
     def _exchange(self) -> None:
         """Let time pass, and hand on what has come out."""

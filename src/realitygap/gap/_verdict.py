@@ -24,7 +24,8 @@ def _size(result: GapResult) -> str:
     if rms.estimate is None:
         return "the size of the gap cannot be told"
     if not result.excludes_no_gap:
-        return f"no gap is shown (RMS at most {rms.high:.3f})"
+        most = "" if rms.high is None else f" (RMS at most {rms.high:.3f})"
+        return f"no gap is shown{most}"
     side = _side(level)
     return f"the transfer gap is {rms} RMS over {rms.n} controllers{side}"
 

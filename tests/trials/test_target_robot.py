@@ -259,7 +259,7 @@ def test_a_robot_that_was_left_driving_too_fast_for_the_machine_answers_all_the_
     with emulator("--twin", str(file), "--speed", "1000") as (port, witness):
         with socket.create_connection(("127.0.0.1", int(port.rpartition(":")[2]))) as left:
             left.sendall(bytes([109, 255, 100, 0, 0, 0, 0, 0, 0]))  # SET_MOTORS, to turn on the spot
-            time.sleep(0.5)
+            time.sleep(3.0)
         with open_target(port, ARENA, witness=witness) as target:
             (trial,) = target.carry_out([FORWARD], "track")
     assert (trial.end, trial.step_s) == ("step limit", 0.5)

@@ -488,7 +488,10 @@ class Server:
         latest = time.monotonic() + LONGEST_S
         while self.emulator.now_ns < until:
             self.emulator.advance_to(min(until, self.emulator.now_ns + PASSED_AT_ONCE_NS))
-            if time.monotonic() > latest:  # its body takes longer: time passes as fast as that can, and it answers
+            self.emulator.table.advance_to(self.emulator.now_ns)
+            if (
+                time.monotonic() > latest
+            ):  # its body takes longer: time passes as fast as that can, and it answers
                 self._begun = time.monotonic() - self.emulator.now / self._speed
                 return
 

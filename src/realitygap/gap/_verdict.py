@@ -23,9 +23,10 @@ def _size(result: GapResult) -> str:
     rms, level = result.rms, result.level
     if rms.estimate is None:
         return "the size of the gap cannot be told"
+    if rms.high is None:
+        return f"the transfer gap is {rms.estimate:.3f} RMS, of too few controllers to say how sure that is"
     if not result.excludes_no_gap:
-        most = "" if rms.high is None else f" (RMS at most {rms.high:.3f})"
-        return f"no gap is shown{most}"
+        return f"no gap is shown (RMS at most {rms.high:.3f})"
     side = _side(level)
     return f"the transfer gap is {rms} RMS over {rms.n} controllers{side}"
 

@@ -113,6 +113,20 @@ def test_the_likelihood_is_what_the_kernels_draw(robot, scales, make):
     assert np.abs(off).max() < 4.5
 
 
+def test_likelihoods_of_readings_add_up_to_one_where_a_sensor_is_saturated():
+    # readings of 1 that were rounded to a step which does not divide 1 once counted as 0.99999, and not as censored
+    read = [Placement(np.array([0.08, 0.08, 0.08]), np.array([1.0, 1.0, 0.73215, 0.73218, 0.0]))]
+    model = MixtureReadings(read, 0.5)
+    truth = {"amplitude": 3.0, "decay": 0.2, "noise_gain": 0.1} | {
+        name: value for scale in (*DROP, *OUTLIER) for name, value in [(scale.name, scale.low)]
+    }
+    values = np.array([[truth[scale.name] for scale in MIXTURE]])
+    saturated = model._rows[1] >= 1.0
+    assert model._rows[2][saturated].tolist() == [2.0]
+    certain = MixtureReadings([Placement(read[0].distances, np.ones(50))], 0.5)
+    assert certain.log_likelihood(values)[0] == pytest.approx(0.0, abs=1e-3)
+
+
 def test_readings_that_follow_each_other_count_less():
     rng = np.random.default_rng(7)
     apart, alike, held = [], [], []

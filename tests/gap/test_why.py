@@ -30,7 +30,7 @@ def test_draws_from_the_posterior_widen_the_intervals():
     low, high = (
         getattr(explain_gap(spread, ("motor", "body"), (1, 1)).falls[0], end) for end in ("low", "high")
     )
-    assert high - low > 0.05
+    assert high - low > 0.04
 
 
 def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_advised():

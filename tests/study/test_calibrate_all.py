@@ -58,6 +58,21 @@ def test_trials_are_the_same_for_the_same_seed_and_touch_nothing_at_the_start():
         assert robot.radius < plan.start.x < 42 * 0.0254 - robot.radius
 
 
+@pytest.mark.parametrize(("observe", "groups"), [("cells", 2), ("encoders", 4), ("track", 1)])
+def test_what_trials_tell_is_as_long_as_what_simulations_make(observe, groups):
+    platform = SimPlatform()
+    with SimTarget(platform, ARENA) as target:
+        trials = target.carry_out(all_plans(ARENA, platform.robot, 2), observe)
+    genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
+    evidence = evidence_of(trials, genomes, ARENA.grid.n_cells)
+    ensemble = SimEnsemble(platform, ARENA, threads=1)
+    assert len(evidence) == groups
+    for one in evidence:
+        made = ensemble.summarize(one.play, {"drive.lag": [0.0, 0.1]}, 1, one.of, keep=one.keep)
+        assert made.shape == (2, len(one.seen))
+        assert one.finest.shape == one.seen.shape == one.trial.shape == one.step.shape
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("observe", ["cells", "encoders", "track"])
 def test_intervals_of_robots_from_the_prior_cover_as_often_as_they_say(observe):

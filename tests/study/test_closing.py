@@ -87,7 +87,7 @@ def test_a_useless_calibration_misses_them_and_says_on_which_twins(tmp_path):
     summary = carry_out(tmp_path, Twins(right=False))
     missed = goals_of(summary)["fall of the RMS gap, track"]
     assert missed["met"] is False
-    assert {each["twin"] for each in missed["why"]} == {"slow-1000", "blind-1000"}
+    assert {each["twin"] for each in missed["why"]} == {"slow-1", "blind-1"}
     assert abs(missed["figure"]) < 0.3
 
 
@@ -116,8 +116,12 @@ def test_an_interrupted_study_goes_on_and_ends_the_same(right, tmp_path):
 
 def test_each_calibration_sees_only_its_budget(right):
     _, folder, _ = right
+    budgets = set()
     for path in (folder / "calibrations").glob("*.jsonl"):
-        assert len(path.read_text().splitlines()) == 1 + 4  # a head, and a line a trial
+        budget = int(path.stem.rpartition("-")[2])
+        assert len(path.read_text().splitlines()) == 1 + budget  # a head, and a line a trial
+        budgets.add(budget)
+    assert budgets == {2, 4}  # by which the gap is measured, and half of it for transfer
 
 
 def test_page_says_what_is_simulated_and_holds_all_figures(right, tmp_path):

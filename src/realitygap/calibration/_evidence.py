@@ -31,8 +31,19 @@ LEAST_STEPS = 5  # of a trial that tells anything
 
 # The least that can be told apart of each kind, as standard deviation: below it a simulator without noise would be
 # refuted by rounding.
-FINEST = {"ahead": 2e-4, "aside": 2e-4, "turn": 1e-3, "reading": 0.02, "stall": 0.02, "wheels": 1e-4, "cell": 0.05,
-          "command": 0.02, "coverage": 0.01}  # fmt: skip
+FINEST = {
+    "ahead": 2e-4,
+    "aside": 2e-4,
+    "turn": 1e-3,
+    "reading": 0.02,
+    "readings": 0.02,
+    "stall": 0.02,
+    "wheels": 1e-4,
+    "cell": 0.05,
+    "command": 0.02,
+    "coverage": 0.01,
+}
+"""Of each kind of entry, in its unit; `readings` are those seen from afar, of a robot that is not put back."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +210,7 @@ def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
 def _step_by_step(t: int, rehearsal: Rehearsal) -> _Columns:
     """All that is seen of trials with t given commands, from afar."""
     columns = _Columns()
-    columns.add("reading", rehearsal.readings[:, :, :t])
+    columns.add("readings", rehearsal.readings[:, :, :t])
     columns.add("stall", rehearsal.stalled[:, :, :t])
     columns.add("cell", rehearsal.cells, 0)
     columns.add("coverage", rehearsal.cells.mean(axis=2, keepdims=True), 0)
@@ -212,7 +223,7 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     stalled = rehearsal.stalled[:, :, :t, None].astype(np.float32)
     commands = rehearsal.commands
     columns = _Columns()
-    columns.add("reading", _blocks(readings), BLOCK)
+    columns.add("readings", _blocks(readings), BLOCK)
     columns.add("stall", _blocks(stalled), BLOCK)
     columns.add("command", _blocks(commands), BLOCK)
     columns.add("cell", rehearsal.cells, 0)
@@ -223,7 +234,7 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     )
     for lag in (0, 1, 2, 4):
         a, b = seen[:, :, : t - lag], seen[:, :, lag:]
-        columns.add("reading", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
+        columns.add("readings", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
     return columns
 
 

@@ -19,8 +19,8 @@ STRAY = 1e-6
 FINEST = 1e-5
 """Readings are taken to be rounded at least to multiples of this."""
 
-MOST_STEPS = 1000
-"""Distinct readings of a sensor that answers in steps."""
+COARSE = 1e-3
+"""A step below this is none: readings that happen to be near each other have it, too."""
 
 BINS = 20
 """Between 0 and 1, for checks and figures, of a sensor that answers in finer steps."""
@@ -31,8 +31,8 @@ def step_of(readings: Array) -> float:
     values = np.unique(np.asarray(readings, np.float64))
     apart = np.diff(values)
     step = float(apart[apart > FINEST].min(initial=1.0))
-    whole = np.rint(values / step)
-    return step if len(values) < MOST_STEPS and np.allclose(whole * step, values, atol=FINEST) else FINEST
+    is_coarse = step > COARSE and np.allclose(np.rint(values / step) * step, values, atol=FINEST)
+    return step if is_coarse else FINEST
 
 
 class MixtureReadings:
@@ -61,9 +61,9 @@ class MixtureReadings:
         readings: list[float] = []
         counts: list[int] = []
         for k, placement in enumerate(placements):
-            values, n = np.unique(
-                np.rint(np.clip(placement.readings, 0, 1) / self.step) * self.step, return_counts=True
-            )
+            clipped = np.clip(placement.readings, 0.0, 1.0)
+            rounded = np.where(clipped < 1.0, np.rint(clipped / self.step) * self.step, 1.0)
+            values, n = np.unique(np.minimum(rounded, 1.0), return_counts=True)
             which += [k] * len(values)
             readings += values.tolist()
             counts += n.tolist()

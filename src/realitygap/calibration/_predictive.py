@@ -21,13 +21,13 @@ from ._prior import Floats
 N_PREDICTIVE = 200  # robots from the posterior
 
 TOLERATED = {
-    "ahead": 0.2,
-    "turn": 0.2,
-    "reading": 0.35,
-    "stall": 1.0,
-    "coverage": 1.0,
+    "ahead": 0.08,
+    "turn": 0.08,
+    "reading": 0.15,
+    "wheels": 0.15,
+    "readings": 0.4,
     "command": 0.5,
-    "wheels": 0.2,
+    "coverage": 1.0,
 }
 """Share of the variance of each kind of observation up to which a fit counts as well specified."""
 

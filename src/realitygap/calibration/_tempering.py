@@ -98,9 +98,9 @@ def _move(
     m, d = places.shape
     one, other = rng.integers(m, size=(2, m))
     jumps = (places[one] - places[other]) * (2.38 / np.sqrt(2 * d)) + rng.normal(0, 1e-9, (m, d))
-    axes = rng.integers(d, size=m)[:, None] == np.arange(d)
+    axes = rng.integers(d, size=(m, 1)) == np.arange(d)
     jumps = np.where(rng.random((m, 1)) < 1 / 3, np.where(axes, jumps * np.sqrt(d), 0.0), jumps)
-    short = rng.random(m) < 1 / 2
+    short = rng.random((m,)) < 1 / 2
     jumps[short] *= 10.0 ** -rng.uniform(0, FINEST, (int(short.sum()), 1))
     proposed = _reflected(places + scale * jumps)
     news = log_likelihood(proposed)

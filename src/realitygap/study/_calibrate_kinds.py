@@ -25,6 +25,8 @@ from realitygap.calibration import (
     motion_plans,
     path_plans,
     placements_of,
+    ranges_of,
+    scribbler_prior,
     sensor_plans,
     step_of,
 )
@@ -237,7 +239,8 @@ def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedT
 
 def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
     step_s = step_of(trials) if trials else robot.step_s
-    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena).replay
+    ranges = ranges_of(scribbler_prior(robot), robot)
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges).replay
 
 
 def _parts_of(fit: MotionFit) -> Parts:

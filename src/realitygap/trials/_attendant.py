@@ -136,11 +136,9 @@ class WitnessAttendant(RobotsOwnSenses):
 
     def poses(self) -> NDArray[np.float64]:
         """(n, 3) at each look."""
-        path = self._witness.path()
-        at = [
-            np.interp(self._times, path[:, 0], column) for column in (*path[:, 1:3].T, np.unwrap(path[:, 3]))
-        ]
-        poses: NDArray[np.float64] = np.stack(at, axis=1)
+        path = self._witness.path()  # a point for each short step in which it moved
+        rows = np.searchsorted(path[:, 0], np.array(self._times) + 1e-9, side="right") - 1
+        poses: NDArray[np.float64] = path[np.maximum(rows, 0), 1:4]
         poses[:, 2] %= math.tau
         return poses
 

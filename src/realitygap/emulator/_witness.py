@@ -190,9 +190,14 @@ class RemoteWitness:
     def __init__(self, address: str, timeout_s: float = 30.0) -> None:
         self._address = address
         host, _, port = address.rpartition(":")
+        if not (port.isdecimal() and 0 < int(port) < 65536):
+            raise RobotError(
+                f"No witness at {address!r}, expected HOST:PORT such as 127.0.0.1:7002, as `realitygap emulate --witness "
+                "PORT` prints it."
+            )
         try:
             self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)
-        except (OSError, ValueError) as error:
+        except OSError as error:
             raise RobotError(
                 f"No witness at {address} ({error}). Start the emulator with --witness PORT and give 127.0.0.1:PORT."
             ) from error

@@ -168,7 +168,7 @@ def test_nobody_at_the_witness_is_said_so():
     with pytest.raises(RobotError, match="No witness at"):
         connect_witness("127.0.0.1:1")
     for address in ("somewhere", "127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:-1"):
-        with pytest.raises(RobotError, match="No witness at .* expected HOST:PORT"):
+        with pytest.raises(RobotError, match=r"No witness at .* expected HOST:PORT"):
             connect_witness(address)
 
 

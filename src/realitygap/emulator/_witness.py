@@ -192,8 +192,8 @@ class RemoteWitness:
         host, _, port = address.rpartition(":")
         if not (port.isdecimal() and 0 < int(port) < 65536):
             raise RobotError(
-                f"No witness at {address!r}, expected HOST:PORT such as 127.0.0.1:7002, as `realitygap emulate --witness "
-                "PORT` prints it."
+                f"No witness at {address!r}, expected HOST:PORT such as 127.0.0.1:7002, as `realitygap emulate "
+                "--witness PORT` prints it."
             )
         try:
             self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)

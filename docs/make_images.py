@@ -1,9 +1,10 @@
-"""The pictures of the README: what the paper's study gives, and one network of it on two platforms.
+"""The pictures of the README: what the paper's study gives, and one network of it on three platforms.
 
     uv run python docs/make_images.py
 
 Carries out `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: paths
-of a typical run beside the best coverage of the nine conditions, and the divergence between `jyro` and `sim`.
+of a typical run beside the best coverage of the nine conditions, and the divergence between `jyro`, `sim` and a twin of
+the family close.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from realitygap import Condition, ResultsFolder, replay, run_study
 from realitygap.report import save_divergence
+from realitygap.robots.twin import sample_twin
 
 IMAGE = Path(__file__).parent / "images" / "paper.svg"
 DIVERGENCE = Path(__file__).parent / "images" / "divergence.svg"
@@ -158,7 +160,9 @@ def main() -> None:
         draw_run(figure.add_axes((0.01, 0.15, 0.52, 0.70)), folder)
         draw_study(figure.add_axes((0.60, 0.13, 0.30, 0.72)), folder)
         DIVERGENCE.parent.mkdir(exist_ok=True)
-        save_divergence(folder, DIVERGENCE, condition="novelty-50", against="sim")
+        twin = Path(temporary) / "close-1.toml"
+        twin.write_text(sample_twin("close", 1).to_toml(), "utf-8")
+        save_divergence(folder, DIVERGENCE, condition="novelty-50", against=f"sim,twin:{twin}")
     IMAGE.parent.mkdir(exist_ok=True)
     figure.savefig(IMAGE, metadata={"Date": None, "Creator": None})
     IMAGE.write_text(_shorter(IMAGE.read_text("utf-8")), "utf-8")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, multivariate_normal
 
-from realitygap.calibration import MotionFit, fit_motion, motion_plans
+from realitygap.calibration import MotionFit, fit_motion, motion_plans, step_of
 from realitygap.calibration._handles import MOTION, MOTION_NOISE
 from realitygap.calibration._identify import collinear_groups
 from realitygap.calibration._scatter import LEAST, Scatter
@@ -147,6 +147,8 @@ def test_trials_with_other_commands_are_refused() -> None:
     trials = carried_out(PLANS[:2], {"drive.gain": 1.0}, 0)
     with pytest.raises(ValueError, match="expected one length"):
         fit_motion([trials[0], replace(trials[1], step_s=0.25)], ENSEMBLE.replay, ROBOT, ARENA)
+    over_a_radio_link = [trials[0], replace(trials[1], step_s=0.51)]
+    assert step_of(over_a_radio_link) == pytest.approx(0.505)
 
 
 def test_any_arena_and_robot_with_room_has_plans() -> None:

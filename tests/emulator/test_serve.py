@@ -167,8 +167,9 @@ def test_the_witness_answers_nonsense_with_an_error_and_lives(request_):
 def test_nobody_at_the_witness_is_said_so():
     with pytest.raises(RobotError, match="No witness at"):
         connect_witness("127.0.0.1:1")
-    with pytest.raises(RobotError, match="No witness at"):
-        connect_witness("somewhere")
+    for address in ("somewhere", "127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:-1"):
+        with pytest.raises(RobotError, match=r"No witness at .* expected HOST:PORT"):
+            connect_witness(address)
 
 
 def test_a_hang_up_closes_the_connection_of_a_tcp_client():

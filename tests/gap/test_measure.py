@@ -111,3 +111,9 @@ def test_a_target_that_is_always_worse_leaves_a12_an_interval():
     assert found.estimate == 0.0
     assert found.low == 0.0
     assert found.high == pytest.approx(1 - 0.025 ** (1 / 5))
+
+
+def test_four_controllers_have_a_verdict_without_an_interval():
+    found = measure_gap(*sides(c=4, r=3, gap=0.3))
+    assert found.rms.high is None
+    assert found.verdict.endswith(" RMS, of too few controllers to say how sure that is.")

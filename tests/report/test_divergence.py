@@ -60,7 +60,7 @@ def test_a_twin_can_stand_beside_two_simulators(tiny_study, tmp_path):
     file = tmp_path / "same.toml"
     file.write_text(sample_twin("same", 3).to_toml())
     sides = compare_trials(tiny_study, against=f"sim, twin:{file}", condition="coverage", repeats=3)
-    assert [side.name for side in sides] == ["jyro", "sim", "twin:same.toml"]
+    assert [side.name for side in sides] == ["jyro", "sim", "twin:same"]
     assert [side.trials[0].label for side in sides] == ["SIM", "SIM", "TWIN"]
     drawing = draw_divergence(*sides)
     one, *others = (side.trials for side in sides)

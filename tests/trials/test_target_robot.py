@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +21,10 @@ from realitygap.robots import Command, ScribblerPlatform
 from realitygap.robots.twin import sample_twin
 from realitygap.study import connect_robot, open_target
 from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessAttendant
+from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena
+
+from .fake_robot import FakeRobot
 
 ARENA = paper_arena()
 PORT = "emulator://s2?fluke=2&speed=off"
@@ -207,3 +212,54 @@ def test_what_cannot_be_is_said_before_anything_moves() -> None:
         open_target("scribbler:socket://127.0.0.1:1", ARENA, witness="127.0.0.1:1")
     with pytest.raises(RobotError, match="drives in the arena 'paper', and the study is about"):
         open_target(f"scribbler:{PORT}", load_arena("wall"))
+
+
+class Stuttering:
+    """A clock whose robot takes a second and a half for one of its commands, as where a byte was lost."""
+
+    def __init__(self, late_at: int) -> None:
+        self._now, self._asked, self._late_at = 0.0, 0, late_at
+
+    def now(self) -> float:
+        self._asked += 1
+        self._now += 1.5 if self._asked == self._late_at else 0.0
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        self._now += seconds
+
+
+@pytest.mark.parametrize(("late_at", "n"), [(7, 10), (3, 100)])
+def test_one_late_command_does_not_make_all_of_them_longer(late_at: int, n: int) -> None:
+    robot = PacedRobot(FakeRobot(), 0.5, Stuttering(late_at))
+    robot.reset()
+    for _ in range(n):
+        robot.observe()
+        robot.drive(Command(1.0, 0.0))
+    assert robot.lasted_s == 0.5
+
+
+@pytest.mark.parametrize("speed", ["20", "1000"])
+def test_commands_last_as_long_however_fast_the_emulator_is(speed: str) -> None:
+    with emulated() as target:
+        (expected,) = target.carry_out([FORWARD], "track")
+    with (
+        emulator("--speed", speed) as (port, witness),
+        open_target(port, ARENA, witness=witness) as target,
+    ):
+        (trial,) = target.carry_out([FORWARD], "track")
+    assert (trial.end, trial.step_s) == ("step limit", 0.5)
+    np.testing.assert_allclose(trial.poses, expected.poses, atol=1e-3)
+
+
+def test_a_robot_that_was_left_driving_too_fast_for_the_machine_answers_all_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
+    file = tmp_path / "close.toml"
+    file.write_text(sample_twin("close", 1).to_toml())
+    with emulator("--twin", str(file), "--speed", "1000") as (port, witness):
+        with socket.create_connection(("127.0.0.1", int(port.rpartition(":")[2]))) as left:
+            left.sendall(bytes([109, 255, 100, 0, 0, 0, 0, 0, 0]))  # SET_MOTORS, to turn on the spot
+            time.sleep(3.0)
+        with open_target(port, ARENA, witness=witness) as target:
+            (trial,) = target.carry_out([FORWARD], "track")
+    assert (trial.end, trial.step_s) == ("step limit", 0.5)

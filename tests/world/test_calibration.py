@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import DescriptionError
+from realitygap.robots import SimPlatform
 from realitygap.world import Calibration, Distribution, Fitted, load_calibration, load_robot, read_calibration
 
 
@@ -116,3 +117,10 @@ def test_numbers_drawn_together_stay_together():
     ]
     units = np.array([0.1, 0.5, 0.9])
     assert (distributions[0].of(units) * 10).tolist() == distributions[1].of(units).tolist()
+
+
+def test_a_robot_whose_commands_lasted_longer_has_steps_of_that_length(tmp_path):
+    file = written(tmp_path, made(step_s=0.83))
+    assert load_robot(file).step_s == 0.83
+    assert SimPlatform(robot=load_calibration(file)).command_s == 0.83
+    assert load_robot("scribbler-s2-fluke2").step_s == 0.5

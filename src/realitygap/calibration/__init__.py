@@ -17,6 +17,7 @@ from ._predictive import Misfit, misfits
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
+from ._step import step_of
 
 __all__ = [
     "LEAST_PLACEMENTS",
@@ -63,5 +64,6 @@ __all__ = [
     "sensor_distances",
     "sensor_plans",
     "standard_of",
+    "step_of",
     "values_of",
 ]

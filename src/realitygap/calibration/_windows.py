@@ -12,6 +12,7 @@ from realitygap.world import Arena, RobotModel
 
 from ._handles import Known, robot_numbers
 from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, plain_numbers, starts_of
+from ._step import step_of
 
 CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
 CHANNELS = ("along", "across", "turn", "left", "right")
@@ -74,14 +75,7 @@ def make_windows(
     Raises:
         ValueError: No trial, or steps of different lengths.
     """
-    if not trials:
-        raise ValueError("There are no trials to fit to, expected at least one.")
-    lengths = sorted({trial.step_s for trial in trials})
-    if len(lengths) > 1:
-        raise ValueError(
-            f"Commands last {', '.join(f'{length:g}' for length in lengths)} s in different trials, expected one "
-            "length. Fit them apart."
-        )
+    step_s = step_of(trials)
     commands = padded_commands(trials)
     anchors = np.full((len(trials), commands.shape[1] + 1, 3), np.nan)
     parts = []
@@ -103,7 +97,7 @@ def make_windows(
     )
     return Windows(
         tuple(trials), trial_of.astype(np.int64), first.astype(np.int64), first.astype(np.int64) + length,
-        touching, (before, after, way), commands, anchors, lengths[0],
+        touching, (before, after, way), commands, anchors, step_s,
     )  # fmt: skip
 
 

@@ -78,7 +78,7 @@ class Emulator:
         self.memory = Memory(model, state)
         self._now = 0
         self._order = 0
-        self._events: list[tuple[int, int, Callable[[int], None]]] = []
+        self._events: list[tuple[int, int, Callable[[int], None], Callable[[], bool] | None]] = []
         self._incoming: deque[tuple[int, int]] = deque()
         self._free = 0
         self._line = Line()
@@ -141,13 +141,15 @@ class Emulator:
         """The time since it was switched on [ns]."""
         return self._now
 
-    def schedule(self, when: int, act: Callable[[int], None]) -> None:
-        """Call `act` at a time [ns]; at once if that is past."""
+    def schedule(
+        self, when: int, act: Callable[[int], None], is_due: Callable[[], bool] | None = None
+    ) -> None:
+        """Call `act` at a time [ns]; at once if that is past; not where `is_due` has come to say no."""
         if when <= self._now:
             act(self._now)
             return
         self._order += 1
-        heapq.heappush(self._events, (when, self._order, act))
+        heapq.heappush(self._events, (when, self._order, act, is_due))
 
     def advance(self, seconds: float) -> None:
         """Let time pass.
@@ -165,7 +167,7 @@ class Emulator:
         while True:
             first = incoming[0][0] if incoming else until + 1
             if events and events[0][0] < first and events[0][0] <= until:
-                when, _, act = heapq.heappop(events)
+                when, _, act, _ = heapq.heappop(events)
                 self._now = max(self._now, when)
                 act(self._now)
             elif first <= until:
@@ -180,6 +182,8 @@ class Emulator:
 
     def next_event(self, wanted: int = 1) -> int | None:
         """When something happens next that may bring output [ns], or `wanted` bytes are out; None for never."""
+        while self._events and (is_due := self._events[0][3]) is not None and not is_due():
+            heapq.heappop(self._events)
         times = [self._line.due(wanted)]
         if self._incoming:
             times.append(self._incoming[0][0])

@@ -183,7 +183,7 @@ class Fluke:
             self._schedule(self._robot_line_free + VERSION_NS, lambda now: self._say_version(job, now))
         if self.model == "2" and self._robot.busy:
             job = self._waiting = self._new_job()
-            self._schedule(at + ROBOT_NS, lambda now: self._give_up(job, now))
+            self._schedule(at + ROBOT_NS, lambda now: self._give_up(job, now), lambda: self._waiting == job)
 
     def _new_job(self) -> int:
         self._jobs += 1
@@ -215,7 +215,11 @@ class Fluke:
         if self._info == "asked" and job == self._info_job:
             self._info = "said"
             self._answer(VERSION[self.model], now, self._link_byte_ns)
-            self._schedule(now + SILENT_NS, lambda later: self._end_line(job, later))
+            self._schedule(
+                now + SILENT_NS,
+                lambda later: self._end_line(job, later),
+                lambda: self._info == "said" and job == self._info_job,
+            )
 
     def _end_line(self, job: int, now: int) -> None:
         """The robot does not answer GET_INFO at all."""

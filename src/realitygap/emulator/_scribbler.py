@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
+from typing import Literal, Protocol
 
 from realitygap.robots.scribbler._opcodes import PACKET, Op
 
@@ -20,7 +20,6 @@ from ._table import Table
 from ._time import MILLISECOND, SECOND, nanoseconds
 
 Model = Literal["s1", "s2"]
-Schedule = Callable[[int, Callable[[int], None]], None]
 Send = Callable[[bytes, int, bool], None]  # bytes, from when on, whether they are an echo
 
 INFO = {
@@ -52,6 +51,14 @@ LEDS = {
     Op.SET_LED_ALL_OFF: (0, 0),
 }
 """What each command switches on, and what it leaves as it is: left, center, right."""
+
+
+class Schedule(Protocol):
+    """`Emulator.schedule`."""
+
+    def __call__(
+        self, when: int, act: Callable[[int], None], is_due: Callable[[], bool] | None = None
+    ) -> None: ...
 
 
 class Scribbler:

@@ -24,6 +24,8 @@ PIECE = 1 << 16
 LONGEST_REQUEST = 1 << 16  # bytes of a line that a witness may send
 SILENT_S = 0.002  # for so long a client says nothing that waits for more of an answer
 ANSWER_S = 5.0  # within which an answer comes, by the emulator's time
+LONGEST_S = 0.05  # of real time that physics may take at once
+PASSED_AT_ONCE_NS = SECOND // 4  # of the emulator's time, before it is looked whether they took so long
 IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
 
 
@@ -265,6 +267,7 @@ class WitnessDoor:
         self.address = f"{HOST}:{self._listening.getsockname()[1]}"
         self._selector: selectors.BaseSelector | None = None
         self._clients: dict[socket.socket, bytearray] = {}
+        self._holder: socket.socket | None = None  # who holds an emulator's time that passes by itself
 
     def watch(self, selector: selectors.BaseSelector) -> None:
         """New clients may come."""
@@ -296,13 +299,20 @@ class WitnessDoor:
         while b"\n" in held:
             line, _, rest = bytes(held).partition(b"\n")
             held[:] = rest
-            client.sendall(answer_witness(self._witness, line))
+            waited = self._witness.waits
+            answer = answer_witness(self._witness, line)
+            if self._witness.waits and not waited:
+                self._holder = client
+            client.sendall(answer)
 
     def _forget(self, client: socket.socket) -> None:
         if self._selector is not None:
             with contextlib.suppress(KeyError, ValueError):
                 self._selector.unregister(client)
         self._clients.pop(client, None)
+        if client is self._holder:
+            self._holder = None
+            self._witness.waits = False
         client.close()
 
     def close(self) -> None:
@@ -343,8 +353,7 @@ class Server:
         self.emulator, self._channel, self._speed = emulator, channel, speed
         self.name = channel.name
         self._lock = RLock()
-        self._waits = speed == 0
-        self.witness = DirectWitness(emulator, self._lock, waits=self._waits)
+        self.witness = DirectWitness(emulator, self._lock, waits=speed == 0, speed=speed)
         self._watch, self._watch_s, self._watched = watch, watch_s, 0.0
         try:
             self._door = None if witness is None else WitnessDoor(self.witness, witness)
@@ -366,7 +375,11 @@ class Server:
         self._stopped = False
         self._is_away = False
         self._thread: Thread | None = None
-        self._begun = 0.0 if self._waits else time.monotonic() - emulator.now / speed
+        self._begun: float | None = None  # when its time would have begun; None while it waits
+
+    @property
+    def _waits(self) -> bool:
+        return self.witness.waits
 
     def start(self) -> Server:
         """Serve in a thread of its own until `close`."""
@@ -429,7 +442,9 @@ class Server:
 
     def _behind(self) -> float:
         """How far the emulator's time is behind [real s]."""
-        return time.monotonic() - self._begun - self.emulator.now / self._speed
+        return (
+            0.0 if self._begun is None else time.monotonic() - self._begun - self.emulator.now / self._speed
+        )
 
     def _take(self, who: object, ready: object) -> None:
         if who is None:
@@ -465,8 +480,20 @@ class Server:
 
     def _catch_up(self) -> None:
         if self._waits:
+            self._begun = None
             return
-        self.emulator.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
+        if self._begun is None:
+            self._begun = time.monotonic() - self.emulator.now / self._speed
+        until = nanoseconds((time.monotonic() - self._begun) * self._speed)
+        latest = time.monotonic() + LONGEST_S
+        while self.emulator.now_ns < until:
+            self.emulator.advance_to(min(until, self.emulator.now_ns + PASSED_AT_ONCE_NS))
+            self.emulator.table.advance_to(self.emulator.now_ns)
+            if (
+                time.monotonic() > latest
+            ):  # its body takes longer: time passes as fast as that can, and it answers
+                self._begun = time.monotonic() - self.emulator.now / self._speed
+                return
 
     def _exchange(self) -> None:
         """Let time pass, and hand on what has come out."""

@@ -64,9 +64,12 @@ class Table:
         left, right = self.motors.speeds()
         turned = self.robot.advance(left, right, STEP_S)
         self.battery.drain(self.motors.load, STEP_NS)
+        began = self.time / SECOND
         self.time += STEP_NS
         self.motors.turned(self.time, *turned, slipping=self.robot.stalled)
         if not self.robot.stalled or self.robot.pose != self._noted:
+            if self.points[-4] < began:  # it stood until now
+                self.points.extend((began, *self._noted))
             self._note()
 
     @property

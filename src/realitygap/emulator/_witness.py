@@ -63,12 +63,25 @@ class DirectWitness:
         emulator: Whom to watch.
         lock: Held while doing so.
         waits: Whether the emulator's time passes only when somebody lets it.
+        speed: Seconds of the emulator in one of real time, where they pass by themselves; 0: as fast as it goes.
     """
 
-    def __init__(self, emulator: Emulator, lock: RLock | None = None, *, waits: bool = False) -> None:
+    def __init__(
+        self, emulator: Emulator, lock: RLock | None = None, *, waits: bool = False, speed: float = 0.0
+    ) -> None:
         self._emulator = emulator
         self._lock = lock or RLock()
+        self._speed = speed
         self.waits = waits
+
+    def hold(self) -> float:
+        """Let the emulator's time pass from now on only with `advance`, and while it answers.
+
+        Returns:
+            How fast it was to pass: its seconds in one of real time; 0: as fast as it goes.
+        """
+        self.waits = True
+        return self._speed
 
     def advance(self, seconds: float) -> None:
         """Let the time of an emulator that waits pass.
@@ -77,7 +90,7 @@ class DirectWitness:
             ValueError: It passes by itself, or does not run backwards.
         """
         if not self.waits:
-            raise ValueError("its time passes by itself; with --speed 0 it waits")
+            raise ValueError("its time passes by itself; hold it first")
         with self._lock:
             self._emulator.advance(seconds)
 
@@ -148,6 +161,8 @@ def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
         return witness.place(Pose(*map(float, request["pose"])), int(request["seed"]))
     if what == "waits":
         return bool(getattr(witness, "waits", False))
+    if what == "hold" and isinstance(witness, DirectWitness):
+        return witness.hold()
     if what == "advance" and isinstance(witness, DirectWitness):
         return witness.advance(float(request["seconds"]))
     if what == "cells_at":
@@ -175,9 +190,14 @@ class RemoteWitness:
     def __init__(self, address: str, timeout_s: float = 30.0) -> None:
         self._address = address
         host, _, port = address.rpartition(":")
+        if not (port.isdecimal() and 0 < int(port) < 65536):
+            raise RobotError(
+                f"No witness at {address!r}, expected HOST:PORT such as 127.0.0.1:7002, as `realitygap emulate "
+                "--witness PORT` prints it."
+            )
         try:
             self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)
-        except (OSError, ValueError) as error:
+        except OSError as error:
             raise RobotError(
                 f"No witness at {address} ({error}). Start the emulator with --witness PORT and give 127.0.0.1:PORT."
             ) from error
@@ -200,6 +220,10 @@ class RemoteWitness:
     def waits(self) -> bool:
         """Whether the emulator's time passes only when somebody lets it."""
         return bool(self._ask("waits"))
+
+    def hold(self) -> float:
+        """As `DirectWitness.hold`; until this connection ends."""
+        return float(self._ask("hold"))
 
     def advance(self, seconds: float) -> None:
         """Let the time of an emulator that waits pass."""

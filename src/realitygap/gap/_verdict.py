@@ -23,6 +23,8 @@ def _size(result: GapResult) -> str:
     rms, level = result.rms, result.level
     if rms.estimate is None:
         return "the size of the gap cannot be told"
+    if rms.high is None:
+        return f"the transfer gap is {rms.estimate:.3f} RMS, of too few controllers to say how sure that is"
     if not result.excludes_no_gap:
         return f"no gap is shown (RMS at most {rms.high:.3f})"
     side = _side(level)

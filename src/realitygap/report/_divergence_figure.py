@@ -170,7 +170,7 @@ def _compare(
 def _called(name: str) -> str:
     """A condition or a platform without the folder of its file."""
     platform, colon, file = name.partition(":")
-    return f"{platform}:{Path(file).name}" if colon else name
+    return f"{platform}:{Path(file).stem}" if colon else name
 
 
 def _is_platform(name: str) -> bool:

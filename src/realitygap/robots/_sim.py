@@ -61,7 +61,7 @@ def _read_draws(robot: Any) -> Calibration | None:
 def _as_robot(value: Any) -> Any:
     """A robot by name or from a file, of a calibration, or as results describe it."""
     if isinstance(value, Calibration):
-        return load_robot(value.robot).with_numbers(value.numbers)
+        return load_robot(value.robot).with_numbers(value.numbers).model_copy(update=value.step)
     if isinstance(value, str | Path):
         value = str(value)
         try:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realitygap.calibration import ruled
+from realitygap.calibration import ruled, step_of
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.records import (
     OBSERVATIONS,
@@ -105,7 +105,7 @@ def _calibrated(
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
-    return _calibration(kind, parts, robot, target.name, target.label, observe, len(trials))
+    return _calibration(kind, parts, robot, target.name, target.label, observe, trials)
 
 
 def _chosen(
@@ -131,7 +131,8 @@ def _chosen(
         made.misspecification_p,
         made.evidence,
     )
-    return _calibration("all", parts, robot, target.name, target.label, observe, made.trials)
+    made_of = _calibration("all", parts, robot, target.name, target.label, observe, ())
+    return made_of.model_copy(update={"trials": made.trials, "step_s": made.step_s})
 
 
 def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
@@ -183,7 +184,7 @@ def calibrate_from(
         raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
     trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
     parts = _fit(kind, trials, robot, arena, seen, seed)
-    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, len(trials))
+    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials)
     return made.model_copy(update={"notes": (*made.notes, found.problem)}) if found.problem else made
 
 
@@ -248,14 +249,16 @@ def _calibration(
     target: str,
     label: str,
     observe: Observe,
-    n_trials: int,
+    trials: Sequence[ObservedTrial],
 ) -> Calibration:
     """The parts of a fit laid over an earlier calibration, where it builds on one."""
     below = read_calibration(robot)
     numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
     fitted, notes = parts.fitted, parts.notes
     name = str(robot)
+    step_s = round(step_of(trials), 4) if trials and kind != "sensors" else 0.0
     if below is not None:
+        step_s = step_s or below.step_s
         name = _beside(below.robot, Path(robot))
         numbers = {**below.numbers, **numbers}
         draws = _paired(below.draws, draws)
@@ -268,7 +271,8 @@ def _calibration(
         target=target,
         label=label,
         observe=observe,
-        trials=n_trials,
+        trials=len(trials),
+        step_s=step_s,
         date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         method=parts.method,
         fitted=tuple(fitted),

@@ -25,6 +25,7 @@ from realitygap.calibration import (
     random_controllers,
     ranges_of,
     scribbler_prior,
+    step_of,
     values_of,
 )
 from realitygap.errors import whole_number
@@ -92,6 +93,8 @@ def calibrate_all(
     first = round(BEFORE_CHOICE * budget) if is_chosen else budget
     say(f"{first} trials on {target.name}, {observe} observed")
     trials = list(target.carry_out(plans[:first], observe, told))
+    if trials:
+        platform = platform.model_copy(update={"step_s": step_of(trials)})
     fit = _Fit(platform, target.arena, seed, say, threads)
     if is_chosen:
         chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
@@ -110,6 +113,7 @@ def calibrate_all(
         fitted=parts.fitted,
         numbers=dict(parts.numbers),
         draws={name: tuple(np.asarray(value).tolist()) for name, value in parts.draws.items()},
+        step_s=step_of(trials) if trials else 0.0,
         misspecified=parts.misspecified,
         misspecification_p=parts.misspecification_p,
         notes=parts.notes,
@@ -144,12 +148,7 @@ def fit_everything(
     Raises:
         ValueError: Trials with commands of several lengths of time.
     """
-    times = sorted({trial.step_s for trial in trials})
-    if len(times) > 1:
-        raise ValueError(
-            f"The trials' commands last {times[0]:g} to {times[-1]:g} s, expected one length of time. Fit them apart."
-        )
-    platform = SimPlatform(robot=robot, **({"step_s": times[0]} if times else {}))
+    platform = SimPlatform(robot=robot, **({"step_s": step_of(trials)} if trials else {}))
     return _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
 
 

@@ -25,7 +25,10 @@ from realitygap.calibration import (
     motion_plans,
     path_plans,
     placements_of,
+    ranges_of,
+    scribbler_prior,
     sensor_plans,
+    step_of,
 )
 from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.robots import Command, SimPlatform
@@ -235,8 +238,9 @@ def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedT
 
 
 def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
-    step_s = trials[0].step_s if trials else robot.step_s
-    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena).replay
+    step_s = step_of(trials) if trials else robot.step_s
+    ranges = ranges_of(scribbler_prior(robot), robot)
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges).replay
 
 
 def _parts_of(fit: MotionFit) -> Parts:

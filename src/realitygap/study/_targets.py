@@ -84,7 +84,9 @@ def _witness(port: str, address: str | None) -> Attendant:
     if address is not None:
         from realitygap.emulator import connect_witness
 
-        return WitnessAttendant(connect_witness(address))
+        remote = connect_witness(address)
+        remote.hold()  # before its robot is spoken to: somebody may have left it driving, faster than it answers
+        return WitnessAttendant(remote)
     raise StudyError(
         f"Who places the robot at {port} and says what it drew? Name the witness of an emulator (HOST:PORT, from "
         "realitygap emulate --witness PORT), or give an attendant."

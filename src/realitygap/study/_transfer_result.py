@@ -76,8 +76,10 @@ class TransferResult:
     """A transfer, carried out.
 
     Attributes:
-        study, condition: What was evolved.
-        target, label: Where it was tried.
+        study: Folder or catalogue name of what was evolved.
+        condition: Of the study, that was evolved.
+        target: Where it was tried.
+        label: What the target says it is.
         replicates: Of each strategy.
         fresh_trials: Of each champion; they are not of the budget.
         strategies: By strategy and budget, in the order asked.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
 
 COUNT_M = 0.00025
 """Way of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
-LEARN_S = 0.02
-"""How long the speed of an emulator's time is looked at before it is relied on [s]."""
+SHOWN_S = 0.05
+"""Real time that is let pass at once [s]: who watches an emulator sees it move, and not jump."""
 
 
 class Attendant(Onlooker, Protocol):
@@ -149,17 +148,16 @@ class WitnessAttendant(RobotsOwnSenses):
 
 
 class WitnessClock:
-    """The time of an emulator in another program: faster than ours, or one that passes only when it is let.
+    """The time of an emulator in another program, which is held: it passes as we let it, however busy the machine is.
 
     Args:
-        witness: Who tells it.
-        real: By which is waited.
+        witness: Who tells it, and holds it.
+        real: By which is waited, so that it passes no faster than was asked for.
     """
 
     def __init__(self, witness: Witness, real: Clock) -> None:
         self._witness, self._real = witness, real
-        self._waits = getattr(witness, "waits", False)
-        self._began = (witness.now(), time.monotonic())
+        self._speed: float = witness.hold()  # type: ignore[attr-defined]  # those of emulators that are served can
 
     def now(self) -> float:
         """The emulator's time [s]."""
@@ -167,14 +165,9 @@ class WitnessClock:
 
     def sleep(self, seconds: float) -> None:
         """Let so much of its time pass."""
-        if self._waits:
-            self._witness.advance(seconds)  # type: ignore[attr-defined]  # one that waits has it
-            return
-        until = self.now() + seconds
-        while (left := until - self.now()) > 0:
-            is_known = time.monotonic() - self._began[1] >= LEARN_S
-            self._real.sleep(left / self._speed() if is_known else min(left, LEARN_S))
-
-    def _speed(self) -> float:
-        """Seconds of the emulator in one of real time, so far."""
-        return max((self._witness.now() - self._began[0]) / (time.monotonic() - self._began[1]), 1e-3)
+        while seconds > 0:
+            piece = min(seconds, self._speed * SHOWN_S) if self._speed else seconds
+            if self._speed:
+                self._real.sleep(piece / self._speed)
+            self._witness.advance(piece)  # type: ignore[attr-defined]
+            seconds -= piece

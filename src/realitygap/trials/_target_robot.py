@@ -9,6 +9,8 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any, Literal, Self
 
+import numpy as np
+
 from realitygap.errors import RobotError
 from realitygap.records import Observe, ObservedTrial
 from realitygap.robots import Clock, Command, Label, Observation, Robot
@@ -24,7 +26,7 @@ OnLost = Literal["retry", "skip", "stop"]
 
 MOST_NUMBER = 2**32 - 1
 LATE = 0.02
-"""How much longer than said commands of a trial may take before what they took is kept instead."""
+"""How much longer than said most commands of a trial may take before what they took is kept instead."""
 
 
 class PacedRobot:
@@ -45,37 +47,37 @@ class PacedRobot:
         self.label: Label = robot.label
         self.step_s = step_s
         self.n_sensors: int = robot.n_sensors
-        self._begun = self._due = 0.0
-        self._n = 0
+        self._due = 0.0
+        self._lasted: list[float] = []
 
     def reset(self, pose: Pose | None = None) -> None:
         """As `Robot.reset`; a robot on a port stays where it was put."""
         self._robot.reset()
-        self._n = 0
+        self._lasted = []
 
     def observe(self) -> Observation:
         """As `Robot.observe`; the first one begins the time."""
-        if not self._n:
-            self._begun = self._due = self._clock.now()
+        if not self._lasted:
+            self._due = self._clock.now()
         seen: Observation = self._robot.observe()
         return seen
 
     def drive(self, command: Command) -> None:
         """As `Robot.drive`; returns when its time is over, reckoned from the readings before it."""
         self._robot.drive(command)
-        self._n += 1
         self._due += self.step_s
-        left = self._due - self._clock.now()
-        if left > 0:
-            self._clock.sleep(left)
+        late = self._clock.now() - self._due
+        if late < 0:
+            self._clock.sleep(-late)
         else:
-            self._due -= left
+            self._due += late
+        self._lasted.append(self.step_s + max(late, 0.0))
 
     @property
     def lasted_s(self) -> float:
-        """How long commands of the trial lasted in the mean [s]; `step_s` where that was kept."""
-        mean = (self._due - self._begun) / self._n if self._n else self.step_s
-        return mean if mean > self.step_s * (1 + LATE) else self.step_s
+        """How long most commands of the trial lasted, their median [s]; `step_s` where that was kept."""
+        median = float(np.median(self._lasted)) if self._lasted else self.step_s
+        return median if median > self.step_s * (1 + LATE) else self.step_s
 
     def stop(self) -> None:
         """Stop the motors."""

@@ -56,6 +56,9 @@ class Calibration(Settings):
     label: Literal["SIM", "TWIN", "EMULATED", "REAL"] = Field(description="Of the target.")
     observe: Literal["cells", "encoders", "track"] = Field(description="How much was seen.")
     trials: int = Field(ge=0, description="How many trials it took.")
+    step_s: float = Field(
+        0.0, ge=0, le=60, description="How long its commands lasted [s]; 0: as the robot's file has it."
+    )
     date: str = Field(description="When it was measured, ISO 8601.")
     method: str = Field(description="How it was fitted, with the source of the method.")
     fitted: tuple[Fitted, ...] = Field((), description="The parameters.")
@@ -78,6 +81,11 @@ class Calibration(Settings):
         if lengths and not 1 <= max(lengths) <= MOST_DRAWS:
             raise ValueError(f"draws: expected 1 to {MOST_DRAWS:,} of each number, came {max(lengths):,}")
         return self
+
+    @property
+    def step(self) -> dict[str, float]:
+        """How long commands last, where it was measured, as a setting of the robot [s]."""
+        return {"step_s": self.step_s} if self.step_s else {}
 
     @property
     def n_draws(self) -> int:

@@ -117,7 +117,8 @@ def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict
     model = _checked(origin, lambda: RobotModel(**below).with_numbers(calibration.numbers))
     said = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
     texts = {"sources": [*_texts(below.get("sources")), said]}
-    return model.to_dict() | {"name": Path(origin).stem[:80], "description": model.description} | texts
+    named = {"name": Path(origin).stem[:80], "description": model.description}
+    return model.to_dict() | calibration.step | named | texts
 
 
 def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[str, Any]:

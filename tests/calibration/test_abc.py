@@ -17,7 +17,6 @@ from realitygap.calibration import (
     standard_of,
     values_of,
 )
-from realitygap.calibration._abc import _adjusted
 from realitygap.world import Distribution, load_robot
 
 ROBOT = load_robot("scribbler-s2-fluke2")
@@ -112,20 +111,3 @@ def test_the_prior_of_a_scribbler_holds_its_file_and_comes_back_from_its_scale()
     even |= {"drive.gain": np.array([0.9]), "drive.asymmetry": np.array([0.1])}
     numbers = numbers_of(prior, even, ROBOT)
     assert (numbers["drive.gain_left"][0], numbers["drive.gain_right"][0]) == pytest.approx((0.95, 0.85))
-
-
-def test_summaries_that_contradict_each_other_widen_the_posterior_and_others_do_not():
-    """Half of the entries say one track, half another; a simulator that is right makes no such thing."""
-    rng = np.random.default_rng(8)
-    places = rng.normal(size=(900, 2))
-    slopes = rng.normal(size=(2, 10))
-    summaries = places @ slopes + 0.1 * rng.normal(size=(900, 10))
-    agreeing = np.array([0.5, -0.5]) @ slopes + 0.1 * rng.normal(size=10)
-    contradicting = agreeing + 2.0 * np.repeat([1.0, -1.0], 5)
-    groups = [np.arange(2)]
-    sure, unsure = (
-        _adjusted(np.random.default_rng(1), places, summaries, seen, groups)[0].std(axis=0)
-        for seen in (agreeing, contradicting)
-    )
-    assert (sure < 0.1).all()
-    assert (unsure > 4 * sure).all()

@@ -36,8 +36,6 @@ ROUNDS = {"small": 4, "full": 7}
 N_DRAWS = 500
 END = 4.0  # standard deviations of the prior beyond which nothing is
 MARGIN = 0.3  # share of its width by which the box is larger than the posterior, to each side
-LEAST_SPREAD = 1e-9  # of a summary over the simulations, below which it tells nothing
-STEPS_TO_BEST = 30  # of the search for the place that explains the summaries best
 CUT = 0.005  # quantile of the posterior that the box leaves out to each side, before the margin
 
 
@@ -146,10 +144,7 @@ def _adjusted(
     n, p = places.shape
     scale = summaries.std(axis=0) + 1e-12
     middle = summaries.mean(axis=0)
-    there, here = (summaries - middle) / scale, (observed - middle) / scale
-    here[scale < LEAST_SPREAD] = 0.0
-    there = there + _doubt(rng, places, there, here)
-    here = np.clip(here, -6, 6)
+    there, here = (summaries - middle) / scale, np.clip((observed - middle) / scale, -6, 6)
     draws, off = np.empty((4 * N_DRAWS, p)), np.empty(p)
     for group in groups:
         mine = places[:, group]
@@ -165,35 +160,6 @@ def _adjusted(
         draws[:, group] = np.clip(moved[which], -END, END)
         off[group] = (told_here - told[near].mean(axis=0)) / (told[near].std(axis=0) + 1e-9)
     return draws, off
-
-
-def _doubt(rng: np.random.Generator, places: Floats, summaries: Floats, observed: Floats) -> Floats:
-    """(n, q) noise that makes up for what no place explains of the observed summaries.
-
-    There are more summaries than parameters. Where they contradict each other at the best place, by more than chance
-    does, all are as much less certain: none where the simulator is right.
-
-    Source: Birge, Phys. Rev. 40 (1932). Differs: of correlated values, which are functions of several parameters.
-    """
-    q, p = summaries.shape[1], places.shape[1]
-    center = places.mean(axis=0)
-    width = places.std(axis=0) + 1e-9
-    z = (places - center) / width
-    design = np.column_stack([np.ones(len(z)), z, z * z])
-    slopes = _ridge(design, summaries)
-    left = summaries - design @ slopes
-    covariance = left.T @ left / (len(z) - design.shape[1]) + 1e-6 * np.eye(q)
-    root = np.linalg.cholesky(covariance)
-    at = np.zeros(p)
-    for _ in range(STEPS_TO_BEST):
-        off = np.linalg.solve(root, observed - np.concatenate([[1.0], at, at * at]) @ slopes)
-        slope = np.linalg.solve(root, (slopes[1 : 1 + p] + 2 * at[:, None] * slopes[1 + p :]).T)
-        step = np.linalg.solve(slope.T @ slope + np.eye(p), slope.T @ off - at)
-        at = np.clip(at + 0.5 * step, z.min(axis=0), z.max(axis=0))
-    off = np.linalg.solve(root, observed - np.concatenate([[1.0], at, at * at]) @ slopes)
-    ratio = float(off @ off) / (q - p)
-    more = np.sqrt(max(ratio - 1.0, 0.0))
-    return np.asarray(more * rng.normal(size=summaries.shape) @ root.T)
 
 
 def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:

@@ -3,11 +3,11 @@
 Each vector is a fixed function of what is seen, so a simulator that is right makes vectors of the same distribution:
 
 * Commands given one by one are given again, and all that is seen counts.
-* Controllers drive anew, as what they do next depends on what they saw.
-* With poses, a robot is also put back to where it was seen before each command, and each command is predicted by
-  itself (multiple shooting): what it answers does not depend on what it was about to do then, so trials of
-  controllers serve too.
+* With poses, a robot is put back to where it was seen before each command, and each command is predicted by itself
+  (multiple shooting): what it answers does not depend on what it was about to do then, so trials of controllers serve
+  too.
 * With encoders, the wheels of any trial are predicted from its commands: in `sim` nothing else moves them.
+* Without poses, controllers drive anew, as what they do next depends on what they saw.
 """
 
 from __future__ import annotations
@@ -135,18 +135,18 @@ def _of_group(
     commands = np.array([trial.commands for _, trial, _ in group])
     steps = commands.shape[1]
     given = Play(starts, steps, commands)
-    made: list[Evidence] = []
     if observe == "track":
         anchors = np.array([trial.poses for _, trial, _ in group])
         put_back = Play(starts, steps, commands, anchors=anchors)
-        keep = ("poses", "readings", "wheels")[: 3 if seen.wheels.shape[2] else 2]
-        made.append(_evidence(put_back, keep, partial(_shooting, anchors), seen, number))
-    if is_driven:
+        keep = ("poses", "readings", "stalled", "wheels")[: 4 if seen.wheels.shape[2] else 3]
+        made = [_evidence(put_back, keep, partial(_shooting, anchors), seen, number)]
+    elif is_driven:
         driven = Play(starts, steps, genomes=tuple(genome for _, _, genome in group if genome is not None))
-        kept = ("readings", "stalled", "commands")
-        made.append(_evidence(driven, kept, partial(_in_blocks, steps), seen, number))
+        made = [
+            _evidence(driven, ("readings", "stalled", "commands"), partial(_in_blocks, steps), seen, number)
+        ]
     else:
-        made.append(_evidence(given, ("readings", "stalled"), partial(_step_by_step, steps), seen, number))
+        made = [_evidence(given, ("readings", "stalled"), partial(_step_by_step, steps), seen, number)]
     if observe == "encoders":
         made.append(_evidence(given, ("wheels",), _wheels, seen, number))
     return made
@@ -201,6 +201,7 @@ def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
     columns.add("turn", (moved[..., 2] + np.pi) % (2 * np.pi) - np.pi)
     t = before.shape[1]
     columns.add("reading", rehearsal.readings[:, :, :t])
+    columns.add("stall", rehearsal.stalled[:, :, :t])
     if rehearsal.wheels.shape[2]:
         columns.add("wheels", np.diff(rehearsal.wheels, axis=2))
     return columns

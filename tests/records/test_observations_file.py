@@ -107,6 +107,16 @@ def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_taken_up(
     assert again.problem == ""
 
 
+@pytest.mark.parametrize("n", [0, 2])
+def test_a_line_without_its_end_is_not_run_into_the_next_one(tmp_path: Path, n: int) -> None:
+    path = tmp_path / "cut.jsonl"
+    write_observations(path, HEAD, [trial(number, 2) for number in range(n)])
+    path.write_bytes(path.read_bytes()[:-1])
+    with ObservationsFile(path, HEAD) as file:
+        file.append(trial(9, 2))
+    assert [each.number for each in read_observations(path).trials] == [*range(n), 9]
+
+
 def test_trials_of_something_else_are_not_put_into_a_file(tmp_path: Path) -> None:
     path = tmp_path / "one.jsonl"
     write_observations(path, HEAD, [trial(0)])

@@ -159,9 +159,11 @@ class ObservationsFile:
         try:
             self._file = self.path.open("r+b" if self.path.exists() else "xb", buffering=0)
             self._file.truncate(held)
-            self._file.seek(held)
+            self._file.seek(max(held - 1, 0))
             if not held:
                 self._write(_first_line(head))
+            elif self._file.read(1) != b"\n":
+                self._write(b"\n")  # the last line is whole, and only its end was cut off
         except OSError as error:
             raise self._cannot(error) from error
 

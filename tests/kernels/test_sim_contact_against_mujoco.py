@@ -57,7 +57,7 @@ def _pushes(n: int, seed: int) -> list[Push]:
 
 def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.ndarray:
     """(n, 3) where `slide` has them end: x, y [m], heading [rad]; at most LANES of them."""
-    shape = make_sim_shape(parts=[8], contact="slide", sweeps=3, n_walls=4, enclosed=True)
+    shape = make_sim_shape(parts=[8], contact="slide", n_walls=4, enclosed=True)
     walls = [(-5, -9, 5, -9), (5, -9, 5, 0), (5, 0, -5, 0), (-5, 0, -5, -9)]
     numbers = {"body.0.radius": RADIUS, "drive.speed": SPEED, "drive.track": TRACK}
     numbers |= {"contact.friction": friction, "contact.long": 1.0, "contact.lat": lat, "contact.ang": ang}

@@ -13,16 +13,16 @@ Point = tuple[float, float]
 Pose = tuple[float, float, float]
 
 CLEAR = 2e-6  # how far a body that was pushed is free [m]
-SUBSTEPS, SWEEPS, RESCUES = 4, 2, 4
+SUBSTEPS, RESCUES = 4, 4
 LEAST_GIVE, MOST_TURN = 0.05, 0.25
 
 
 class Touch(NamedTuple):
-    """The deepest contact: gap [m], unit normal towards the body and point of contact, in the world."""
+    """A contact in the world: gap [m], unit normal towards the body, and its corner, before it is grown."""
 
     gap: float
     normal: Point
-    point: Point
+    corner: Point
 
 
 @dataclass
@@ -97,18 +97,22 @@ def touch_polygon(body: Body, pose: Pose, polygon: Polygon) -> Touch:
             inside = Touch(distance, normal, ours)
     if inside is None:  # one point in common, or none: two discs about the same place
         inside = Touch(0.0, (1.0, 0.0), corners[0])
-    gap, (a, b), (x, y) = inside
-    return Touch(gap - body.radius - polygon.radius, (a, b), (x - body.radius * a, y - body.radius * b))
+    return Touch(inside.gap - body.radius - polygon.radius, inside.normal, inside.corner)
+
+
+def touched(body: Body, pose: Pose, world: World) -> list[Touch]:
+    """From the deepest on: each corner at each plane, and each polygon where it is met deepest."""
+    touches = [
+        Touch(a * x + b * y - offset - body.radius, (a, b), (x, y))
+        for (a, b), offset in world.planes
+        for x, y in placed(body, pose)
+    ]
+    touches += [touch_polygon(body, pose, polygon) for polygon in world.polygons]
+    return sorted(touches, key=lambda touch: touch.gap)
 
 
 def deepest(body: Body, pose: Pose, world: World) -> Touch:
-    touches = []
-    for (a, b), offset in world.planes:
-        for x, y in placed(body, pose):
-            gap = a * x + b * y - offset - body.radius
-            touches.append(Touch(gap, (a, b), (x - body.radius * a, y - body.radius * b)))
-    touches += [touch_polygon(body, pose, polygon) for polygon in world.polygons]
-    return min(touches, key=lambda touch: touch.gap)
+    return touched(body, pose, world)[0]
 
 
 def arc(pose: Pose, length: float, turn: float) -> Pose:
@@ -118,39 +122,80 @@ def arc(pose: Pose, length: float, turn: float) -> Pose:
     return x + chord * math.cos(heading + half), y + chord * math.sin(heading + half), heading + turn
 
 
-def pushed(body: Body, pose: Pose, before: Pose, touch: Touch) -> Pose:
-    """Free of the contact by a push along its normal and by friction, which holds as long as mu allows."""
-    x, y, heading = pose
+Vector = tuple[float, float, float]  # along, across, around, in the frame of the axle
+
+
+class Held(NamedTuple):
+    """A contact at some heading: wrenches of its normal and tangent, what is deep, and what has slipped."""
+
+    n: Vector
+    t: Vector
+    deep: float
+    slip: float
+
+
+def dot(f: Vector, g: Vector) -> float:
+    return sum(one * two for one, two in zip(f, g, strict=True))
+
+
+def gives(body: Body, wrench: Vector) -> Vector:
+    along, across, around = (give * part for give, part in zip(body.give, wrench, strict=True))
+    return along, across, around
+
+
+def held_at(body: Body, pose: Pose, before: Pose, heading: float, touch: Touch) -> Held:
+    """A contact as it would be if the body stood at another heading; the deep part is that of its pose."""
     c, s = math.cos(heading), math.sin(heading)
+    a, b = c * touch.normal[0] + s * touch.normal[1], c * touch.normal[1] - s * touch.normal[0]
+    own_c, own_s = math.cos(pose[2]), math.sin(pose[2])
+    dx, dy = touch.corner[0] - pose[0], touch.corner[1] - pose[1]
+    px = own_c * dx + own_s * dy - body.radius * a  # of the body's own corner
+    py = own_c * dy - own_s * dx - body.radius * b
+    n, t = (a, b, px * b - py * a), (-b, a, px * a + py * b)
+    dx, dy = pose[0] - before[0], pose[1] - before[1]
+    moved = (c * dx + s * dy, c * dy - s * dx, math.remainder(pose[2] - before[2], math.tau))
+    return Held(n, t, CLEAR - touch.gap, dot(moved, t))
 
-    def in_body(v: Point) -> Point:
-        return c * v[0] + s * v[1], c * v[1] - s * v[0]
 
-    a, b = in_body(touch.normal)
-    px, py = in_body((touch.point[0] - x, touch.point[1] - y))
-    n, t = (a, b, px * b - py * a), (-b, a, px * a + py * b)  # wrenches: along, across, around
-
-    def gives(f: tuple[float, float, float], g: tuple[float, float, float]) -> float:
-        return sum(give * one * two for give, one, two in zip(body.give, f, g, strict=True))
-
-    moved = in_body((x - before[0], y - before[1]))
-    turned = math.remainder(heading - before[2], math.tau)
-    slip = moved[0] * t[0] + moved[1] * t[1] + turned * t[2]
-    nn, nt, tt = gives(n, n), gives(n, t), gives(t, t)
-    deep = CLEAR - touch.gap
+def push(body: Body, held: Held, others: Vector = (0.0, 0.0, 0.0)) -> Vector:
+    """The motion by one contact, beside that of others: free by a push, and by friction as far as mu allows."""
+    nn, tt, nt = (dot(gives(body, f), g) for f, g in ((held.n, held.n), (held.t, held.t), (held.n, held.t)))
+    deep, slip = held.deep - dot(others, held.n), held.slip + dot(others, held.t)
+    if deep <= 0:
+        return 0.0, 0.0, 0.0
     whole = nn * tt - nt * nt
-    push, rub = deep * tt + slip * nt, -slip * nn - deep * nt
-    if whole > 0 and abs(rub) <= body.friction * push:
-        push, rub = push / whole, rub / whole
+    press, rub = deep * tt + slip * nt, -slip * nn - deep * nt
+    if whole > 0 and abs(rub) <= body.friction * press:
+        press, rub = press / whole, rub / whole
     else:
         side = -1.0 if rub < 0 else 1.0
-        push = deep / max(nn + side * body.friction * nt, LEAST_GIVE * nn)
-        rub = side * body.friction * push
-    f = [push * one + rub * two for one, two in zip(n, t, strict=True)]
-    along, across, around = (give * part for give, part in zip(body.give, f, strict=True))
+        press = deep / max(nn + side * body.friction * nt, LEAST_GIVE * nn)
+        rub = side * body.friction * press
+    n, t = held.n, held.t
+    return gives(body, (press * n[0] + rub * t[0], press * n[1] + rub * t[1], press * n[2] + rub * t[2]))
+
+
+def pushed(body: Body, pose: Pose, before: Pose, world: World) -> Pose:
+    """Free of the deepest two contacts, as they are with the body halfway through its turn."""
+    contacts = touched(body, pose, world)[:2]
+    turned = math.remainder(pose[2] - before[2], math.tau)
+
+    def clipped(angle: float) -> float:
+        return min(max(angle, -MOST_TURN), MOST_TURN)
+
+    around = push(body, held_at(body, pose, before, pose[2] + clipped(-turned / 2), contacts[0]))[2]
+    heading = pose[2] + clipped((around - turned) / 2)
+    held = [held_at(body, pose, before, heading, contact) for contact in contacts]
+    moves: list[Vector] = [(0.0, 0.0, 0.0)] * len(held)
+    for _ in range(2):
+        for k in range(len(held)):
+            moves[k] = push(body, held[k], moves[1 - k] if len(held) == 2 else (0.0, 0.0, 0.0))
+    along, across, around = (sum(parts) for parts in zip(*moves, strict=True))
     limit = MOST_TURN / max(abs(around), MOST_TURN)
-    along, across, around = along * limit, across * limit, around * limit
-    return x + c * along - s * across, y + s * along + c * across, heading + around
+    c, s = math.cos(heading), math.sin(heading)
+    x = pose[0] + limit * (c * along - s * across)
+    y = pose[1] + limit * (s * along + c * across)
+    return x, y, pose[2] + limit * around
 
 
 def _stopped(body: Body, pose: Pose, before: Pose, world: World) -> Pose:
@@ -171,11 +216,8 @@ def step(body: Body, start: Pose, world: World, length: float, turn: float) -> P
         blocked |= touches
         if touches and body.model == "stop":
             pose = _stopped(body, pose, before, world)
-        for _ in range(SWEEPS if body.model == "slide" else 0):
-            touch = deepest(body, pose, world)
-            if touch.gap > 0:
-                break
-            pose = pushed(body, pose, before, touch)
+        if touches and body.model == "slide":
+            pose = pushed(body, pose, before, world)
     if body.model == "freeze":
         return start if blocked else pose
     for _ in range(RESCUES):

@@ -1,8 +1,8 @@
 """What happens to a body that meets a wall or an obstacle, in lanes.
 
 `freeze`: the whole step is refused (Jyro). `stop`: translation is refused, turning goes on where the body allows it.
-`slide`: at the contact that is deepest, the wall pushes along its normal n and rubs along its tangent t; the body gives
-way along A * wrench, A = diag(long, lat, ang) in the frame of its axle, until it is free, several times.
+`slide`: at the deepest two contacts, the wall pushes along its normal n and rubs along its tangent t; the body gives
+way along A * wrench, A = diag(long, lat, ang) in the frame of its axle, until it is free.
 
 Source: the wrench n - mu * sign(slip) * t, and A, of quasi-static pushing. Differs: friction holds the contact point
 where less than mu times the normal push is enough for that (Coulomb); a full push against the slip would drag the
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._compile import kernel, stage
+from ._compile import inlined, kernel, stage
 from ._lanes import LANES, fill, keep_where_low
 from ._math import TWO_PI
 from ._sim_drive import AXLE, arc_step
@@ -62,58 +62,135 @@ def _note_touch(gap, low):
         low[k] = now if now < least else least
 
 
+@inlined
+def _held_up(deep, slip, friction, nn, tt, nt):
+    """By how much a contact pushes and rubs, to be free of what is `deep` and of slip as far as friction can.
+
+    Args:
+        deep, slip: What the body is to be moved along the normal, and has slipped along the tangent [m].
+        friction: Coefficient.
+        nn, tt, nt: What a body gives along the normal and tangent by a wrench of 1 of either.
+    """
+    real = type(deep)
+    # Friction holds it: no slip is left. Both are divided by `whole` later.
+    whole = nn * tt - nt * nt
+    hold_n = deep * tt + slip * nt
+    hold_t = -slip * nn - deep * nt
+    holds = (abs(hold_t) <= friction * hold_n) & (whole > real(0.0))
+    # It does not: it rubs with all it has, against the slip that there would be without it.
+    side = real(-1.0) if hold_t < real(0.0) else real(1.0)
+    gives = nn + side * friction * nt
+    least = real(LEAST_GIVE) * nn
+    gives = gives if gives > least else least
+    scale = real(1.0) / (whole if holds else gives)
+    scale = scale if deep > real(0.0) else real(0.0)
+    push = (hold_n if holds else deep) * scale
+    rub = (hold_t if holds else side * friction * deep) * scale
+    return push, rub
+
+
+@inlined
+def _between(angle):
+    """An angle, as far as `sin_cos_of_small` goes."""
+    real = type(angle)
+    most = real(MOST_TURN)
+    angle = angle if angle < most else most
+    return angle if angle > -most else -most
+
+
 @stage
-def _push(gap, facing, beside, point_x, point_y, friction, long, lat, ang, pose, before):
-    """Push bodies that touch something free at their deepest contacts, in the frames of their axles."""
+def _push(first, second, friction, long, lat, ang, pose, before):
+    """Push bodies that touch something free at their deepest two contacts, in the frames of their axles.
+
+    What the contacts push depends on how the body is turned meanwhile: it is worked out as it stands halfway, which
+    a push by the deepest contact alone foretells. The two are then worked out in turn, each with what the other does.
+    """
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
+    gap, facing, beside, corner_x, corner_y, rounding = first
+    then, then_facing, then_beside, then_x, then_y, then_rounding = second
     real = gap.dtype.type
     for k in range(LANES):
-        a = facing[k]
-        b = beside[k]
-        c_x = point_x[k]
-        c_y = point_y[k]
+        g = ang[k]
+        l_x = long[k]
+        l_y = lat[k]
+        mu = friction[k]
         s = sine[k]
         c = cosine[k]
-        mu = friction[k]
-        # Wrenches of the normal (a, b) and of the tangent (-b, a): what each turns, and what the body gives.
-        turn_n = c_x * b - c_y * a
-        turn_t = c_x * a + c_y * b
-        nn = long[k] * a * a + lat[k] * b * b + ang[k] * turn_n * turn_n
-        tt = long[k] * b * b + lat[k] * a * a + ang[k] * turn_t * turn_t
-        nt = (lat[k] - long[k]) * a * b + ang[k] * turn_n * turn_t
-        # How far the point of contact slipped since the beginning.
         d_x = x[k] - old_x[k]
         d_y = y[k] - old_y[k]
         turned = heading[k] - old_heading[k]
         turned = (turned - np.floor(turned + real(0.5))) * real(TWO_PI)
-        slip = (d_y * c - d_x * s) * a - (d_x * c + d_y * s) * b + turned * turn_t
         deep = real(CLEAR) - gap[k]
-        # Friction holds it: no slip is left. Both are divided by `whole` later.
-        whole = nn * tt - nt * nt
-        hold_n = deep * tt + slip * nt
-        hold_t = -slip * nn - deep * nt
-        holds = (abs(hold_t) <= mu * hold_n) & (whole > real(0.0))
-        # It does not: it rubs with all it has, against the slip that there would be without it.
-        side = real(-1.0) if hold_t < real(0.0) else real(1.0)
-        gives = nn + side * mu * nt
-        least = real(LEAST_GIVE) * nn
-        gives = gives if gives > least else least
-        scale = real(1.0) / (whole if holds else gives)
-        push = (hold_n if holds else deep) * scale
-        rub = (hold_t if holds else side * mu * deep) * scale
-        f_x = push * a - rub * b
-        f_y = push * b + rub * a
-        spin = ang[k] * (push * turn_n + rub * turn_t)
+        next_deep = real(CLEAR) - then[k]
+        # The deepest alone, as the body stands halfway through its free motion.
+        by_s, by_c = sin_cos_of_small(_between(real(-0.5) * turned))
+        h_s, h_c = turned_by(s, c, by_s, by_c)
+        a = by_c * facing[k] + by_s * beside[k]
+        b = by_c * beside[k] - by_s * facing[k]
+        turn_n = corner_x[k] * b - corner_y[k] * a
+        turn_t = corner_x[k] * a + corner_y[k] * b - rounding[k]
+        nn = l_x * a * a + l_y * b * b + g * turn_n * turn_n
+        tt = l_x * b * b + l_y * a * a + g * turn_t * turn_t
+        nt = (l_y - l_x) * a * b + g * turn_n * turn_t
+        slip = (d_y * h_c - d_x * h_s) * a - (d_x * h_c + d_y * h_s) * b + turned * turn_t
+        push, rub = _held_up(deep, slip, mu, nn, tt, nt)
+        spin = g * (push * turn_n + rub * turn_t)
+        # Both, as it stands halfway through its motion with that push.
+        by_s, by_c = sin_cos_of_small(_between(real(0.5) * (spin - turned)))
+        h_s, h_c = turned_by(s, c, by_s, by_c)
+        m_x = d_x * h_c + d_y * h_s
+        m_y = d_y * h_c - d_x * h_s
+        a = by_c * facing[k] + by_s * beside[k]
+        b = by_c * beside[k] - by_s * facing[k]
+        turn_n = corner_x[k] * b - corner_y[k] * a
+        turn_t = corner_x[k] * a + corner_y[k] * b - rounding[k]
+        nn = l_x * a * a + l_y * b * b + g * turn_n * turn_n
+        tt = l_x * b * b + l_y * a * a + g * turn_t * turn_t
+        nt = (l_y - l_x) * a * b + g * turn_n * turn_t
+        slip = m_y * a - m_x * b + turned * turn_t
+        e = by_c * then_facing[k] + by_s * then_beside[k]
+        f = by_c * then_beside[k] - by_s * then_facing[k]
+        next_n = then_x[k] * f - then_y[k] * e
+        next_t = then_x[k] * e + then_y[k] * f - then_rounding[k]
+        next_nn = l_x * e * e + l_y * f * f + g * next_n * next_n
+        next_tt = l_x * f * f + l_y * e * e + g * next_t * next_t
+        next_nt = (l_y - l_x) * e * f + g * next_n * next_t
+        next_slip = m_y * e - m_x * f + turned * next_t
+        push, rub = _held_up(deep, slip, mu, nn, tt, nt)
+        go_x = l_x * (push * a - rub * b)
+        go_y = l_y * (push * b + rub * a)
+        spin = g * (push * turn_n + rub * turn_t)
+        push, rub = _held_up(
+            next_deep - (go_x * e + go_y * f + spin * next_n), next_slip + (go_y * e - go_x * f + spin * next_t),
+            mu, next_nn, next_tt, next_nt,
+        )  # fmt: skip
+        next_x = l_x * (push * e - rub * f)
+        next_y = l_y * (push * f + rub * e)
+        next_spin = g * (push * next_n + rub * next_t)
+        push, rub = _held_up(
+            deep - (next_x * a + next_y * b + next_spin * turn_n),
+            slip + (next_y * a - next_x * b + next_spin * turn_t),
+            mu, nn, tt, nt,
+        )  # fmt: skip
+        go_x = l_x * (push * a - rub * b)
+        go_y = l_y * (push * b + rub * a)
+        spin = g * (push * turn_n + rub * turn_t)
+        push, rub = _held_up(
+            next_deep - (go_x * e + go_y * f + spin * next_n), next_slip + (go_y * e - go_x * f + spin * next_t),
+            mu, next_nn, next_tt, next_nt,
+        )  # fmt: skip
+        go_x = go_x + l_x * (push * e - rub * f)
+        go_y = go_y + l_y * (push * f + rub * e)
+        spin = spin + g * (push * next_n + rub * next_t)
         size = abs(spin)
         limit = real(MOST_TURN) / (size if size > real(MOST_TURN) else real(MOST_TURN))
-        touching = gap[k] <= real(0.0)
-        limit = limit if touching else real(0.0)
-        f_x = f_x * long[k] * limit
-        f_y = f_y * lat[k] * limit
-        x[k] = x[k] + (f_x * c - f_y * s)
-        y[k] = y[k] + (f_x * s + f_y * c)
+        limit = limit if gap[k] <= real(0.0) else real(0.0)
+        go_x = go_x * limit
+        go_y = go_y * limit
         spin = spin * limit
+        x[k] = x[k] + (go_x * h_c - go_y * h_s)
+        y[k] = y[k] + (go_x * h_s + go_y * h_c)
         angle = heading[k] + spin * real(1.0 / TWO_PI)
         angle = angle - np.floor(angle + real(0.5))
         by_s, by_c = sin_cos_of_small(spin)
@@ -124,9 +201,10 @@ def _push(gap, facing, beside, point_x, point_y, friction, long, lat, ang, pose,
 
 
 @stage
-def _push_straight(gap, facing, beside, pose):
+def _push_straight(contact, pose):
     """Move bodies that touch something straight away from it."""
     x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
+    gap, facing, beside = contact.gap, contact.facing, contact.beside
     real = gap.dtype.type
     for k in range(LANES):
         now = gap[k]
@@ -208,14 +286,11 @@ def _answer_part(shape, p, near, sweep):
     if shape.contact == FREEZE:
         return False
     if shape.contact == SLIDE:
-        _push(
-            near.gap, near.facing, near.beside, near.point_x, near.point_y,
-            p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, near.before,
-        )  # fmt: skip
-        return sweep + 1 < shape.sweeps
-    _put_back_places(near.gap, near.before, near.pose)
+        _push(near.first, near.second, p[row], p[row + 1], p[row + 2], p[row + 3], near.pose, near.before)
+        return False
+    _put_back_places(near.first.gap, near.before, near.pose)
     if sweep == 1:
-        _put_back_turns(near.gap, near.before, near.pose)
+        _put_back_turns(near.first.gap, near.before, near.pose)
     return sweep == 0
 
 
@@ -223,10 +298,10 @@ def _answer_part(shape, p, near, sweep):
 def _leave_free(near, sweep):
     """Push what still touches something straight out, and where that fails go back to the beginning of the step."""
     if sweep < N_RESCUES:
-        _push_straight(near.gap, near.facing, near.beside, near.pose)
+        _push_straight(near.first, near.pose)
         return True
-    _put_back_places(near.gap, near.start, near.pose)
-    _put_back_turns(near.gap, near.start, near.pose)
+    _put_back_places(near.first.gap, near.start, near.pose)
+    _put_back_turns(near.first.gap, near.start, near.pose)
     return False
 
 
@@ -259,14 +334,14 @@ def _resolve(shape, lanes, near):
             part += 1  # Jyro looks where a step ends, and not before it turns there
             continue
         if part == last and shape.enclosed:
-            clearance(shape, p, near.pose, near, near.gap)
-            if shape.row_shape.size == 0 and count_touching(near.gap) == 0:
+            clearance(shape, p, near.pose, near, near.first.gap)
+            if shape.row_shape.size == 0 and count_touching(near.first.gap) == 0:
                 break
             choose_walls(shape, p, near)
         n_touching = touch(shape, p, near)
         again = False
         if n_touching > 0:
-            _note_touch(near.gap, near.low)
+            _note_touch(near.first.gap, near.low)
             again = _answer_part(shape, p, near, sweep) if part < last else _leave_free(near, sweep)
         if again:
             sweep += 1
@@ -279,9 +354,9 @@ def _resolve(shape, lanes, near):
     if shape.contact == FREEZE:
         _put_back_places(near.low, near.start, near.pose)
         _put_back_turns(near.low, near.start, near.pose)
-        _stall_of_touch(near.low, near.gap)
+        _stall_of_touch(near.low, near.first.gap)
         return
-    _judge(reach, length, turn, went, turned, near.low, near.gap)
+    _judge(reach, length, turn, went, turned, near.low, near.first.gap)
 
 
 @stage
@@ -336,7 +411,7 @@ def _meet(shape, lanes, near):
     to_axles(lanes.pose, axle, near.pose)
     _begin(flag, near.low)
     _resolve(shape, lanes, near)
-    _end(flag, near.low, near.gap, axle, near.pose, lanes.low, lanes.proposed)
+    _end(flag, near.low, near.first.gap, axle, near.pose, lanes.low, lanes.proposed)
 
 
 @kernel

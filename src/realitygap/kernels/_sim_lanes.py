@@ -74,17 +74,25 @@ class SimRoom(NamedTuple):
     wiring: Wiring
 
 
+class Contact(NamedTuple):
+    """Where bodies are met, in the frames of their axles."""
+
+    gap: Row  # [m]
+    facing: Row  # the normal, towards the body: ahead and left
+    beside: Row
+    corner_x: Row  # the body's corner that is met, grown by a radius [m]
+    corner_y: Row
+    radius: Row
+
+
 class Near(NamedTuple):
     """What contact works out for a block of trials in a step. Poses are of the axle."""
 
     pose: Poses
     before: Poses  # at the beginning of a part of the step
     start: Poses  # at the beginning of the step
-    gap: Row  # of the deepest contact [m]; the rest is of it too
-    facing: Row  # its normal, towards the body: ahead and left
-    beside: Row
-    point_x: Row  # where the body is met
-    point_y: Row
+    first: Contact  # the deepest
+    second: Contact  # the next
     low: Row  # the least gap met so far
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
@@ -132,6 +140,9 @@ def make_near(shape, dtype):
     def poses():
         return Poses(*(row() for _ in Poses._fields))
 
+    def contact():
+        return Contact(*(row() for _ in Contact._fields))
+
     def rows(n):
         return np.zeros((n, LANES), dtype)
 
@@ -139,11 +150,8 @@ def make_near(shape, dtype):
         pose=poses(),
         before=poses(),
         start=poses(),
-        gap=row(),
-        facing=row(),
-        beside=row(),
-        point_x=row(),
-        point_y=row(),
+        first=contact(),
+        second=contact(),
         low=row(),
         effort=rows(4),
         gaps=rows(shape.n_walls),

@@ -128,7 +128,6 @@ class SimShape(NamedTuple):
     noisy: bool  # whether the drive draws random numbers
     substeps: int  # parts of a step in which contact is looked for
     late_substeps: int  # likewise, of its beginning, when the old command still goes on
-    sweeps: int  # how often contact is mended in each of them
     enclosed: bool  # whether the walls close a convex room, so that each is a half-plane
     stall: int  # BLOCKED or IDLER
     light_shadows: int  # NO_SHADOWS, HALF_SHADOWS or DARK_SHADOWS
@@ -218,7 +217,6 @@ def make_sim_shape(
     delay_steps: int = 0,
     substeps: int = 4,
     late_substeps: int = 1,
-    sweeps: int = 2,
     stall: str = "blocked",
     range_response: Sequence[str] = (),
     range_rays: Sequence[int] | None = None,
@@ -255,7 +253,6 @@ def make_sim_shape(
         delay_steps: Whole steps by which a command can be late at most.
         substeps, late_substeps: Parts of a step in which contact is looked for, of the new command and of the
             old one that goes on before it (`substeps_for`).
-        sweeps: How often contact is mended in each of them.
         stall: "blocked" or "idler".
         range_response: "linear", "ir", "table" or "pulses" for each range sensor.
         range_rays, range_table, range_pulses: Rays (1 or odd), entries of the table, and pulses of each.
@@ -312,7 +309,6 @@ def make_sim_shape(
         delay_steps=delay_steps,
         substeps=substeps,
         late_substeps=late_substeps,
-        sweeps=sweeps,
         enclosed=enclosed,
         stall=STALLS[stall],
         light_shadows=SHADOWS[light_shadows],
@@ -453,8 +449,9 @@ def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:
 def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: float) -> int:
     """Parts of a step in which contact must be looked for, so that nothing thin is passed through.
 
-    In each part the body moves less than half of its half width: what it meets is always pushed back out to the
-    side where it came from. There are at least two, for the sake of exactness.
+    In each part the body moves less than a quarter of its half width: what it meets is always pushed back out to the
+    side where it came from. Half of it would be enough for that; the rest, and that there are at least two, is for
+    the sake of exactness.
 
     Args:
         travel: The farthest that a wheel drives in a step [m].
@@ -467,4 +464,4 @@ def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: 
     heights = normals @ points.T
     widths = heights.max(1) - heights.min(1) if len(normals) else np.zeros(1)
     half = float(widths.min()) / 2 + radius
-    return max(2, math.ceil(2 * abs(travel) / half)) if half > 0 else 64
+    return max(2, math.ceil(4 * abs(travel) / half)) if half > 0 else 64

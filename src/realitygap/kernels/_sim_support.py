@@ -110,3 +110,91 @@ def lowest(p, outline, n, along, across, low, point_x, point_y):
     if n & 1:
         row = outline + PER_CORNER * (n - 1)
         _lower(along, across, p[row], p[row + 1], low, point_x, point_y)
+
+
+@stage
+def _lower_pair(along, across, x, y, other_x, other_y, low, point_x, point_y, next_low, next_x, next_y):
+    """Merge two corners into the lowest two, which are in order."""
+    for lane in range(LANES):
+        a = along[lane]
+        b = across[lane]
+        c_x = x[lane]
+        c_y = y[lane]
+        d_x = other_x[lane]
+        d_y = other_y[lane]
+        one = a * c_x + b * c_y
+        two = a * d_x + b * d_y
+        swapped = two < one
+        c = two if swapped else one
+        d = one if swapped else two
+        lower_x = d_x if swapped else c_x
+        lower_y = d_y if swapped else c_y
+        d_x = c_x if swapped else d_x
+        d_y = c_y if swapped else d_y
+        least = low[lane]
+        p_x = point_x[lane]
+        p_y = point_y[lane]
+        then = next_low[lane]
+        q_x = next_x[lane]
+        q_y = next_y[lane]
+        lower = c < least
+        low[lane] = c if lower else least
+        point_x[lane] = lower_x if lower else p_x
+        point_y[lane] = lower_y if lower else p_y
+        # The next is the lower one of what was lowest and the other corner, or of the next and the lower corner.
+        c = d if lower else c
+        lower_x = d_x if lower else lower_x
+        lower_y = d_y if lower else lower_y
+        then = least if lower else then
+        q_x = p_x if lower else q_x
+        q_y = p_y if lower else q_y
+        lower = c < then
+        next_low[lane] = c if lower else then
+        next_x[lane] = lower_x if lower else q_x
+        next_y[lane] = lower_y if lower else q_y
+
+
+@stage
+def _lower_one(along, across, x, y, low, point_x, point_y, next_low, next_x, next_y):
+    for lane in range(LANES):
+        c_x = x[lane]
+        c_y = y[lane]
+        c = along[lane] * c_x + across[lane] * c_y
+        least = low[lane]
+        p_x = point_x[lane]
+        p_y = point_y[lane]
+        then = next_low[lane]
+        q_x = next_x[lane]
+        q_y = next_y[lane]
+        lower = c < least
+        low[lane] = c if lower else least
+        point_x[lane] = c_x if lower else p_x
+        point_y[lane] = c_y if lower else p_y
+        c = least if lower else c
+        c_x = p_x if lower else c_x
+        c_y = p_y if lower else c_y
+        lower = c < then
+        next_low[lane] = c if lower else then
+        next_x[lane] = c_x if lower else q_x
+        next_y[lane] = c_y if lower else q_y
+
+
+@stage
+def lowest_two(p, outline, n, along, across, low, point_x, point_y, next_low, next_x, next_y):
+    """The lowest two of n corners along a normal; of one corner there is no second: it is FAR.
+
+    Args:
+        p, outline, n, along, across: As in `low_height`.
+        low, point_x, point_y, next_low, next_x, next_y: Written: the height and place of each.
+    """
+    fill(low, low.dtype.type(FAR))
+    fill(next_low, low.dtype.type(FAR))
+    for pair in range(n >> 1):
+        row = outline + 2 * PER_CORNER * pair
+        _lower_pair(
+            along, across, p[row], p[row + 1], p[row + PER_CORNER], p[row + PER_CORNER + 1],
+            low, point_x, point_y, next_low, next_x, next_y,
+        )  # fmt: skip
+    if n & 1:
+        row = outline + PER_CORNER * (n - 1)
+        _lower_one(along, across, p[row], p[row + 1], low, point_x, point_y, next_low, next_x, next_y)

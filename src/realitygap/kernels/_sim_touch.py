@@ -159,36 +159,60 @@ def _begin_pair(x, y, q_x, q_y, score, apart, at_end, n_x, n_y, on_x, on_y, way_
 
 @stage
 def _deeper_in_shape(
-    apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y,
-    body_radius, radius, near_gap, facing, beside, point_x, point_y,
+    apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y, body_radius, radius, first, second
 ):  # fmt: skip
-    """Keep the deeper contact; of two as deep, the one more to the left, so that no order of shapes decides."""
-    real = near_gap.dtype.type
+    """Merge a contact into the deepest two; of two as deep, the one more to the left, so that no order decides."""
+    gap, facing, beside, corner_x, corner_y, rounding = first
+    then, then_facing, then_beside, then_x, then_y, then_rounding = second
+    real = gap.dtype.type
     for k in range(LANES):
         d_x = way_x[k]
         d_y = way_y[k]
         size = np.sqrt(d_x * d_x + d_y * d_y)
-        gap = apart[k]
-        face_x = n_x[k]
-        face_y = n_y[k]
-        corner = (at_end[k] > real(0.0)) & (gap > real(0.0)) & (size > real(0.0))
+        now = apart[k]
+        a = n_x[k]
+        b = n_y[k]
+        corner = (at_end[k] > real(0.0)) & (now > real(0.0)) & (size > real(0.0))
         scale = real(1.0) / (size if corner else real(1.0))
-        a = d_x * scale if corner else face_x
-        b = d_y * scale if corner else face_y
-        gap = (size if corner else gap) - (body_radius[k] + radius[k])
-        c_x = on_x[k] - body_radius[k] * a
-        c_y = on_y[k] - body_radius[k] * b
-        least = near_gap[k]
-        f = facing[k]
-        g = beside[k]
-        p_x = point_x[k]
-        p_y = point_y[k]
-        deeper = (gap < least) | ((gap == least) & (c_y + b > p_y + g))
-        near_gap[k] = gap if deeper else least
-        facing[k] = a if deeper else f
-        beside[k] = b if deeper else g
-        point_x[k] = c_x if deeper else p_x
-        point_y[k] = c_y if deeper else p_y
+        r = body_radius[k]
+        a = d_x * scale if corner else a
+        b = d_y * scale if corner else b
+        now = (size if corner else now) - (r + radius[k])
+        u = on_x[k]
+        v = on_y[k]
+        left = v + (real(1.0) - r) * b
+        f = gap[k]
+        f_a = facing[k]
+        f_b = beside[k]
+        f_x = corner_x[k]
+        f_y = corner_y[k]
+        f_r = rounding[k]
+        s = then[k]
+        s_a = then_facing[k]
+        s_b = then_beside[k]
+        s_x = then_x[k]
+        s_y = then_y[k]
+        s_r = then_rounding[k]
+        deeper = (now < f) | ((now == f) & (left > f_y + (real(1.0) - f_r) * f_b))
+        next_one = (now < s) | ((now == s) & (left > s_y + (real(1.0) - s_r) * s_b))
+        gap[k] = now if deeper else f
+        facing[k] = a if deeper else f_a
+        beside[k] = b if deeper else f_b
+        corner_x[k] = u if deeper else f_x
+        corner_y[k] = v if deeper else f_y
+        rounding[k] = r if deeper else f_r
+        s = now if next_one else s
+        s_a = a if next_one else s_a
+        s_b = b if next_one else s_b
+        s_x = u if next_one else s_x
+        s_y = v if next_one else s_y
+        s_r = r if next_one else s_r
+        then[k] = f if deeper else s
+        then_facing[k] = f_a if deeper else s_a
+        then_beside[k] = f_b if deeper else s_b
+        then_x[k] = f_x if deeper else s_x
+        then_y[k] = f_y if deeper else s_y
+        then_rounding[k] = f_r if deeper else s_r
 
 
 @stage
@@ -302,28 +326,30 @@ def touch_shape(shape, p, near, q):
             )  # fmt: skip
         _deeper_in_shape(
             best[1], best[2], best[3], best[4], best[5], best[6], best[7], best[8],
-            p[shape.row_part[part] + 2 * n], p[first + PER_CORNER * m],
-            near.gap, near.facing, near.beside, near.point_x, near.point_y,
+            p[shape.row_part[part] + 2 * n], p[first + PER_CORNER * m], near.first, near.second,
         )  # fmt: skip
 
 
 @kernel
 def touch(shape, p, near):
-    """The deepest contact of each body at `near.pose`: gap [m], normal and point in the body's frame.
+    """The deepest two contacts of each body at `near.pose`.
+
+    A wall of a room can have both; an obstacle or open wall has one with each part of a body.
 
     Args:
         shape: Structure.
-        near: Numbers and poses are read; `gap`, `facing`, `beside`, `point_x` and `point_y` written.
+        near: Numbers and poses are read; `first` and `second` written.
 
     Returns:
         In how many lanes bodies touch or overlap something.
     """
-    fill(near.gap, near.gap.dtype.type(FAR))
+    fill(near.first.gap, near.first.gap.dtype.type(FAR))
+    fill(near.second.gap, near.first.gap.dtype.type(FAR))
     if shape.enclosed:
         touch_walls(shape, p, near)
     for q in range(shape.row_shape.size):
         touch_shape(shape, p, near, q)
-    return count_touching(near.gap)
+    return count_touching(near.first.gap)
 
 
 @stage

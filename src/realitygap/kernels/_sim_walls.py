@@ -9,7 +9,7 @@ from __future__ import annotations
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._sim_rays import see_plane
-from ._sim_support import FAR, low_height, lowest
+from ._sim_support import FAR, low_height, lowest_two
 
 N_NEAREST = 2
 PER_WALL = 4  # rows of a wall that is near: normal x, y, offset, gap
@@ -104,39 +104,71 @@ def choose_walls(shape, p, near):
 
 
 @stage
-def _deeper_in_wall(low, center, radius, along, across, x, y, near_gap, facing, beside, point_x, point_y):
+def _deeper_in_wall(low, next_low, center, radius, along, across, x, y, next_x, next_y, first, second):
+    """Merge a wall's lowest two corners into the deepest two contacts."""
+    gap, facing, beside, corner_x, corner_y, rounding = first
+    then, then_facing, then_beside, then_x, then_y, then_rounding = second
     for lane in range(LANES):
         a = along[lane]
         b = across[lane]
         r = radius[lane]
-        gap = low[lane] + center[lane] - r
-        c_x = x[lane] - r * a
-        c_y = y[lane] - r * b
-        least = near_gap[lane]
-        f = facing[lane]
-        g = beside[lane]
-        p_x = point_x[lane]
-        p_y = point_y[lane]
-        deeper = gap < least
-        near_gap[lane] = gap if deeper else least
-        facing[lane] = a if deeper else f
-        beside[lane] = b if deeper else g
-        point_x[lane] = c_x if deeper else p_x
-        point_y[lane] = c_y if deeper else p_y
+        one = low[lane] + center[lane] - r
+        two = next_low[lane] + center[lane] - r
+        u = x[lane]
+        v = y[lane]
+        next_u = next_x[lane]
+        next_v = next_y[lane]
+        f = gap[lane]
+        f_a = facing[lane]
+        f_b = beside[lane]
+        f_x = corner_x[lane]
+        f_y = corner_y[lane]
+        f_r = rounding[lane]
+        s = then[lane]
+        s_a = then_facing[lane]
+        s_b = then_beside[lane]
+        s_x = then_x[lane]
+        s_y = then_y[lane]
+        s_r = then_rounding[lane]
+        deeper = one < f
+        gap[lane] = one if deeper else f
+        facing[lane] = a if deeper else f_a
+        beside[lane] = b if deeper else f_b
+        corner_x[lane] = u if deeper else f_x
+        corner_y[lane] = v if deeper else f_y
+        rounding[lane] = r if deeper else f_r
+        # What is left: the wall's next corner and what was deepest, or its lowest and what was next.
+        one = two if deeper else one
+        u = next_u if deeper else u
+        v = next_v if deeper else v
+        s = f if deeper else s
+        s_a = f_a if deeper else s_a
+        s_b = f_b if deeper else s_b
+        s_x = f_x if deeper else s_x
+        s_y = f_y if deeper else s_y
+        s_r = f_r if deeper else s_r
+        deeper = one < s
+        then[lane] = one if deeper else s
+        then_facing[lane] = a if deeper else s_a
+        then_beside[lane] = b if deeper else s_b
+        then_x[lane] = u if deeper else s_x
+        then_y[lane] = v if deeper else s_y
+        then_rounding[lane] = r if deeper else s_r
 
 
 @stage
 def touch_walls(shape, p, near):
-    """Deepen the touch by the walls in `near.walls`."""
+    """Deepen the touch by the walls in `near.walls`: by two corners of each part of the body at each."""
     spare, walls = near.spare, near.walls
     center, along, across, low, x, y = spare[0], spare[1], spare[2], spare[3], spare[4], spare[5]
+    next_low, next_x, next_y = spare[6], spare[7], spare[8]
     for k in range(N_NEAREST):
         wall = PER_WALL * k
         see_plane(walls[wall], walls[wall + 1], walls[wall + 2], near.pose, center, along, across)
         for part in range(shape.part_corners.size):
             n = shape.part_corners[part]
-            lowest(p, shape.row_outline[part], n, along, across, low, x, y)
+            lowest_two(p, shape.row_outline[part], n, along, across, low, x, y, next_low, next_x, next_y)
             _deeper_in_wall(
-                low, center, p[shape.row_part[part] + 2 * n], along, across, x, y,
-                near.gap, near.facing, near.beside, near.point_x, near.point_y,
+                low, next_low, center, p[shape.row_part[part] + 2 * n], along, across, x, y, next_x, next_y,
+                near.first, near.second,
             )  # fmt: skip

@@ -169,7 +169,7 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
     )
     if robot.contact.model == "freeze":
         # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
-        substeps = math.ceil(substeps / 3)
+        substeps = math.ceil(substeps / 6)
     if substeps > MOST_PARTS:
         raise ValueError(
             f"the robot drives up to {way:,.4g} m in a step, which takes {substeps:,} parts to look for contact in; "

@@ -47,6 +47,16 @@ def test_wheels_near_their_speed_exponentially_at_any_step(step_s: float) -> Non
     )
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.05])
+def test_a_robot_that_stands_is_not_shaken(lag: float) -> None:
+    """The tail of a lag never ends, but a second after a command to stop nothing moves any more."""
+    numbers = {**FIELD, "drive.lag": lag, "drive.heading_noise_per_s": 0.1, "drive.travel_noise_per_s": 0.02}
+    driven = drive_robots(numbers, np.array([[0.5, 0.1]] * 3 + [[0.0, 0.0]] * 6), noisy=True)
+    headings = driven.poses[:, 0, 2]
+    assert np.ptp(headings[:4]) > 0.1
+    assert np.ptp(headings[5:]) < 1e-4
+
+
 @pytest.mark.parametrize(("step_s", "delay_steps"), [(0.5, 0), (0.25, 1), (0.0625, 4)])
 def test_an_old_command_goes_on_until_the_new_one_arrives(step_s: float, delay_steps: int) -> None:
     """One second ahead, one second back, each 0.3 s late."""

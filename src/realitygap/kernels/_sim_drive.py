@@ -17,6 +17,7 @@ HEADING_PER_M, HEADING_PER_S, DRIFT_PER_M, BATTERY_SAG = range(15, len(DRIVE_NUM
 
 LEAST_LAG = 1e-9  # [s] what stands for no lag, which would be divided by
 SMALL_TURN = 1e-3  # half a turn [rad] below which sin(x) / x is taken from its series
+STANDS = 1e-3  # [m/s] below which wheels stand: a lag never ends
 
 
 @stage
@@ -170,13 +171,13 @@ def _to_motion(left, right, slip, track, drift, length, turn):
 
 @stage
 def _shake(words, left, right, other_left, other_right, seconds, per_m, per_s, noise):
-    """Noise of a step that the wheels drive, whose variance grows with the way and with the time."""
+    """Noise of a step that the wheels drive, whose variance grows with the way, and with the time unless they stand."""
     real = noise.dtype.type
     for lane in range(LANES):
         way = real(0.5) * (
             abs(left[lane]) + abs(right[lane]) + (abs(other_left[lane]) + abs(other_right[lane]))
         )
-        time = real(seconds) if way > real(0.0) else real(0.0)
+        time = real(seconds) if way > real(STANDS * seconds) else real(0.0)
         variance = per_m[lane] * per_m[lane] * way + per_s[lane] * per_s[lane] * time
         noise[lane] = np.sqrt(variance) * normal(words[lane], variance)
 

@@ -1,9 +1,10 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
 from ._abc import Effort, Posterior, fit_all
+from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
 from ._contact_plans import contact_plans
-from ._evidence import Evidence, Vectors, evidence_of
+from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
 from ._ir_checks import Independence, independence, predictive_check
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
@@ -21,6 +22,7 @@ from ._step import step_of
 
 __all__ = [
     "LEAST_PLACEMENTS",
+    "LEAST_STEPS",
     "Effect",
     "Effort",
     "Evidence",
@@ -43,6 +45,7 @@ __all__ = [
     "excitation",
     "fit_all",
     "fit_contact",
+    "fit_from_poses",
     "fit_motion",
     "fit_path",
     "fit_sensor",

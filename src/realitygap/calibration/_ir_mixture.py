@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ._ir_readings import Array, Placement, Places
-from ._ir_scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, OUTLIER, Scale
+from ._ir_readings import Array, Placement, Places, logistic
+from ._ir_scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column
 
 STRAY = 1e-6
 """Probability of any reading, so that one that the model cannot make is unlikely and not impossible."""
@@ -48,8 +48,7 @@ class MixtureReadings:
         self.places = Places.of(placements, reach)
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER)
-        if self.places.battery_varied:
-            self.scales += (BATTERY,)
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
         self.step = step_of(np.concatenate([placement.readings for placement in placements]))
         self._edges = _inner_edges(self.step)
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
@@ -88,7 +87,7 @@ class MixtureReadings:
         return self._at(self.places, values)
 
     def _at(self, places: Places, values: Array) -> Array:
-        back, spread, drop, out = _parts(places, values)
+        back, spread, drop, out = _parts(places, self.scales, values)
         edges = self._edges
         below = ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
@@ -99,10 +98,10 @@ class MixtureReadings:
         mixed[..., 0] += drop
         return np.asarray((1.0 - STRAY) * mixed + STRAY / mixed.shape[2])
 
-    def log_likelihood(self, values: Array) -> Array:
-        """(m,) of (m, d) parameters."""
+    def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
+        """(m,) of (m, d) parameters, with a probability of any reading at all."""
         which, readings, counts = self._rows
-        back, spread, drop, out = (part[:, which] for part in _parts(self.places, values))
+        back, spread, drop, out = (part[:, which] for part in _parts(self.places, self.scales, values))
         half = self.step / 2
         upper = np.where(readings >= 1.0, np.inf, readings + half)
         lower = np.where(readings <= 0.0, -np.inf, readings - half)
@@ -110,7 +109,7 @@ class MixtureReadings:
         inside = (readings > 0.0) & (readings < 1.0)
         chance = (1.0 - drop - out) * normal + out * np.where(inside, self.step, half)
         chance = chance + drop * (readings <= 0.0)
-        chance = (1.0 - STRAY) * chance + STRAY * self.step
+        chance = (1.0 - stray) * chance + stray * self.step
         return np.asarray(self.weight * (np.log(chance) @ counts))
 
     def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
@@ -122,14 +121,14 @@ class MixtureReadings:
         return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
 
 
-def _parts(places: Places, values: Array) -> tuple[Array, Array, Array, Array]:
+def _parts(places: Places, scales: tuple[Scale, ...], values: Array) -> tuple[Array, Array, Array, Array]:
     """(m, p) each: response, standard deviation, and probability of nothing and of anything."""
     amplitude, decay, gain = values[:, :3].T
-    per_volt = values[:, 9] if values.shape[1] > 9 else np.zeros(len(values))
-    back = places.response(amplitude, decay, per_volt)
+    per_volt, incidence = (column(scales, values, scale) for scale in (BATTERY, INCIDENCE))
+    back, dim = places.response(amplitude, decay, per_volt, incidence)
     spread = np.maximum(gain[:, None] * back, 1e-9)
-    drop = places.logistic(*values[:, 3:6].T)
-    out = np.minimum(places.logistic(*values[:, 6:9].T), 1.0 - drop)
+    drop = logistic(dim, *values[:, 3:6].T)
+    out = np.minimum(logistic(dim, *values[:, 6:9].T), 1.0 - drop)
     return back, spread, drop, out
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from ._ir_readings import Array, Placement, Places
-from ._ir_scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, Scale
+from ._ir_readings import Array, Placement, Places, logistic
+from ._ir_scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column
 
 STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
@@ -28,8 +28,7 @@ class PulseReadings:
         self.pulses = pulses
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
-        if self.places.battery_varied:
-            self.scales += (BATTERY,)
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
 
     @property
@@ -50,12 +49,13 @@ class PulseReadings:
         """
         return self._at(self.places, values)
 
-    def _at(self, places: Places, values: Array) -> Array:
+    def _at(self, places: Places, values: Array, stray: float = STRAY) -> Array:
         amplitude, decay, most, at, width, burst = values[:, :6].T
-        per_volt = values[:, 6] if values.shape[1] > 6 else np.zeros(len(values))
-        back = np.clip(places.response(amplitude, decay, per_volt), 0.0, 1.0)
+        per_volt, incidence = (column(self.scales, values, scale) for scale in (BATTERY, INCIDENCE))
+        back, dim = places.response(amplitude, decay, per_volt, incidence)
+        back = np.clip(back, 0.0, 1.0)
         promised = np.floor(back * self.pulses + 0.5).astype(np.int64)
-        missed = np.clip(places.logistic(most, at, width), 1e-12, 1.0 - 1e-12)
+        missed = np.clip(logistic(dim, most, at, width), 1e-12, 1.0 - 1e-12)
         k = np.arange(self.pulses + 1)
         left = promised[..., None] - k
         logs = np.log(missed)[..., None] * np.maximum(left, 0) + np.log1p(-missed)[..., None] * k
@@ -63,11 +63,11 @@ class PulseReadings:
         shared = np.where(k == promised[..., None], (1.0 - missed)[..., None], 0.0)
         shared = shared + np.where(k == 0, missed[..., None], 0.0)
         mixed = burst[:, None, None] * shared + (1.0 - burst)[:, None, None] * apart
-        return np.asarray((1.0 - STRAY) * mixed + STRAY / (self.pulses + 1))
+        return np.asarray((1.0 - stray) * mixed + stray / (self.pulses + 1))
 
-    def log_likelihood(self, values: Array) -> Array:
-        """(m,) of (m, d) parameters."""
-        logs = np.log(self.probabilities(values))
+    def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
+        """(m,) of (m, d) parameters, with a probability of any reading at all."""
+        logs = np.log(self._at(self.places, values, stray))
         return np.asarray(self.weight * np.einsum("mpb,pb->m", logs, self.counts))
 
     def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:

@@ -56,7 +56,7 @@ class Scale:
 _FAR = "Record nearer to the distance from which readings fall to 0, and beyond it."
 
 AMPLITUDE = Scale(
-    "amplitude", 0.2, 4.0, "ratio", "", "Record at more distances at which readings are between 0 and full."
+    "amplitude", 0.2, 10.0, "ratio", "", "Record at more distances at which readings are between 0 and full."
 )
 DECAY = Scale("decay", 0.03, 0.8, "ratio", "m", AMPLITUDE.advice)
 GAIN = Scale("noise_gain", 0.002, 0.5, "ratio", "", AMPLITUDE.advice)
@@ -73,6 +73,7 @@ OUTLIER = (
 BURST = Scale(
     "burst", 0.0, 1.0, "even", "", "Record where several pulses come back and some are missed: 4 to 12 in."
 )
+INCIDENCE = Scale("incidence", 0.0, 4.0, "even", "", "Record near walls that are not faced.")
 BATTERY = Scale(
     "battery_per_v",
     -1.0,
@@ -82,3 +83,8 @@ BATTERY = Scale(
     "Record with a full and with a nearly empty battery: its voltage did not vary, or is not known.",
 )
 """Change of the logarithm of the amplitude with each volt."""
+
+
+def column(scales: tuple[Scale, ...], values: Array, scale: Scale) -> Array:
+    """(m,) the values of one parameter among (m, d) of all; 0 where it is none of them."""
+    return values[:, scales.index(scale)] if scale in scales else np.zeros(len(values))

@@ -128,11 +128,12 @@ DRIVE: tuple[tuple[str, Distribution, str, str], ...] = (
 """Numbers of the drive that are parameters themselves; ranges chosen for small robots with cheap motors."""
 
 RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
-    ("amplitude", _ratio(0.4, 3.0), "", "readings very near a wall"),
+    ("amplitude", _ratio(0.4, 10.0), "", "readings very near a wall"),
     ("decay", _ratio(0.05, 0.5), "m", "readings at several distances"),
     ("drop_most", _even(0.0, 1.0), "", "readings far from a wall, where light still comes back"),
     ("drop_at", _even(0.0, 0.45), "m", "readings at several distances"),
     ("drop_width", _ratio(0.005, 0.1), "m", "readings at several distances"),
+    ("incidence", _even(0.0, 4.0), "", "readings near walls that are not faced"),
 )
 """Of range sensors, the same for all."""
 
@@ -165,6 +166,11 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
         Parameter("body.length", _even(0.8, 1.2), "", _corners(plain, "x"), "walls met head on"),
         Parameter("body.width", _even(0.8, 1.2), "", _corners(plain, "y"), "walls scraped along"),
     ]  # fmt: skip
+    if robot.stall.kind == "idler":
+        # Also what loads take from the wheels, which in `sim` turn as commanded.
+        prior.append(
+            Parameter("stall.share", _even(0.05, 0.8), "", (Effect("stall.share"),), "walls scraped along")
+        )
     return tuple(prior) + _of_ranges(robot)
 
 

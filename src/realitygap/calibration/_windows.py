@@ -79,14 +79,14 @@ def make_windows(
     commands = padded_commands(trials)
     anchors = np.full((len(trials), commands.shape[1] + 1, 3), np.nan)
     parts = []
-    outline = _outline(robot)
+    outline = outline_of(robot)
     for k, trial in enumerate(trials):
         t = len(trial.commands)
         first = np.arange(0, t - length + 1, length)
         poses = trial.poses if len(trial.poses) else np.full((t + 1, 3), np.nan)
         wheels = trial.wheels if len(trial.wheels) else np.full((t + 1, 2), np.nan)
         anchors[k, first] = poses[first]
-        near = _is_near(poses, outline, arena)
+        near = is_near(poses, outline, arena)
         near[:t] |= trial.stalled
         near[1 : t + 1] |= trial.stalled
         touching = np.array([near[at : at + length + 1].any() for at in first], np.bool_)
@@ -101,12 +101,12 @@ def make_windows(
     )  # fmt: skip
 
 
-def _outline(robot: RobotModel) -> Floats:
+def outline_of(robot: RobotModel) -> Floats:
     """(p, 2) points around the body [m]."""
     return np.array([point for part in robot.body for point in part.outline()])
 
 
-def _is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
+def is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
     """(n,) whether the body at each pose is near a wall; False where the pose is not known."""
     cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
     x = poses[:, :1] + outline[:, 0] * cos - outline[:, 1] * sin

@@ -12,7 +12,7 @@ import numpy as np
 
 from ._compile import inlined, stage
 from ._lanes import LANES, fill
-from ._math import LOG2_E, exp2
+from ._math import LOG2_E, exp2, log
 
 STEEP = 1e30  # [1/m]: any distance times it is beyond the limits of `exp2`
 
@@ -89,6 +89,51 @@ def _one_return(distance, reach, amplitude, rate, reading):
         d = distance[lane]
         back = amplitude[lane] * exp2(-d * rate[lane])
         reading[lane] = back if d < reach[lane] else real(0.0)
+
+
+@stage
+def _add_slanted(distance, cosine, reach, rate, incidence, weight, faced, reading):
+    real = reading.dtype.type
+    for lane in range(LANES):
+        d = distance[lane]
+        c = cosine[lane]
+        back = real(weight) * exp2(-d * rate[lane])
+        back = back if d < reach[lane] else real(0.0)
+        faced[lane] = faced[lane] + back
+        reading[lane] = reading[lane] + back * (c / (c + incidence[lane] * (real(1.0) - c)))
+
+
+@stage
+def slanted_response(distances, cosines, reach, amplitude, rate, incidence, near, faced, dim, reading):
+    """`ir_response` of walls that send back less where a ray meets them at a slant: c / (c + k (1 - c)) of it.
+
+    c is the cosine between ray and normal; k = 1 is Lambert's law of matt surfaces, 0 none, more falls off faster.
+
+    Args:
+        distances, reach, amplitude, rate: As in `ir_response`.
+        cosines: (rays, LANES) c, above 0.
+        incidence: k.
+        near: (LANES,) distance to what is nearest [m].
+        faced: Room.
+        dim: Written: where what is nearest would send back as little if it were faced [m].
+        reading: Written.
+    """
+    real = reading.dtype.type
+    rays = distances.shape[0]
+    fill(reading, real(0.0))
+    fill(faced, real(0.0))
+    whole = 0.0
+    for ray in range(rays):
+        weight = lobe_of(ray, rays)
+        whole += weight
+        _add_slanted(distances[ray], cosines[ray], reach, rate, incidence, weight, faced, reading)
+    for lane in range(LANES):
+        all_of_it = faced[lane]
+        less = reading[lane]
+        some = (all_of_it > real(0.0)) & (less > real(0.0))
+        ratio = (all_of_it if some else real(1.0)) / (less if some else real(1.0))
+        dim[lane] = near[lane] + log(ratio) * real(LOG2_E) / rate[lane]
+        reading[lane] = less * (amplitude[lane] * real(1.0 / whole))
 
 
 @stage

@@ -1,4 +1,7 @@
-"""Distances along rays to walls and obstacles, in lanes: the nearest hit is kept as a fraction, divided once."""
+"""Distances along rays to walls and obstacles, in lanes: the nearest hit is kept as a fraction, divided once.
+
+The denominator is the cosine between the ray and the normal of what it meets.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ import numpy as np
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._sim_outline import PER_CORNER
+
+GRAZING = 1e-3  # the least cosine at which a disc is met
 
 
 @stage
@@ -142,12 +147,16 @@ def _meet_disc(x, y, radius, forward, left, cosine, sine, distance, rate):
         along = off_x * cosine[lane] + off_y * sine[lane]
         aside = off_y * cosine[lane] - off_x * sine[lane]
         under = radius[lane] * radius[lane] - aside * aside
-        gap = along - np.sqrt(under if under > real(0.0) else real(0.0))
+        half = np.sqrt(under if under > real(0.0) else real(0.0))
+        gap = along - half
+        r = radius[lane]
+        cosine_there = half / (r if r > real(0.0) else real(1.0))
+        cosine_there = cosine_there if cosine_there > real(GRAZING) else real(GRAZING)
         nearest = distance[lane]
         nearest_rate = rate[lane]
         hit = (under >= real(0.0)) & (gap >= real(0.0)) & (gap * nearest_rate < nearest)
-        distance[lane] = gap if hit else nearest
-        rate[lane] = real(1.0) if hit else nearest_rate
+        distance[lane] = gap * cosine_there if hit else nearest
+        rate[lane] = cosine_there if hit else nearest_rate
 
 
 @stage
@@ -247,7 +256,8 @@ def cast_rays(shape, lanes):
 
     Args:
         shape: Structure.
-        lanes: Numbers and poses are read, `distances` (rays, LANES) written.
+        lanes: Numbers and poses are read; `distances` (rays, LANES) written, and `rates`: the cosine between each ray
+            and the normal of what it meets, 1 where there is nothing.
     """
     p, distances, rates, spare = lanes.p, lanes.distances, lanes.rates, lanes.spare
     for s in range(shape.row_range.size):

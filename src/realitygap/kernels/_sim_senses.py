@@ -29,6 +29,7 @@ from ._sim_range import (
     nearest_ray,
     prepare_table,
     rate_of,
+    slanted_response,
     table_response,
 )
 from ._sim_shape import HALF_SHADOWS, IDLER, IR, LINEAR, NO_SHADOWS, PULSES, RANGE_NUMBERS, TABLE
@@ -38,7 +39,7 @@ from ._sim_words import blocks_of, draw_words_of
 
 N_RANGE = len(RANGE_NUMBERS)
 # Places in RANGE_NUMBERS
-REACH, AMPLITUDE, DECAY, UNIFORM, GAIN, DROP, DROP_WIDTH, OUTLIER, OUTLIER_WIDTH, BURST = (
+REACH, AMPLITUDE, DECAY, UNIFORM, GAIN, DROP, DROP_WIDTH, OUTLIER, OUTLIER_WIDTH, BURST, INCIDENCE = (
     RANGE_NUMBERS.index(name)
     for name in (
         "reach",
@@ -51,6 +52,7 @@ REACH, AMPLITUDE, DECAY, UNIFORM, GAIN, DROP, DROP_WIDTH, OUTLIER, OUTLIER_WIDTH
         "outlier_most",
         "outlier_width",
         "burst",
+        "incidence",
     )
 )
 
@@ -60,7 +62,9 @@ class Senses(NamedTuple):
 
     range_rates: Rows  # (3 * s,) of the response, of dropouts, of outliers [1/m]
     noisy: NDArray[np.int32]  # (3,) whether any trial has the paper's noise, gain noise, a mixture
+    slanted: NDArray[np.int32]  # (1,) whether any trial has walls that send back less at a slant
     near: Rows  # (s,) distance to what is nearest [m]
+    dim: Rows  # (s,) the distance at which it would send back as little if it were faced [m]
     lobes: Rows  # (4 * l,) of `prepare_light`
     words: Words
     value: NDArray[np.uint32]  # (LANES,) room
@@ -95,7 +99,9 @@ def make_senses(shape, dtype):
     return Senses(
         range_rates=rows(3 * s),
         noisy=np.zeros(3, np.int32),
+        slanted=np.zeros(1, np.int32),
         near=rows(s),
+        dim=rows(s),
         lobes=rows(4 * shape.row_light.size),
         words=np.zeros((words, LANES), np.uint32),
         value=np.zeros(LANES, np.uint32),
@@ -122,6 +128,7 @@ def _any(row):
 def _start_range(shape, p, senses):
     for k in range(senses.noisy.size):
         senses.noisy[k] = 0
+    senses.slanted[0] = 0
     for s in range(shape.row_range.size):
         row = shape.row_range[s]
         rate_of(p[row + DECAY], senses.range_rates[3 * s])
@@ -130,6 +137,7 @@ def _start_range(shape, p, senses):
         if shape.range_response[s] == TABLE:
             prepare_table(p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]])
         senses.noisy[0] |= _any(p[row + UNIFORM])
+        senses.slanted[0] |= _any(p[row + INCIDENCE])
         if shape.range_response[s] != PULSES:
             senses.noisy[1] |= _any(p[row + GAIN])
             senses.noisy[2] |= _any(p[row + DROP]) | _any(p[row + OUTLIER])
@@ -177,6 +185,11 @@ def _respond(shape, lanes, senses):
             linear_response(near, p[row + REACH], reading)
         elif kind == TABLE:
             table_response(near, p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]], reading)
+        elif senses.slanted[0] > 0:
+            slanted_response(
+                rays, lanes.rates[shape.first_ray[s] : shape.first_ray[s + 1]], p[row + REACH], p[row + AMPLITUDE],
+                senses.range_rates[3 * s], p[row + INCIDENCE], near, senses.spare[0], senses.dim[s], reading,
+            )  # fmt: skip
         elif kind == IR or kind == PULSES:
             ir_response(rays, p[row + REACH], p[row + AMPLITUDE], senses.range_rates[3 * s], reading)
 
@@ -185,6 +198,7 @@ def _respond(shape, lanes, senses):
 def _mix(shape, key, lanes, senses, step):
     """Gain noise, dropouts and outliers. Three sensors share a block of four words."""
     p, words, value, n = lanes.p, senses.words, senses.value, shape.row_range.size
+    seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
     draw_words_of(PURPOSE_RANGE, step, mixture_words(n), lanes.counters, key, words)
     for s in range(n):
         row, reading = shape.row_range[s], lanes.readings[s]
@@ -195,7 +209,7 @@ def _mix(shape, key, lanes, senses, step):
                 gain_noise(value, p[row + GAIN], reading)
             if senses.noisy[2] > 0:
                 mixture(
-                    senses.near[s], words[block + place], value, p[row + DROP : row + DROP + 2],
+                    seen_from[s], words[block + place], value, p[row + DROP : row + DROP + 2],
                     senses.range_rates[3 * s + 1], p[row + OUTLIER : row + OUTLIER + 2],
                     senses.range_rates[3 * s + 2], reading,
                 )  # fmt: skip
@@ -207,6 +221,7 @@ def _mix(shape, key, lanes, senses, step):
 def _count_all_pulses(shape, key, lanes, senses, step):
     """Sensor k takes its words from reading step * sensors + k of the stream."""
     p, spare, n = lanes.p, senses.spare, shape.row_range.size
+    seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
     for s in range(n):
         if shape.range_response[s] == PULSES:
             row, pulses = shape.row_range[s], shape.range_pulses[s]
@@ -214,7 +229,7 @@ def _count_all_pulses(shape, key, lanes, senses, step):
                 PURPOSE_PULSES, step * n + s, pulse_words(pulses), lanes.counters, key, senses.words
             )
             count_pulses(
-                senses.near[s], pulses, senses.words, p[row + DROP : row + DROP + 2],
+                seen_from[s], pulses, senses.words, p[row + DROP : row + DROP + 2],
                 senses.range_rates[3 * s + 1], p[row + BURST], spare[0], spare[1], lanes.readings[s],
             )  # fmt: skip
 

@@ -93,6 +93,7 @@ RANGE_NUMBERS = (
     "outlier_at",
     "outlier_width",
     "burst",
+    "incidence",
 )  # then distance and reading of each entry of its table
 LIGHT_NUMBERS = ("x", "y", "direction", "width", "gain", "noise")
 LINE_NUMBERS = ("x", "y", "threshold", "noise")

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from realitygap.calibration import (
+    LEAST_STEPS,
     Effort,
     Evidence,
     Floats,
@@ -18,6 +19,7 @@ from realitygap.calibration import (
     evidence_of,
     excitation,
     fit_all,
+    fit_from_poses,
     information_of,
     misfits,
     next_trials,
@@ -176,6 +178,11 @@ class _Fit:
         return evidence_of(trials, genomes, self.arena.grid.n_cells)
 
     def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+        told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
+        if told and all(trial.observe == "track" for trial in told):
+            return fit_from_poses(
+                told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
+            )
         return fit_all(
             self.evidence(trials), self.simulate, self.prior, self.robot,
             seed=self.seed, effort=effort, tell=self.tell,

@@ -18,7 +18,7 @@ from ._part import Part
 from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
 from ._placing import check_start, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
-from ._robot_model import RobotModel
+from ._robot_model import RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
@@ -44,6 +44,7 @@ __all__ = [
     "Obstacle",
     "Part",
     "Pose",
+    "RangeSensor",
     "RangeSensors",
     "RobotModel",
     "arena_names",

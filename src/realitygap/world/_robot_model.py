@@ -136,6 +136,11 @@ class RangeSensor(Settings):
     burst: Share = Field(
         0.0, description="Of pulses: how often those of one reading share one fate, their correlation."
     )
+    incidence: NotNegative = Field(
+        0.0,
+        description="k of ir and pulses: what a ray meets at an angle a to its normal sends back c / (c + k (1 - c)) "
+        "of the light, c = cos a. 0: all; 1: as a matt surface does (Lambert).",
+    )
 
     @model_validator(mode="after")
     def _has_what_its_response_needs(self) -> Self:

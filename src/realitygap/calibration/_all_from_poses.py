@@ -1,0 +1,209 @@
+"""All parameters of a robot from whole trials with poses.
+
+With poses each command, each reading and each stall can be predicted by itself from where the robot was seen, so that
+likelihoods take the place of simulation alone (`fit_all`): of motion (`_single_commands.py`), of readings
+(`_ir_pulses.py`, `_ir_mixture.py`), and of stalls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from realitygap.records import ObservedTrial
+from realitygap.trials import SimEnsemble
+from realitygap.world import Arena, Distribution, RobotModel
+
+from ._abc import Posterior
+from ._ir_mixture import MixtureReadings
+from ._ir_pulses import PulseReadings
+from ._ir_readings import Placement
+from ._prior import Floats, Parameter, standard_of
+from ._rays import rays_of
+from ._shots import Shooter, Shots, shots_of
+from ._single_commands import BLOCK, SLIP, WIDER, MotionOfCommands, is_motion, place_of, values_at
+from ._tempering import sample_posterior
+
+N_DRAWS = 500
+N_READINGS = 3000  # of all that were made
+N_PARTICLES = 150
+FINEST_PLACE = 1e-3  # of a parameter of sensors: likelihoods of pulses have steps
+STRAY = 0.01  # probability of any reading at all: what no parameter explains must not decide
+SHARES = 31  # of stalls, from the least to the most that is thought possible
+N_ROBOTS = 24  # that say how often each of them stalls
+N_STALLS = 200  # draws
+LEAST_WAY = 0.02  # of the wheels in a command that tells of their slip [m]
+LEAST_COMMANDS = 20
+SURELY = 0.03  # least probability of a stall, and of none
+
+
+def fit_from_poses(
+    trials: Sequence[ObservedTrial],
+    ensemble: SimEnsemble,
+    prior: Sequence[Parameter],
+    robot: RobotModel,
+    arena: Arena,
+    *,
+    seed: int,
+    tell: Callable[[str], None] | None = None,
+) -> Posterior:
+    """The posterior of all parameters.
+
+    Args:
+        trials: With poses.
+        ensemble: Carries them out anew.
+        prior: Of the parameters.
+        robot: Whose numbers they stand for.
+        arena: Where it drove.
+        seed: Of all random numbers.
+        tell: Called with a line after each part.
+    """
+    say = tell or (lambda _: None)
+    rng = np.random.default_rng(seed)
+    shots = shots_of(trials, robot, arena)
+    shooter = Shooter(shots, ensemble, prior, robot)
+    motion = MotionOfCommands(shooter, rng)
+    values = motion.fit(_own_places(prior, robot), N_DRAWS)
+    say(f"motion: {shots.known.sum()} commands, {shots.touching[shots.known].mean():.0%} near walls")
+    n_simulated = motion.n_simulated
+    sensors = [parameter for parameter in prior if parameter.name.startswith("range.")]
+    if sensors:
+        values |= _sensors(shots, sensors, robot, arena, rng)
+        say(f"readings: {', '.join(parameter.name for parameter in sensors)}")
+    for parameter in prior:
+        if parameter.name == SLIP:
+            values[SLIP] = np.zeros(N_DRAWS)
+    for parameter in prior:
+        if parameter.name == "stall.share":
+            values[parameter.name] = _share(shooter, parameter, values, rng)
+            n_simulated += SHARES * N_ROBOTS
+            say("stalls")
+    _spread_slip(prior, values, shots, rng)
+    places = standard_of(prior, values)
+    return Posterior(places, values, np.zeros(len(prior)), n_simulated)
+
+
+def _own_places(prior: Sequence[Parameter], robot: RobotModel) -> Floats:
+    """(p,) where the robot's own numbers are, of parameters of its motion."""
+    numbers = {
+        name: value.center if isinstance(value, Distribution) else value
+        for name, value in robot.numbers().items()
+    }
+    own = {
+        "drive.gain": numbers["drive.gain_left"],
+        "drive.asymmetry": 0.0,
+        "body.length": 1.0,
+        "body.width": 1.0,
+    }
+    return np.array([place_of(p, (own | numbers)[p.name]) for p in prior if is_motion(p.name)])
+
+
+def _sensors(
+    shots: Shots, parameters: Sequence[Parameter], robot: RobotModel, arena: Arena, rng: np.random.Generator
+) -> dict[str, Floats]:
+    """(N_DRAWS,) of each parameter that range sensors share."""
+    first = next(sensor for sensor in robot.range if sensor.response in ("ir", "pulses"))
+    placements: list[Placement] = []
+    poses = shots.poses[:, :-1][shots.known]
+    for k, sensor in enumerate(robot.range):
+        if (sensor.response, sensor.rays, sensor.pulses) == (first.response, first.rays, first.pulses):
+            distances, cosines = rays_of(sensor, poses, arena)
+            read = shots.readings[..., k][shots.known]
+            placements += [
+                Placement(*each, cosines=c)  # type: ignore[misc]
+                for *each, c in zip(distances, read[:, None], cosines, strict=True)
+            ]
+    some = rng.permutation(len(placements))[:N_READINGS]
+    chosen = [placements[k] for k in some]
+    model = (
+        PulseReadings(chosen, first.reach, first.pulses)
+        if first.response == "pulses"
+        else MixtureReadings(chosen, first.reach)
+    )
+    names = [scale.name for scale in model.scales]
+    free = [p for p in parameters if p.name.removeprefix("range.") in names]
+    own = robot.numbers()
+    k = robot.range.index(first)
+
+    def values_of_model(places: Floats) -> Floats:
+        values = values_at(free, places)
+        columns = []
+        for name in names:
+            plain = own.get(f"range.{k}.{name}", 0.0)
+            center = plain.center if isinstance(plain, Distribution) else plain
+            columns.append(values.get(f"range.{name}", np.full(len(places), center)))
+        return np.stack(columns, axis=1)
+
+    places = sample_posterior(
+        lambda at: model.log_likelihood(values_of_model(at), STRAY), len(free), rng, N_PARTICLES
+    )
+    which = rng.integers(len(places), size=N_DRAWS)
+    wider = places.mean(axis=0) + WIDER * (places[which] - places.mean(axis=0))
+    wider += FINEST_PLACE * rng.standard_normal(wider.shape)
+    found = values_at(free, np.clip(wider, 0.0, 1.0))
+    for parameter in parameters:
+        if parameter.name not in found:
+            found[parameter.name] = np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
+    return found
+
+
+WITH_SLIP = {
+    "drive.gain": -1.0,
+    "drive.asymmetry": -1.0,
+    "stall.share": 1.0,
+    "drive.travel_noise_per_m": 0.5,
+    "drive.heading_noise_per_m": 0.5,
+}
+"""With what power of what slip leaves of the wheels' way parameters go that were fitted without any."""
+
+
+def _spread_slip(
+    prior: Sequence[Parameter], values: dict[str, Floats], shots: Shots, rng: np.random.Generator
+) -> None:
+    """Slip, from encoders or from the prior: what it takes, gain gives; and stalls compare with what wheels turn."""
+    for parameter in prior:
+        if parameter.name == SLIP:
+            slips = _slips(parameter, shots, rng)
+            values[SLIP] = slips
+            for name, power in WITH_SLIP.items():
+                if name in values:
+                    values[name] = values[name] * (1 - slips) ** power
+
+
+def _slips(parameter: Parameter, shots: Shots, rng: np.random.Generator) -> Floats:
+    """(N_DRAWS,) of slip."""
+    turned = np.abs(np.diff(shots.wheels, axis=1)).mean(axis=2)
+    some = shots.known & ~shots.touching & np.isfinite(turned) & (turned > LEAST_WAY)
+    forward = some & (np.prod(np.sign(np.nan_to_num(np.diff(shots.wheels, axis=1))), axis=2) > 0)
+    if forward.sum() < LEAST_COMMANDS:
+        return np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
+    lost = 1.0 - np.hypot(*shots.moved[forward][:, :2].T) / turned[forward]
+    n = len(lost)
+    found = [np.median(lost[rng.integers(n, size=n)]) for _ in range(N_STALLS)]
+    draws = np.clip(np.array(found), parameter.prior.lowest, parameter.prior.highest)
+    return np.asarray(draws[rng.integers(N_STALLS, size=N_DRAWS)])
+
+
+def _share(
+    shooter: Shooter, parameter: Parameter, values: Mapping[str, Floats], rng: np.random.Generator
+) -> Floats:
+    """(N_DRAWS,) of the share of its wheels' way below which a robot stalls, by weighing blocks of commands anew."""
+    shots = shooter.shots
+    shares = parameter.prior.lowest + np.linspace(0.0, 1.0, SHARES) * (
+        parameter.prior.highest - parameter.prior.lowest
+    )
+    which = rng.integers(N_DRAWS, size=N_ROBOTS)
+    some = {name: value[which] for name, value in values.items()}
+    block, n_blocks = shots.blocks(BLOCK)
+    logs = np.empty((SHARES, n_blocks))
+    for k, share in enumerate(shares):
+        chance = shooter.stalls({**some, parameter.name: np.full(N_ROBOTS, share)}, key=5)
+        chance = SURELY + (1 - 2 * SURELY) * chance
+        log = np.where(shots.known, np.log(np.where(shots.stalled, chance, 1 - chance)), 0.0)
+        logs[k] = np.bincount(block.reshape(-1), log.reshape(-1), minlength=n_blocks)
+    best = np.argmax(logs @ rng.exponential(size=(n_blocks, N_STALLS)), axis=0)
+    apart = shares[1] - shares[0]
+    draws = shares[best] + rng.uniform(-0.5, 0.5, N_STALLS) * apart
+    draws = np.clip(draws, parameter.prior.lowest, parameter.prior.highest)
+    return np.asarray(draws[rng.integers(N_STALLS, size=N_DRAWS)])

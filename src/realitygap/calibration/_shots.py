@@ -1,0 +1,121 @@
+"""Trials with poses as single commands: a robot is put back to where it was seen before each (multiple shooting)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.records import ObservedTrial
+from realitygap.trials import Play, Rehearsal, SimEnsemble
+from realitygap.world import Arena, RobotModel
+
+from ._prior import Floats, Parameter, numbers_of
+from ._windows import is_near, outline_of, wrapped
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Shots:
+    """What each command of k trials of up to t commands did.
+
+    Attributes:
+        play: The trials, with poses as anchors.
+        poses: (k, t + 1, 3) x [m], y [m], heading [rad]; not a number where a trial had ended.
+        moved: (k, t, 3) ahead [m], aside [m] and turn [rad], in the frame of the robot before the command.
+        known: (k, t) whether there was such a command.
+        touching: (k, t) whether the robot was near a wall before or after it.
+        stalled: (k, t) whether it knew before it that it stalls.
+        readings: (k, t, s) of its range sensors before it.
+        wheels: (k, t + 1, 2) way of each wheel since the start [m]; not a number where nothing tells.
+    """
+
+    play: Play
+    poses: Floats
+    moved: Floats
+    known: Bools
+    touching: Bools
+    stalled: Bools
+    readings: Floats
+    wheels: Floats
+
+    def blocks(self, length: int) -> tuple[NDArray[np.int64], int]:
+        """(k, t) to which block of so many commands of a trial each belongs, and how many there are."""
+        k, t = self.known.shape
+        each = -(-t // length)
+        return np.arange(k)[:, None] * each + np.arange(t) // length, k * each
+
+
+def shots_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Shots:
+    """The commands of trials with poses."""
+    k, t = len(trials), max(len(trial.commands) for trial in trials)
+    commands, poses = np.zeros((k, t, 2)), np.full((k, t + 1, 3), np.nan)
+    stalled, readings = np.zeros((k, t), np.bool_), np.zeros((k, t, len(robot.range)))
+    wheels = np.full((k, t + 1, 2), np.nan)
+    for row, trial in enumerate(trials):
+        n = len(trial.commands)
+        commands[row, :n], poses[row, : n + 1] = trial.commands, trial.poses[: n + 1]
+        if len(trial.wheels):
+            wheels[row, : n + 1] = trial.wheels[: n + 1]
+        stalled[row, :n], readings[row, :n] = trial.stalled[:n], trial.readings[:n]
+    outline = outline_of(robot)
+    near = np.array([is_near(each, outline, arena) for each in poses])
+    near[:, :-1] |= stalled
+    near[:, 1:] |= stalled
+    return Shots(
+        Play(poses[:, 0], t, commands, anchors=poses),
+        poses,
+        _in_own_frame(poses[:, 1:], poses[:, :-1]),
+        np.isfinite(poses[:, 1:]).all(axis=2),
+        near[:, :-1] | near[:, 1:],
+        stalled,
+        readings,
+        wheels,
+    )
+
+
+def _in_own_frame(after: NDArray[np.floating], before: Floats) -> Floats:
+    x, y = after[..., 0] - before[..., 0], after[..., 1] - before[..., 1]
+    cosine, sine = np.cos(before[..., 2]), np.sin(before[..., 2])
+    turn = wrapped(after[..., 2] - before[..., 2])
+    return np.stack([x * cosine + y * sine, y * cosine - x * sine, turn], axis=-1)
+
+
+@dataclass(frozen=True)
+class Shooter:
+    """Carries out the commands of shots in `sim`."""
+
+    shots: Shots
+    ensemble: SimEnsemble
+    prior: Sequence[Parameter]
+    robot: RobotModel
+
+    def moved(self, values: Mapping[str, Floats], key: int) -> Floats:
+        """(m, k, t, 3) what m robots do at each command; 0 where there was none."""
+        before = self.shots.poses[None, :, :-1]
+
+        def of(rehearsal: Rehearsal) -> Floats:
+            return np.nan_to_num(_in_own_frame(rehearsal.poses[:, :, 1:].astype(np.float64), before))
+
+        numbers = numbers_of(self.prior, values, self.robot)
+        return self.ensemble.summarize(self.shots.play, numbers, key, of, keep=("poses",))
+
+    def off(self, values: Mapping[str, Floats], key: int) -> Floats:
+        """(m, k, t, 3) what was seen less what m robots do."""
+        off = np.nan_to_num(self.shots.moved) - self.moved(values, key)
+        off[..., 2] = wrapped(off[..., 2])
+        off[:, ~self.shots.known] = 0.0
+        return off
+
+    def stalls(self, values: Mapping[str, Floats], key: int) -> Floats:
+        """(k, t) the share of m robots that stall before each command."""
+
+        def of(rehearsal: Rehearsal) -> NDArray[np.float32]:
+            return rehearsal.stalled[:, :, :-1].astype(np.float32)
+
+        numbers = numbers_of(self.prior, values, self.robot)
+        made = self.ensemble.summarize(self.shots.play, numbers, key, of, keep=("stalled",))
+        return np.asarray(made.mean(axis=0), np.float64)

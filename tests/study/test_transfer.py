@@ -102,6 +102,24 @@ def test_a_folder_of_another_transfer_is_left_alone(result, calibration):
     assert target.n == before
 
 
+def test_a_known_target_may_have_another_name_and_not_another_identity(result, calibration, tmp_path):
+    """An emulator on another port was taken for another target."""
+
+    class Known(CountingTarget):
+        identity = "s2, Fluke 2, twin a"
+
+    target = Known()
+    target.name = "scribbler:socket://127.0.0.1:7001"
+    transfer("sim-paper", target, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+    again = Known()
+    again.name = "scribbler:socket://127.0.0.1:7002"
+    transfer("sim-paper", again, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+    assert (target.n, again.n) == (SMALL["fresh_trials"], 0)
+    again.identity = "s2, Fluke 2, twin b"
+    with pytest.raises(RecordError, match="identity was 's2, Fluke 2, twin a', is 's2, Fluke 2, twin b'"):
+        transfer("sim-paper", again, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+
+
 def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):
     with pytest.raises(StudyError, match="took 6 trials, more than a budget of 5"):
         transfer(

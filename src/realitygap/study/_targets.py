@@ -75,7 +75,8 @@ def open_target(
 
 def observations_head(target: Target, observe: Observe, robot: str = DEFAULT_ROBOT) -> ObservationsHead:
     """What a file of trials of a target begins with."""
-    return ObservationsHead(target.name, target.label, robot, target.arena.to_dict(), target.step_s, observe)
+    arena = target.arena.to_dict()
+    return ObservationsHead(target.name, target.label, robot, arena, target.step_s, observe, target.identity)
 
 
 def _witness(port: str, address: str | None) -> Attendant:

@@ -10,7 +10,7 @@ from typing import Any
 
 from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, write_whole
+from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
 from realitygap.runs import Condition
 from realitygap.trials import Target
 
@@ -55,6 +55,7 @@ class TransferPlan:
         condition: Of the study.
         settings: Of that condition, as resolved.
         target: Its name.
+        identity: What tells it from others whatever its name; empty where only the name does.
         budgets: Trials on the target, one transfer each.
         replicates: Times that everything is done, each with evolution of its own.
         fresh_trials: Of each champion.
@@ -69,6 +70,7 @@ class TransferPlan:
     condition: str
     settings: dict[str, Any]
     target: str
+    identity: str
     budgets: tuple[int, ...]
     replicates: int = 1
     fresh_trials: int = 20
@@ -129,6 +131,7 @@ def transfer(
         condition="",
         settings={},
         target=target.name,
+        identity=target.identity,
         budgets=budgets,
         replicates=whole_number("replicates", replicates, 1, 1000),
         fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
@@ -258,8 +261,8 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
     path = folder / "transfer.json"
     if path.exists():
         there = json.loads(path.read_text("utf-8"))
-        extends = ("replicates", "budgets", "fresh_trials")
         now = json.loads(json.dumps(asdict(plan)))
+        extends = ("replicates", "budgets", "fresh_trials", not_compared(there, now))
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
         if different:
             shown = "; ".join(

@@ -48,6 +48,7 @@ class SimTarget:
         name: As the user named it; the platform's when not given.
     """
 
+    identity = ""
     label: Label = "SIM"
     observes: Observe = "track"
 

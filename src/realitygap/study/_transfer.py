@@ -11,11 +11,13 @@ from typing import Any
 from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
 from realitygap.evolution import Genome
 from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
+from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target
 
 from ._file import load_study
 from ._study import Study
+from ._targets import steps_as_a_robot
 from ._transfer_attempt import Attempt, Simulation, plans_of
 from ._transfer_calibrated import Calibrating, calibrated, posterior
 from ._transfer_direct import direct
@@ -101,7 +103,8 @@ def transfer(
     """Evolve in simulation, spend a budget of trials on a target, and try what each strategy chose on fresh trials.
 
     All strategies have the same evolution in simulation: `runs` runs of the condition, every individual tried `repeats`
-    times. Every trial on the target is kept as it comes; the same call goes on where an interrupted one stopped.
+    times. Where the study does not say how long a command of `sim` lasts, it is as long as the target's. Every trial on
+    the target is kept as it comes; the same call goes on where an interrupted one stopped.
 
     Args:
         study: A study, its name or its file.
@@ -141,7 +144,7 @@ def transfer(
         calibration="" if calibration is None else str(calibration),
         seed=whole_number("seed", seed, 0, 2**63 - 1),
     )
-    chosen = choose_condition(study, condition, plan.seed)
+    chosen = _at_the_pace_of(target, choose_condition(study, condition, plan.seed))
     plan = _with(plan, condition=chosen.name, settings=chosen.settings())
     names = strategy_names(strategies)
     folder = Path(out)
@@ -201,6 +204,18 @@ def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> 
         )
     refuse_other_tasks(chosen)
     return chosen.model_copy(update={"seed": seed})
+
+
+def _at_the_pace_of(target: Target, condition: Condition) -> Condition:
+    """The condition with a robot whose commands last as long as the target's, unless it says itself how long."""
+    sim = condition.sim
+    if condition.platform != "sim" or sim.step_s or sim.robot.step_s == target.step_s:
+        return condition
+    if not steps_as_a_robot(target):
+        return condition
+    settings = {name: getattr(sim, name) for name in SimPlatform.model_fields}
+    settings["robot"] = sim.robot.model_copy(update={"step_s": target.step_s})
+    return condition.model_copy(update={"sim": SimPlatform(**settings)})
 
 
 @dataclass

@@ -83,6 +83,17 @@ class SimTarget:
                     tell(len(trials) - 1, trial)
         return trials
 
+    def lasting(self, step_s: float) -> SimTarget:
+        """The same with commands of another length [s].
+
+        Raises:
+            ValueError: It is `jyro`, whose step is always the same.
+        """
+        if not isinstance(self.platform, SimPlatform):
+            raise ValueError(f"A step of {self.name} lasts {self.step_s:g} s, and no other time.")
+        platform = self.platform.model_copy(update={"step_s": step_s})
+        return SimTarget(platform, self.arena, self.noise, key=self.key, name=self.name)
+
     def close(self) -> None:
         """Nothing is held."""
 

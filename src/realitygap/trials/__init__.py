@@ -32,7 +32,7 @@ from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
-from ._twin_trials import close_twins
+from ._twin_trials import close_twins, release_twins
 
 __all__ = [
     "PATH_PARTS",
@@ -85,6 +85,7 @@ __all__ = [
     "paper_inputs",
     "poses_of",
     "preflight",
+    "release_twins",
     "retry_genomes",
     "sim_scene",
     "simulate_case",

@@ -145,7 +145,7 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
         annotation = owner.model_fields[name].annotation if name in owner.model_fields else None
         if get_origin(annotation) is dict and rest:
             names.append(str(rest.pop(0)))
-        inner, is_list = _table_in(annotation)
+        inner, is_list = table_in(annotation)
         if not rest or inner is None:
             break
         if is_list:
@@ -155,7 +155,7 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
     return ".".join(names) + entry, names[-1] + entry if names else "", owner
 
 
-def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
+def table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
     """The model that a setting's type is, may be or lists, if any, and whether it lists it."""
     parts = [part for part in get_args(annotation) if part not in (type(None), Ellipsis)]
     is_list = get_origin(annotation) is tuple
@@ -199,7 +199,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind in ("too_long", "too_short"):
         n = context.get("max_length", context.get("min_length"))
         field = model.model_fields.get(str(problem["loc"][-1]))
-        if field is not None and _table_in(field.annotation)[1]:
+        if field is not None and table_in(field.annotation)[1]:
             bound = "at most" if kind == "too_long" else "at least"
             return f"expected {bound} {n}, came {len(problem['input'])}."
         expected = f"{n} values"

@@ -8,7 +8,7 @@ from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
 from ._scribbler_platform import ScribblerPlatform
-from ._sim import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform
+from ._sim import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform, as_numbers
 from ._twin_platform import TwinPlatform, hash_elsewhere
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "SimPlatform",
     "SystemClock",
     "TwinPlatform",
+    "as_numbers",
     "check_command",
     "export_mcap",
     "hash_elsewhere",

@@ -3,6 +3,7 @@
 from . import scribbler, twin
 from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, check_command
+from ._in_program import ProgramRobot
 from ._jyro import STEP_S, JyroPlatform
 from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
@@ -21,6 +22,7 @@ __all__ = [
     "JyroPlatform",
     "Label",
     "Observation",
+    "ProgramRobot",
     "RecordedRobot",
     "Recorder",
     "Recording",

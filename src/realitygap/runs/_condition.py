@@ -17,9 +17,7 @@ from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, Twin
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask, Task, as_task
 from realitygap.trials import Trajectory, paper_inputs, sim_scene
-from realitygap.world import Arena, ArenaSettings
-
-from ._drawn_places import check_drawn_starts
+from realitygap.world import Arena, ArenaSettings, check_drawn_starts
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"

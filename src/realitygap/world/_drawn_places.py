@@ -7,7 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from realitygap.world import Arena, Body, RobotModel, check_start
+from ._arena import Arena
+from ._placing import check_start
+from ._robot import Body
+from ._robot_model import RobotModel
 
 START = "arena.start."
 PLACES = (START, "arena.obstacle.", "arena.wall.")

@@ -49,11 +49,13 @@ from realitygap.records._observations_file import (
 )
 from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
+from realitygap.records._published_results import PublishedResults
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # the folder and what is in it
     "ResultsFolder",
+    "PublishedResults",
     "Chunk",
     "Delivery",
     "MissingInboxError",

@@ -34,6 +34,7 @@ from realitygap.records._ledger_kinds import (
     TrialState,
     Turn,
 )
+from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._observations_file import (
@@ -76,6 +77,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "list_column",
     # the ledger of physical trials
     "Ledger",
+    "LedgerReader",
     "Generation",
     "Individual",
     "Turn",

@@ -26,6 +26,7 @@ from realitygap.report import (
     draw_closing,
     family_table,
     goal_table,
+    not_counted,
     strategy_table,
     twin_table,
     why_table,
@@ -72,7 +73,7 @@ def sentences(summary: dict[str, Any]) -> str:
     met = [goal["name"] for goal in goals if goal["met"]]
     missed = [goal["name"] for goal in goals if goal["met"] is False]
     verdict = f"Met: {'; '.join(met) or NOTHING}.\n\nMissed: {'; '.join(missed) or NOTHING}."
-    return "\n\n".join([size, counted, verdict, *_reasons(summary)]) + "\n"
+    return "\n\n".join([size, counted, verdict, *not_counted(summary), *_reasons(summary)]) + "\n"
 
 
 def _reasons(summary: dict[str, Any]) -> list[str]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import signal
+import sys
 import threading
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -34,6 +38,23 @@ def _ctrl_c_is_heard() -> None:
     """A shell that starts a job in the background has it ignore Ctrl-C, and tests that press it would wait for ever."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def twin_processes() -> list[int]:
+    """Processes in which a twin lives, children of this one; none are found where there is no /proc."""
+    listed = Path("/proc/self/task").glob("*/children")
+    children = [Path("/proc") / pid for each in listed for pid in each.read_text().split()]
+    return [int(each.name) for each in children if b"twin_worker" in (each / "cmdline").read_bytes()]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_twin_is_left_open() -> Iterator[None]:
+    """Whoever opens a twin closes it; the one of the last trials by a genome is kept for the next, and closed here."""
+    yield
+    if twin_processes():
+        sys.modules["realitygap.trials"].close_twins()
+        gc.collect()
+        assert not twin_processes()
 
 
 @pytest.fixture

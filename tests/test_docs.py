@@ -37,6 +37,7 @@ def _load(name):
 
 make_outputs = _load("make_outputs")
 description_pages = _load("description_pages")
+task_pages = _load("task_pages")
 reference_pages = _load("reference_pages")
 PAGES = [path for path in make_outputs.documents() if path.name != "README.md"]
 

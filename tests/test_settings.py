@@ -5,11 +5,13 @@ import pickle
 import pytest
 
 from realitygap import Condition, NeatSettings, Study
+from realitygap.errors import RealityGapError
 from realitygap.evolution import NoveltySettings
-from realitygap.robots import JyroPlatform
-from realitygap.study import ConditionNotes, ReportSection, StudySection
+from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.robots.twin import load_twin
+from realitygap.study import ConditionNotes, ReportSection, StudySection, load_study
 from realitygap.tasks import CoverageTask
-from realitygap.world import ArenaSettings
+from realitygap.world import ArenaSettings, Distribution, load_arena, load_calibration, load_robot
 
 UNKNOWN = "unknown setting. Did you mean "
 
@@ -97,3 +99,57 @@ def test_settings_are_made_copied_and_pickled_as_before():
     assert NeatSettings(settings="rosenzweig-remy", population=20) == settings
     with pytest.raises(ValueError, match="frozen"):
         settings.population = 3
+
+
+FORMATS = {
+    load_twin: 'format = "realitygap twin 1"\n',
+    load_calibration: 'format = "realitygap calibration 1"\n',
+}
+WHERE_NUMBERS_GO = [
+    (load_robot, 'name = "r"\ndrive = { speed = true, track = 0.1 }\n', "drive.speed: expected a number"),
+    (load_arena, 'name = "a"\nwall = [[0, 0, true, 0]]\nstart = [1, 1, 0]\n', "wall.0.x2: expected a number"),
+    (load_twin, "[body]\nmass = true\n", "body.mass: expected a number"),
+    (load_calibration, '[numbers]\n"drive.track" = true\n', "numbers.drive.track: expected a number"),
+    (
+        load_calibration,
+        '[draws]\n"drive.track" = [0, false]\n',
+        "draws.drive.track[2]: expected a number as value 2",
+    ),
+    (load_study, '[study]\nname = "s"\nseed = true\n', "study.seed: expected a whole number"),
+    (
+        load_study,
+        '[platform.sim.set]\n"drive.track" = { uniform = [true, 2] }\n',
+        "platform.sim.set: drive.track.uniform[1]: expected a number",
+    ),
+]
+
+
+@pytest.mark.parametrize(("load", "text", "said"), WHERE_NUMBERS_GO)
+def test_true_and_false_are_no_numbers_in_a_file(load, text, said, tmp_path):
+    """They were read as 1 and 0."""
+    file = tmp_path / "file.toml"
+    file.write_text(FORMATS.get(load, "") + text)
+    with pytest.raises(RealityGapError, match="mistake") as caught:
+        load(file)
+    came = "False" if "false" in text else "True"
+    assert len([line for line in str(caught.value).splitlines() if f"{said}, came {came}" in line]) == 1
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: JyroPlatform(steps=True), "JyroPlatform.steps: expected a whole number, came True."),
+        (lambda: Distribution(choice=[1, True]), "Distribution.choice[2]: expected a number, came True."),
+        (lambda: ConditionNotes(published=[True, 1]), "ConditionNotes.published[1]: expected a number, came True."),
+        (lambda: Condition(name="a", noise=True), "Condition.noise: expected a number, came True."),
+    ],
+)  # fmt: skip
+def test_true_and_false_are_no_numbers_in_python(make, text):
+    with pytest.raises(ValueError, match=":") as caught:
+        make()
+    assert str(caught.value).startswith(text)
+
+
+def test_a_setting_that_is_true_or_false_may_be_so():
+    assert NeatSettings(recurrent=True).recurrent
+    assert not SimPlatform(noise=False).noise

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema, PydanticKnownError
 
 from .errors import did_you_mean
 
@@ -35,6 +36,32 @@ _LIMITS = {
 }
 
 
+def _refusing(wrong: Literal["float_type", "int_type"]) -> dict[str, Any]:
+    """A step before a number is checked, which says of true and false that they are none."""
+
+    def refuse_truth(value: Any) -> Any:
+        if isinstance(value, bool):
+            raise PydanticKnownError(wrong)
+        return value
+
+    return {"type": "no-info", "function": refuse_truth}
+
+
+_REFUSING = {"float": _refusing("float_type"), "int": _refusing("int_type")}
+
+
+def _without_truth_in_numbers(schema: Any) -> Any:
+    """A schema whose numbers are not true or false, which pydantic would take for 1 and 0."""
+    if isinstance(schema, list | tuple):
+        return type(schema)(map(_without_truth_in_numbers, schema))
+    if not isinstance(schema, dict) or schema.get("function") in _REFUSING.values():
+        return schema
+    step = _REFUSING.get(str(schema.get("type")))
+    if step is not None:
+        return {"type": "function-before", "function": step, "schema": schema}
+    return {key: _without_truth_in_numbers(part) for key, part in schema.items()}
+
+
 class Settings(BaseModel):
     """Settings that cannot be changed once they are made, of which no other than the named ones may be given.
 
@@ -58,6 +85,12 @@ class Settings(BaseModel):
 
     # Else pydantic would call it for tables within tables, too, and tell of its errors as if they were a value's.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """As pydantic has it, except that true and false are no numbers."""
+        strict: CoreSchema = _without_truth_in_numbers(handler(source))
+        return strict
 
 
 def mistakes(
@@ -98,7 +131,8 @@ def shown(value: object) -> str:
 def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str, type[BaseModel]]:
     """A problem's place as text, the last name in it, and the model that this belongs to.
 
-    Tables in a list are counted from 0, as in the names of their numbers: range.0.cone. What else follows a setting
+    Tables in a list are counted from 0, as in the names of their numbers: range.0.cone. Numbers by name have theirs:
+    draws.drive.track[2]. What else follows a setting
     that is no table itself is an entry of a list, or one of the types that the setting may have, which is no part of
     the place.
     """
@@ -108,8 +142,10 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
     while rest:
         name = str(rest.pop(0))
         names.append(name)
-        inner = owner.model_fields[name].annotation if name in owner.model_fields else None
-        inner, is_list = _table_in(inner)
+        annotation = owner.model_fields[name].annotation if name in owner.model_fields else None
+        if get_origin(annotation) is dict and rest:
+            names.append(str(rest.pop(0)))
+        inner, is_list = table_in(annotation)
         if not rest or inner is None:
             break
         if is_list:
@@ -119,7 +155,7 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
     return ".".join(names) + entry, names[-1] + entry if names else "", owner
 
 
-def _table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
+def table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
     """The model that a setting's type is, may be or lists, if any, and whether it lists it."""
     parts = [part for part in get_args(annotation) if part not in (type(None), Ellipsis)]
     is_list = get_origin(annotation) is tuple
@@ -163,7 +199,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind in ("too_long", "too_short"):
         n = context.get("max_length", context.get("min_length"))
         field = model.model_fields.get(str(problem["loc"][-1]))
-        if field is not None and _table_in(field.annotation)[1]:
+        if field is not None and table_in(field.annotation)[1]:
             bound = "at most" if kind == "too_long" else "at least"
             return f"expected {bound} {n}, came {len(problem['input'])}."
         expected = f"{n} values"

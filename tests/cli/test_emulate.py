@@ -62,6 +62,16 @@ def test_on_a_tcp_port_with_a_witness_and_a_state_that_stays(tmp_path):
         end(process)
 
 
+def test_a_quiet_one_tells_the_address_of_its_witness_too():
+    """The port of `--witness 0` is known to nobody else."""
+    process, _ = start("--tcp", "0", "--witness", "0", "--quiet")
+    word, address = process.stdout.readline().split()
+    assert word == "witness"
+    with connect_witness(address) as witness:
+        assert witness.pose() == witness.arena().start
+    end(process)
+
+
 CLIENT = """
 import os, sys, serial
 assert sys.argv[1] == os.environ["REALITYGAP_PORT"]

@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env
 
 import realitygap.gym
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.robots import JyroPlatform
+from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.trials import NoiseKey, trace_genome, try_genomes
 from realitygap.world import ArenaSettings
 
@@ -298,3 +298,99 @@ def test_gymnasium_finds_the_environment_by_module_and_name():
     code = f"import gymnasium; print(gymnasium.make({name!r}).reset(seed=1)[0].shape)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "(3,)\n"
+
+
+# --- the platform sim -----------------------------------------------------------------------------------------
+
+SLOW_AND_DRAWN = {"drive.speed": {"uniform": [0.08, 0.14]}, "arena.start.x": {"uniform": [0.18, 0.3]}}
+SIMS = [
+    ({}, {}),
+    ({"steps": 100, "set": SLOW_AND_DRAWN}, {"cells": "ends"}),
+    ({"robot": "jyro", "steps": 40}, {"noise": 0.5}),
+]
+
+
+@pytest.mark.parametrize(("platform", "settings"), SIMS)
+def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, settings):
+    platform, arena = SimPlatform(precision="double", **platform), ArenaSettings().arena()
+    env = gymnasium.make(ENV, platform=platform, disable_env_checker=True, **settings)
+    n_blocked, starts = 0, set()
+    for k, genome in enumerate(genomes(5)):
+        key = NoiseKey(7, replicate=2, individual=k)
+        trial = trace_genome(platform, arena, genome, noise=settings.get("noise", 0.0), noise_key=key)
+        controller = genome.network()
+        observation, info = env.reset(options={"noise_key": key})
+        starts.add(info["pose"][0])
+        coverage = info["coverage_ends" if settings.get("cells") == "ends" else "coverage_line"]
+        for step in range(platform.steps):
+            assert observation.tolist() == trial.inputs[step, :3].tolist()
+            observation, reward, _, truncated, info = env.step(controller.activate(observation))
+            assert info["pose"].tolist() == trial.poses[step + 1].tolist()
+            assert info["readings"].tolist() == trial.readings[step + 1].tolist()
+            coverage += reward
+        assert truncated
+        assert (info["coverage_line"], info["coverage_ends"]) == (trial.coverage_line, trial.coverage_ends)
+        assert env.unwrapped.visited_cells == trial.cells
+        assert coverage == pytest.approx(
+            trial.coverage_ends if settings.get("cells") == "ends" else trial.coverage_line, abs=1e-12
+        )
+        n_blocked += trial.stalled.sum()
+    assert (len(starts) > 1) == ("set" in platform.model_fields_set)
+    assert n_blocked > 0
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_many_robots_of_sim_are_the_trials_of_the_batch(precision):
+    """More than a block of them, so that the last one is not full."""
+    platform = SimPlatform(precision=precision, steps=25, set=SLOW_AND_DRAWN)
+    tried = genomes(70)
+    keys = [NoiseKey(KEY.key, individual=k) for k in range(70)]
+    trials = [
+        trace_genome(platform, ArenaSettings().arena(), genome, noise=0.0, noise_key=key)
+        for genome, key in zip(tried, keys, strict=True)
+    ]
+    envs = gymnasium.make_vec(ENV, num_envs=70, platform=platform)
+    observations, infos = envs.reset(options={"noise_key": keys[0]})
+    for step in range(25):
+        assert observations.tolist() == [trial.inputs[step, :3].tolist() for trial in trials]
+        assert infos["pose"].tolist() == [trial.poses[step].tolist() for trial in trials]
+        observations, _, _, over, infos = envs.step(np.array([trial.commands[step] for trial in trials]))
+    assert over.all()
+    assert [envs.visited_cells(k) for k in range(70)] == [trial.cells for trial in trials]
+    assert infos["coverage_ends"].tolist() == [trial.coverage_ends for trial in trials]
+
+
+@pytest.mark.parametrize(("platform", "settings"), SIMS)
+def test_the_checker_of_gymnasium_finds_nothing_in_sim(platform, settings):
+    env = gymnasium.make(ENV, platform=SimPlatform(**platform), **settings).unwrapped
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*infinity.*")  # a linear response has no limits
+        check_env(env)
+
+
+def test_platforms_have_names_and_noise_of_their_own(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "scribbler-s2"\n[drive]\nspeed = 0.05\n')
+    speeds = []
+    for name in ("sim", f"sim:{file}"):
+        env = gymnasium.make(ENV, platform=name)
+        at = env.reset(seed=1)[1]["pose"][0]
+        speeds.append(sum(env.step(np.array([1.0, 0.0]))[4]["pose"][0] for _ in range(4)) - 4 * at)
+    assert speeds[1] < 0.6 * speeds[0]
+    high = [gymnasium.make(ENV, platform=name).observation_space.high[0] for name in ("jyro", "sim")]
+    assert high == pytest.approx([1.1, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("platform", "message"),
+    [
+        ("simm", "platform is 'simm'. Did you mean 'sim'"),
+        ("sim:", "platform is 'sim:'"),
+        ("sim:nothing.toml", "There is no robot file nothing.toml"),
+        (SimPlatform(set={"arena.start.x": {"uniform": [0.0, 0.4]}}), "does not fit at the start"),
+    ],
+)
+def test_what_is_no_platform_is_refused(platform, message):
+    with pytest.raises(ValueError, match=message):
+        realitygap.gym.ScribblerCoverageEnv(platform=platform)

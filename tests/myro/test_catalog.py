@@ -79,8 +79,9 @@ def test_functions_have_the_arguments_of_the_methods_without_the_robot():
     )
 
 
-def test_the_page_of_reference_has_every_name():
+def test_the_page_of_reference_has_every_name(monkeypatch):
     path = Path(__file__).parents[2] / "docs" / "reference_pages.py"
+    monkeypatch.syspath_prepend(path.parent)  # it imports its neighbors
     spec = importlib.util.spec_from_file_location("reference_pages_of_myro", path)
     pages = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pages)

@@ -16,6 +16,7 @@ from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records import RESULTS_VERSION, SCHEMA, RecordWarning, ResultsFolder
 from realitygap.records import _chunk as chunk_module
 from realitygap.records import _folder as folder_module
+from realitygap.records import _published_results as published_module
 from tests.records.rows import DESCRIPTION, HASH, make_folder, make_rows
 
 READERS = {
@@ -423,7 +424,7 @@ def test_conditions_and_replicates_may_be_added_but_not_lost(tmp_path):
 def older(tmp_path, monkeypatch) -> ResultsFolder:
     """Results that another version computed."""
     with monkeypatch.context() as patch:
-        for module in (folder_module, chunk_module):
+        for module in (folder_module, published_module, chunk_module):
             patch.setattr(module, "RESULTS_VERSION", RESULTS_VERSION - 1)
         make_folder(tmp_path / "older", 2)
     return ResultsFolder.open(tmp_path / "older")

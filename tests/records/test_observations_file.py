@@ -128,6 +128,30 @@ def test_trials_of_something_else_are_not_put_into_a_file(tmp_path: Path) -> Non
     assert path.read_bytes() == before
 
 
+KNOWN = replace(HEAD, identity="s2, Fluke 2, BoxOnWheels")
+
+
+def test_a_target_that_is_known_may_have_another_name_and_not_another_identity(tmp_path: Path) -> None:
+    """An emulator started again, on another port, was taken for something else."""
+    path = tmp_path / "one.jsonl"
+    write_observations(path, KNOWN, [trial(0)])
+    with ObservationsFile(path, replace(KNOWN, target="scribbler:socket://127.0.0.1:7002")) as file:
+        assert len(file.trials) == 1
+    with pytest.raises(RecordError, match="identity 's2, Fluke 2, BoxOnWheels' and not 's1, Fluke 1'"):
+        ObservationsFile(path, replace(KNOWN, identity="s1, Fluke 1"))
+
+
+def test_where_one_side_is_not_known_the_name_tells_targets_apart(tmp_path: Path) -> None:
+    path = tmp_path / "one.jsonl"
+    write_observations(path, HEAD, [trial(0)])
+    path.write_bytes(path.read_bytes().replace(b',"identity":""', b""))  # as files were before
+    assert read_observations(path).head.identity == ""
+    with ObservationsFile(path, KNOWN) as file:
+        assert len(file.trials) == 1
+    with pytest.raises(RecordError, match=r"target 'twin:worn.toml' and not 'sim'"):
+        ObservationsFile(path, replace(KNOWN, target="sim"))
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

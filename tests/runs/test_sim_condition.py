@@ -32,6 +32,40 @@ def test_a_mistake_is_said(values: dict[str, Any], said: str) -> None:
         Condition.model_validate({"name": "a", "platform": "sim", **values})
 
 
+BESIDE = {"arena": {"preset": "paper", "start": [0.1, 0.3, 0.0]}}
+BOXES = {"arena": {"preset": "paper-boxes"}}
+ALL_AROUND = {"arena.start.heading": {"uniform": [-1.5, 1.5]}}
+TOGETHER = [{"choice": values, "together": "a"} for values in ([0.2, 0.4], [0.3, 0.19])]
+
+
+@pytest.mark.parametrize(
+    ("values", "drawn", "said"),
+    [
+        (BESIDE, ALL_AROUND, "beyond a wall.*Drawn: arena.start.heading = "),
+        (BESIDE, {"arena.start.heading": {"uniform": [-0.1, 0.1]}}, ""),
+        (BOXES, {"arena.obstacle.0.x": {"uniform": [0.05, 0.5]}}, ""),
+        (
+            BOXES,
+            {"arena.obstacle.0.x": {"uniform": [0.05, 0.5]}, "arena.obstacle.0.y": {"choice": [0.2, 0.4]}},
+            "(overlap|lies within) obstacle 0.*Drawn: arena.obstacle.0.x = .*, arena.obstacle.0.y = 0.2",
+        ),
+        (BOXES, {"arena.wall.0.y1": {"uniform": [0.0, 0.3]}}, "Drawn: arena.wall.0.y1"),
+        ({}, {"arena.start.x": {"choice": [0.05, 0.2]}}, "start \\(0.05, 0.1905, 0\\)"),
+        ({}, dict(zip(("arena.start.x", "arena.start.y"), TOGETHER, strict=True)), ""),
+    ],
+)
+def test_whatever_is_drawn_of_heading_and_obstacles_the_robot_fits_at_the_start(
+    values: dict[str, Any], drawn: dict[str, Any], said: str
+) -> None:
+    """Only the ends of the start's place were looked at."""
+    given = {"name": "a", "platform": "sim", **values, "sim": {"set": drawn}}
+    if said:
+        with pytest.raises(ValidationError, match=said):
+            Condition.model_validate(given)
+    else:
+        assert Condition.model_validate(given).drawn_names == tuple(drawn)
+
+
 def test_figures_of_a_trial_show_the_arena_that_was_drawn_for_it() -> None:
     name = "arena.obstacle.0.x"
     values: dict[str, Any] = {

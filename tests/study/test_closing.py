@@ -1,4 +1,5 @@
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -122,6 +123,24 @@ def test_each_calibration_sees_only_its_budget(right):
         assert len(path.read_text().splitlines()) == 1 + budget  # a head, and a line a trial
         budgets.add(budget)
     assert budgets == {2, 4}  # by which the gap is measured, and half of it for transfer
+
+
+def test_a_twin_whose_floor_is_0_is_named_and_not_dropped_in_silence(right, tmp_path):
+    _, whole, _ = right
+    folder = shutil.copytree(whole, tmp_path / "copied")
+    unit = next((folder / "units").glob("slow-1-gap-cells-*.json"))
+    found = json.loads(unit.read_text())
+    found["gap"]["mmrv"]["estimate"], found["gap"]["mmrv_floor"]["estimate"] = 0.0123, 0.0
+    unit.write_text(json.dumps(found))
+    summary = summarize_closing(folder)
+    goal = goals_of(summary)["MMRV over its split-half floor, cells"]
+    assert goal["n"] == 1
+    said = "its floor is 0, the same order in both halves of its trials; MMRV is 0.012"
+    assert goal["unknown"] == [{"twin": "slow-1", "why": said}]
+    row = next(row for row in goal_table(summary) if row[0] == goal["name"])
+    assert row[4] == "1 of 2"
+    page = write_closing_page(summary, tmp_path / "page.html").read_text("utf-8")
+    assert f"1 of 2 twins are judged. slow-1 is not: {said}." in page
 
 
 def test_page_says_what_is_simulated_and_holds_all_figures(right, tmp_path):

@@ -224,6 +224,26 @@ def test_a_file_that_is_no_study_is_refused(text, message):
     assert message in str(caught.value)
 
 
+def test_numbers_of_robot_and_arena_are_wrong_at_once():
+    text = """
+    [study]
+    name = "s"
+    [platform.sim.set]
+    "drive.trak" = 0.1
+    "arena.start.z" = 1.0
+    [[condition]]
+    name = "a"
+    platform = "sim"
+    """
+    with pytest.raises(StudyError) as caught:
+        parse_study(text, "s.toml")
+    assert [line.strip() for line in str(caught.value).splitlines()] == [
+        "s.toml has 2 mistakes; nothing was run.",
+        "platform.sim.set: drive.trak: no number of this name. Did you mean 'drive.track'?",
+        "condition[1] 'a'.sim.set: arena.start.z: no number of this name. Did you mean 'arena.start.y'?",
+    ]
+
+
 def test_what_follows_from_a_mistake_is_no_second_one():
     """`study = 4` was said to lack a name, too."""
     assert mistakes('study = 4\n[[condition]]\nname = "y"') == ["study: expected a table, came 4."]

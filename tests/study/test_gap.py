@@ -142,6 +142,29 @@ def test_a_file_of_another_target_is_refused(some, tmp_path):
         run_gap(sim(), open_target("jyro", ARENA), some, trials=2, results=path)
 
 
+def calibrated(path, **more):
+    made = Calibration(
+        kind="all", robot="scribbler-s2-fluke2", target="a", label="SIM", observe="cells", trials=1, date="2026-01-01",
+        method="known", numbers={"drive.track": 0.15}, **more,
+    )  # fmt: skip
+    path.write_text(made.to_toml())
+    return f"sim:{path}"
+
+
+def test_commands_of_an_uncalibrated_sim_last_as_long_as_the_robots(tmp_path):
+    """They lasted half a second against a robot whose commands last longer, which made a gap of its own."""
+    slow = calibrated(tmp_path / "slow.toml", step_s=0.8)
+    untimed = calibrated(tmp_path / "untimed.toml")
+    timed = calibrated(tmp_path / "timed.toml", step_s=0.5)
+    expected = {"sim": 0.8, untimed: 0.8, timed: 0.5, "jyro": 0.1}
+    for spec, step_s in expected.items():
+        found = gap_between(spec, slow, n_controllers=2, trials=2).study
+        assert {trial.step_s for trial in found.source_trials} == {step_s}
+        assert any("0.8 s in place of 0.5 s" in note for note in found.result.notes) is (step_s == 0.8)
+    found = gap_between("sim", "jyro", n_controllers=2, trials=2).study
+    assert {trial.step_s for trial in found.source_trials} == {0.5}
+
+
 def test_replays_are_measured_where_the_robot_is_seen(some):
     found = study_gap(sim(), sim(**{"drive.track": 0.2}), some, trials=2, observe="track")
     assert found.replay.distance[:, 0] == pytest.approx(np.zeros(12), abs=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RecordError, StudyError
-from realitygap.robots import SimPlatform
+from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.study import STRATEGIES, transfer
 from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
 from realitygap.study._transfer_simulated import evolve_champions
@@ -100,6 +100,37 @@ def test_a_folder_of_another_transfer_is_left_alone(result, calibration):
     with pytest.raises(RecordError, match="seed was 1, is 2"):
         transfer("sim-paper", target, ["plain"], [8], out=folder, calibration=calibration, seed=2, **SMALL)
     assert target.n == before
+
+
+def test_a_known_target_may_have_another_name_and_not_another_identity(result, calibration, tmp_path):
+    """An emulator on another port was taken for another target."""
+
+    class Known(CountingTarget):
+        identity = "s2, Fluke 2, twin a"
+
+    target = Known()
+    target.name = "scribbler:socket://127.0.0.1:7001"
+    transfer("sim-paper", target, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+    again = Known()
+    again.name = "scribbler:socket://127.0.0.1:7002"
+    transfer("sim-paper", again, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+    assert (target.n, again.n) == (SMALL["fresh_trials"], 0)
+    again.identity = "s2, Fluke 2, twin b"
+    with pytest.raises(RecordError, match="identity was 's2, Fluke 2, twin a', is 's2, Fluke 2, twin b'"):
+        transfer("sim-paper", again, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
+
+
+@pytest.mark.parametrize(
+    ("target", "step_s"),
+    [
+        (SimTarget(SimPlatform(step_s=0.8), paper_arena(), name="other"), 0.8),
+        (SimTarget(JyroPlatform(), paper_arena(), name="jyro"), 0.5),
+    ],
+)
+def test_what_evolves_has_commands_as_long_as_a_robots(target, step_s, tmp_path):
+    transfer("sim-paper", target, ["plain"], [0], out=tmp_path, **SMALL)
+    evolved = json.loads((tmp_path / "transfer.json").read_text())["settings"]["sim"]
+    assert (evolved["step_s"] or evolved["robot"]["step_s"]) == step_s
 
 
 def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):

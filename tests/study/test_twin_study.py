@@ -19,8 +19,10 @@ from realitygap.robots import TwinPlatform
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.study import Study, parse_study, run_study
-from realitygap.trials import NoiseKey, open_twin, trace_genome, try_genomes
+from realitygap.trials import NoiseKey, close_twins, open_twin, trace_genome, try_genomes
 from realitygap.world import paper_arena
+
+from ..conftest import twin_processes
 
 STEPS = 15
 
@@ -138,6 +140,13 @@ def test_digest_does_not_depend_on_processes_or_interruptions(
     result = run_study(study, tmp_path / "r", threads=2)
     assert result.n_computed == 1
     assert result.folder.digest() == results.digest()
+
+
+def test_the_processes_of_a_twin_end_with_the_study(file: Path, tmp_path: Path) -> None:
+    """They stayed until the program ended."""
+    close_twins()
+    run_study(study_on(file), tmp_path / "r", threads=1)
+    assert not twin_processes()
 
 
 def test_a_twin_that_has_changed_is_refused(file: Path, results: ResultsFolder, tmp_path: Path) -> None:

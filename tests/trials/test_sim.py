@@ -211,12 +211,34 @@ def test_a_platform_without_noise_is_the_same_in_every_repeat():
         ({"set": {"drive.track": {"normal": [0.1]}}}, "drive.track.normal"),
         ({"set": {"drive.track": {"uniform": [-1.0, 2.0]}}}, "drive.track: expected numbers more than 0"),
         ({"contact": "bounce"}, "expected 'robot', 'freeze', 'stop' or 'slide', came 'bounce'"),
+        (
+            {"set": {"contact.model": {"choice": [1.0]}}},
+            "contact.model: the same in all trials, and no number",
+        ),
+        ({"set": {"body": 1.0}}, "body: the same in all trials, and no number"),
+        (
+            {"set": {"steps": {"uniform": [1, 2]}}},
+            "steps: a setting of [platform.sim] itself, write it there",
+        ),
     ],
 )
 def test_a_mistake_is_said(values, text):
     with pytest.raises(ValueError) as raised:  # noqa: PT011 - its text is looked at
         SimPlatform(**values)
     assert text in str(raised.value)
+
+
+def test_all_mistakes_in_numbers_are_said_at_once():
+    """They came in rounds: those of one number alone, then unknown names, then limits."""
+    wrong = {
+        "drive.track": "wide", "drive.lag": {"uniform": [2, 1]}, "drive.trak": 0.1, "contact.model": 1, "steps": 5,
+        "drive.speed": -1.0, "drive.delay": {"normal": [-1.0, 0.1]}, "drive.gain_left": 1.0,
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="set") as raised:
+        SimPlatform(set=wrong)
+    said = str(raised.value)
+    assert [name for name in wrong if f"{name}:" not in said.replace(".uniform:", ":")] == ["drive.gain_left"]
+    assert said.count("; ") == len(wrong) - 2
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.errors import RobotError, StudyError
+from realitygap.emulator import Emulator, serve_tcp
+from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.records import ObservedTrial, trial_to_dict
+from realitygap.records import ObservedTrial, read_observations, trial_to_dict
 from realitygap.robots import Command, ScribblerPlatform
 from realitygap.robots.twin import sample_twin
-from realitygap.study import connect_robot, open_target
+from realitygap.study import connect_robot, open_target, try_on
 from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessAttendant
 from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena
@@ -29,6 +30,12 @@ from .fake_robot import FakeRobot
 ARENA = paper_arena()
 PORT = "emulator://s2?fluke=2&speed=off"
 FORWARD = TrialPlan(commands=np.array([[1.0, 0.0]] * 4 + [[0.0, 0.5]] * 2), purpose="path", number=5)
+
+
+def identity_of(url: str) -> str:
+    """What is behind a port of an emulator in this program, as a target tells it."""
+    with open_target(f"scribbler:{url}", ARENA) as target:
+        return target.identity
 
 
 def controller(steps: int = 8) -> TrialPlan:
@@ -103,6 +110,46 @@ def test_over_tcp_it_is_what_it_is_in_this_process() -> None:
         np.testing.assert_allclose(trial.poses, other.poses, atol=1e-3)
         np.testing.assert_allclose(trial.wheels, other.wheels, atol=1e-3)
         np.testing.assert_allclose(trial.readings, other.readings, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "is_the_same"),
+    [("seed=3", True), ("id=b", True), ("speed=5", True), ("faults=sag=0.1", False), ("timing=off", False)],
+)
+def test_an_emulator_is_known_by_what_it_is_whatever_it_is_called(options: str, is_the_same: bool) -> None:
+    one, other = identity_of(PORT), identity_of(f"emulator://s2?fluke=2&{options}")
+    assert one.startswith("s2, Fluke 2")
+    assert (one == other) is is_the_same
+
+
+def test_twins_behind_the_emulator_are_known_apart(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
+    known = []
+    for name, seed in (("one", 1), ("same", 1), ("other", 2)):
+        file = tmp_path / f"{name}.toml"
+        file.write_text(sample_twin("close", seed).to_toml())
+        known.append(identity_of(f"{PORT}&twin={file}"))
+    assert known[0] == known[1] != known[2]
+    assert len({*known, identity_of(PORT)}) == 3
+
+
+def test_kept_trials_go_on_with_the_emulator_started_again_and_not_with_another(tmp_path: Path) -> None:
+    """Its port is another one, and that made them trials of something else."""
+    genome = controller().genome
+    assert genome is not None
+    kept = tmp_path / "kept.jsonl"
+    for fluke, n in (("2", 1), ("2", 2), ("1", 3)):
+        with serve_tcp(Emulator("s2", fluke), speed=0, witness=0) as server:  # type: ignore[arg-type]
+            spec = f"scribbler:{server.name}"
+            with open_target(spec, ARENA, witness=server.witness_address) as target:
+                if fluke == "1":
+                    with pytest.raises(
+                        RecordError, match="identity 's2, Fluke 2, BoxOnWheels' and not 's2, Fl"
+                    ):
+                        try_on(target, genome, trials=n, steps=3, out=kept)
+                else:
+                    assert len(try_on(target, genome, trials=n, steps=3, out=kept)) == n
+    assert len(read_observations(kept).trials) == 2
 
 
 @pytest.mark.long

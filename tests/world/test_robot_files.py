@@ -153,6 +153,18 @@ def test_each_is_put_into_every_entry_and_base_below(write):
         (SMALL.replace("0.1", "{ normal = [1, 1] }"), "drive.speed: a normal distribution reaches 0"),
         (SMALL.replace("0.1", "{ uniform = [2, 1] }"), "drive.speed: expected uniform = [lower, upper]"),
         (SMALL + "[vary]\n'drive.trak' = { uniform = [1, 2] }\n", "Did you mean 'drive.track'?"),
+        (
+            "step_s = { uniform = [0.4, 0.6] }\n" + SMALL,
+            "step_s: expected a number, came {'uniform': [0.4, 0.6]}",
+        ),
+        (
+            "contact = { model = { choice = [1, 2] } }\n" + SMALL,
+            "contact.model: expected 'freeze', 'stop' or 'slide', came {'choice': [1, 2]}",
+        ),
+        (
+            SMALL + "[vary]\n'step_s' = { uniform = [1, 2] }\n",
+            "step_s: the same in all trials, and no number",
+        ),
         (SMALL + "[[range]]\nx = 0\ny = 0\nreach = 1\n[[range]]\nx = 0\ny = 0\n", "range.1.reach: missing"),
         (
             SMALL + "[[range]]\nx = 0\ny = 0\nreach = 1\nrays = 2\n",

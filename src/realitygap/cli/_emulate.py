@@ -72,7 +72,12 @@ def emulate(
             help="Run this program with its port in {port} and REALITYGAP_PORT, and end with it. For Myro 2.9.9.",
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Print the port and nothing else.")] = False,
+    quiet: Annotated[
+        bool,
+        typer.Option(
+            "--quiet", help="Print the port, the witness's address where there is one, and nothing else."
+        ),
+    ] = False,
 ) -> None:
     """Pose as a Scribbler, with a simulated robot behind it, until Ctrl-C.
 
@@ -137,7 +142,7 @@ def _serve(
         if command is None:
             stack.enter_context(_ended_by_signals(server))
         typer.echo(server.name)
-        if server.witness_address and not quiet:
+        if server.witness_address:
             typer.echo(f"witness {server.witness_address}")
         sys.stdout.flush()
         if command is not None:

@@ -50,6 +50,9 @@ class Emulator:
         robot: What moves behind it, instead of a box on two wheels in the arena; one of its own infrared and battery
             is asked for these, too.
 
+    Attributes:
+        identity: What is emulated, in words that are equal where it is the same, whatever its port and seed.
+
     Raises:
         RobotError: There is no such model, or the file of its state cannot be read.
     """
@@ -98,6 +101,7 @@ class Emulator:
         own = body if isinstance(body, RobotOfItsOwn) else None
         self.battery = Battery(self.faults.sag, own.volts if own else None)
         self.table = Table(body, motors, self.battery, arena)
+        self.identity = self._identity(body)
         self.senses = Senses(body, self.scene, seed)
         self.fluke: Fluke | None = None
         to_client = self._from_robot if self.fluke_model == "none" else self._through_fluke
@@ -128,6 +132,13 @@ class Emulator:
             )
         self._board: Scribbler | Fluke = self.fluke or self.robot
         self.place(arena.start, seed)
+
+    def _identity(self, body: SimulatedRobot) -> str:
+        """What is emulated, in words that are equal where it is the same."""
+        moves = getattr(body, "identity", type(body).__name__)
+        goes_wrong = [f"{name}={value:g}" for name, value in vars(self.faults).items() if value]
+        own = [f"{self.model}, Fluke {self.fluke_model}", moves, *goes_wrong]
+        return ", ".join(own if self.timing else [*own, "no timing"])
 
     # -- time --
 

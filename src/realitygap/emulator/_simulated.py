@@ -18,6 +18,8 @@ SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0
 class SimulatedRobot(Protocol):
     """A robot on two wheels in a world of its own.
 
+    One that has an `identity`, a text that no other robot has, is told by it from others; else its class is.
+
     Attributes:
         pose: Where it is: the point midway between its wheels, and where the Scribbler's end without the caster
             looks.

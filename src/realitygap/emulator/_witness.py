@@ -35,6 +35,10 @@ class Witness(Protocol):
         """Where it drives, and whose cells are counted."""
         ...
 
+    def identity(self) -> str:
+        """What is emulated, in words that are equal where it is the same, whatever its port."""
+        ...
+
     def pose(self) -> Pose:
         """Where it is."""
         ...
@@ -107,6 +111,10 @@ class DirectWitness:
         """Where it drives."""
         return self._emulator.scene.arena
 
+    def identity(self) -> str:
+        """What is emulated."""
+        return self._emulator.identity
+
     def pose(self) -> Pose:
         """Where it is."""
         with self._lock:
@@ -171,7 +179,7 @@ def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
         return witness.path().tolist()
     if what == "arena":
         return witness.arena().to_dict()
-    if what in ("now", "pose", "motors", "cells"):
+    if what in ("now", "identity", "pose", "motors", "cells"):
         return getattr(witness, what)()
     raise ValueError(f"cannot do {what!r}")
 
@@ -240,6 +248,10 @@ class RemoteWitness:
     def arena(self) -> Arena:
         """Where it drives."""
         return Arena.from_dict(self._ask("arena"))
+
+    def identity(self) -> str:
+        """What is emulated."""
+        return str(self._ask("identity"))
 
     def pose(self) -> Pose:
         """Where it is."""

@@ -9,17 +9,16 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.robots import JyroPlatform
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
-from ._robots import Cells, Robots
+from ._robots import Cells, Platform, Robots
 
 Array = NDArray[np.float64]
 
 
 class ScribblerCoverageEnv(gymnasium.Env[Array, Array]):
-    """Visit as many cells of the arena as possible: the trials of Rosenzweig & Remy, one robot and step at a time.
+    """Visit as many cells of the arena as possible: the task of Rosenzweig & Remy, one robot and step at a time.
 
     | observation | least | most | unit |
     |---|---|---|---|
@@ -29,22 +28,26 @@ class ScribblerCoverageEnv(gymnasium.Env[Array, Array]):
 
     | action | least | most | unit |
     |---|---|---|---|
-    | move | -1 | 1 | 1: 0.1 m in a step, forward |
-    | turn | -1 | 1 | 1: `platform.turn_per_step` in a step, to the left |
+    | move | -1 | 1 | 1: 0.1 m in a step, forward; on `sim` the robot's full speed |
+    | turn | -1 | 1 | 1: `platform.turn_per_step` in a step, to the left; on `sim` both wheels at full speed |
 
     The reward of a step is the share of the reachable cells that it visits for the first time. The cell of the start
     is visited by then, so that the rewards of a trial add up to its coverage less that cell. A trial is truncated after
     `platform.steps` steps and never terminated. Actions beyond -1..1 are limited to it, and what is no number counts as
     0, as in a trial.
 
-    `info` has `pose` (3,) x [m], y [m], heading [rad, counter-clockwise from +x], `readings` (3,) [m] without noise,
+    `info` has `pose` (3,) x [m], y [m], heading [rad, counter-clockwise from +x], `readings` (s,) [m] without noise,
     `coverage_line` and `coverage_ends` [0..1].
+
+    On `sim` readings lie in 0..1, but for those of a linear response that is not clipped, which have no limits.
 
     Version 0: the first one.
 
     Args:
-        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10.
-        platform: The robot as simulated, or its settings; the paper's when not given.
+        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10. 0.1 on `jyro` and none on `sim`, whose robot has
+            noise of its own, when not given.
+        platform: The robot as simulated: `jyro`, `sim` or `sim:FILE`, a `SimPlatform`, or settings of `jyro`; the
+            paper's when not given.
         arena: Where, or its settings; the paper's when not given.
         cells: What rewards count: cells along the line driven, or those in which steps end.
 
@@ -58,8 +61,8 @@ class ScribblerCoverageEnv(gymnasium.Env[Array, Array]):
     def __init__(
         self,
         *,
-        noise: float = 0.1,
-        platform: JyroPlatform | Mapping[str, Any] | None = None,
+        noise: float | None = None,
+        platform: Platform = None,
         arena: ArenaSettings | Mapping[str, Any] | None = None,
         cells: Cells = "line",
     ) -> None:

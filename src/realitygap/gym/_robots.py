@@ -1,4 +1,4 @@
-"""n robots that take a command each, step by step: the only place where the environments call kernels."""
+"""n robots that take a command each, step by step."""
 
 from __future__ import annotations
 
@@ -11,14 +11,21 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import did_you_mean, real_number, whole_number
-from realitygap.kernels._fleet import make_fleet, observe_robots, start_robots, step_robots
 from realitygap.kernels._philox import MAX_INDIVIDUALS
-from realitygap.robots import JyroPlatform
-from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene, poses_of
-from realitygap.world import ArenaSettings, check_start
+from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.trials import NoiseKey
+from realitygap.world import ArenaSettings
+
+from ._fleet import Fleet
+from ._jyro_fleet import JyroFleet
+from ._sim_fleet import SimFleet
 
 Cells = Literal["line", "ends"]
+Platform = JyroPlatform | SimPlatform | str | Mapping[str, Any] | None
 T = TypeVar("T")
+
+PAPERS_NOISE = 0.1
+"""The paper's a on `jyro`, whose sensors are without noise otherwise."""
 
 
 class Robots:
@@ -26,8 +33,8 @@ class Robots:
 
     Args:
         n: How many, >= 1.
-        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10.
-        platform: The robot as simulated, or its settings; the paper's when not given.
+        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10. 0.1 on `jyro` and none on `sim` when None.
+        platform: The robot as simulated: `jyro`, `sim` or `sim:FILE`, or settings; the paper's when not given.
         arena: Where, or its settings; the paper's when not given.
         cells: What rewards count: cells along the line driven, or those in which steps end.
 
@@ -40,23 +47,25 @@ class Robots:
         self,
         n: int,
         *,
-        noise: float,
-        platform: JyroPlatform | Mapping[str, Any] | None,
+        noise: float | None,
+        platform: Platform,
         arena: ArenaSettings | Mapping[str, Any] | None,
         cells: Cells,
     ) -> None:
+        self.platform = _platform(platform)
+        if noise is None:
+            noise = PAPERS_NOISE if isinstance(self.platform, JyroPlatform) else 0.0
         noise = real_number("noise", noise, 0, 10)
         if cells not in ("line", "ends"):
             raise ValueError(f"cells is {cells!r}, expected 'line' or 'ends'.")
         self.n = whole_number("num_envs", n, 1, MAX_INDIVIDUALS)
-        self.platform = _made("platform", JyroPlatform, platform)
-        self.arena = _made("arena", ArenaSettings, arena).arena()
-        check_start(self.arena, self.platform.body)
-        self._scene = jyro_scene(self.platform, self.arena)
-        self._rules = jyro_rules(self.platform, noise=noise, bias_input=False, bias_value=1.0)
-        self._fleet = make_fleet(self._scene, n)
-        self._cells = np.zeros((n, self.arena.grid.n_cells), np.uint8)
-        self._counts = np.zeros((n, 3), np.int32)
+        place = _made("arena", ArenaSettings, arena).arena()
+        self._fleet: Fleet
+        if isinstance(self.platform, SimPlatform):
+            self._fleet = SimFleet(self.platform, place, noise, self.n)
+        else:
+            self._fleet = JyroFleet(self.platform, place, noise, self.n)
+        self.arena = self._fleet.arena
         self._column = 0 if cells == "line" else 1
         self._step: int | None = None
         self.noise_key = NoiseKey(0)
@@ -68,10 +77,7 @@ class Robots:
 
     def observation_space(self) -> Any:
         """The Box of what one robot's controller sees: obstacle (largest noisy reading), stall, time."""
-        noise = self._rules.noise[0] * (not self._rules.clip)
-        low, high = np.nextafter(
-            [-noise, 1 + noise], [-np.inf, np.inf], dtype=noise.dtype
-        )  # sums are rounded
+        low, high = self._fleet.bounds()
         return spaces.Box(np.array([low, 0.0, 0.0]), np.array([high, 1.0, 1.0]), dtype=np.float64)
 
     def action_space(self) -> Any:
@@ -102,11 +108,9 @@ class Robots:
                 f"{MAX_INDIVIDUALS - self.n}: beyond it numbers would repeat."
             )
         self.noise_key = key
-        start_robots(
-            self._scene, self._rules, self._fleet, counters_of(key, self.n), self._cells, self._counts
-        )
+        self._fleet.start(key)
         self._step = 0
-        return self._observe()
+        return self._fleet.observe()
 
     def drive(self, commands: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Carry out one command of each robot.
@@ -126,29 +130,34 @@ class Robots:
         given = np.ascontiguousarray(commands, np.float64)
         if given.shape != (self.n, 2):
             raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2): move and turn.")
-        before = self._counts[:, self._column].copy()
-        step_robots(self._scene, self._fleet, given, self._cells, self._counts)
+        before = self._fleet.counts[:, self._column].copy()
+        self._fleet.step(given)
         self._step += 1
-        return self._observe(), (self._counts[:, self._column] - before) / self.arena.grid.n_cells
-
-    def _observe(self) -> NDArray[np.float64]:
-        observations = np.empty((self.n, 3))
-        observe_robots(self._rules, self._fleet, np.uint64(self.noise_key.key), self._step, observations)
-        return observations
+        visited = self._fleet.counts[:, self._column] - before
+        return self._fleet.observe(), visited / self.arena.grid.n_cells
 
     def facts(self) -> dict[str, NDArray[np.float64]]:
-        """What is so, whatever the controller sees: pose (n, 3), readings (n, s) [m], both coverages (n,)."""
-        counts = self._counts / self.arena.grid.n_cells
-        return {
-            "pose": poses_of(by_robot(self._fleet.poses, self.n), self.arena.start),
-            "readings": by_robot(self._fleet.fractions, self.n) * self.platform.sensor_range,
-            "coverage_line": counts[:, 0],
-            "coverage_ends": counts[:, 1],
-        }
+        """What is so, whatever the controller sees: pose (n, 3), readings (n, s), both coverages (n,)."""
+        counts = self._fleet.counts / self.arena.grid.n_cells
+        return {**self._fleet.facts(), "coverage_line": counts[:, 0], "coverage_ends": counts[:, 1]}
 
     def cells(self, k: int) -> tuple[int, ...]:
         """The cells that robot k visited along its line, in order of first visit, columns * row + column."""
-        return tuple(self._cells[k, : self._counts[k, 0]].tolist())
+        return tuple(self._fleet.cells[k, : self._fleet.counts[k, 0]].tolist())
+
+
+def _platform(given: Platform) -> JyroPlatform | SimPlatform:
+    """The platform that was given, or that a name stands for; settings without a name are those of `jyro`."""
+    if isinstance(given, SimPlatform):
+        return given
+    if not isinstance(given, str):
+        return _made("platform", JyroPlatform, given)
+    name, colon, file = given.partition(":")
+    if name == "sim" and bool(colon) == bool(file):
+        return SimPlatform(**({"robot": file} if file else {}))
+    if given == "jyro":
+        return JyroPlatform()
+    raise ValueError(f"platform is {given!r}. {did_you_mean(given, ['jyro', 'sim', 'sim:FILE'])}")
 
 
 def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
@@ -158,8 +167,3 @@ def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
     if not isinstance(given, Mapping | None):
         raise TypeError(f"{name} is {given!r}, expected {kind.__name__}, or a mapping of what it is made of.")
     return kind(**(given or {}))
-
-
-def by_robot(blocks: NDArray[Any], n: int) -> NDArray[np.float64]:
-    """(b, m, LANES) numbers of blocks as (n, m)."""
-    return np.moveaxis(blocks, 1, 2).reshape(-1, blocks.shape[1])[:n].astype(np.float64)

@@ -10,11 +10,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from realitygap.robots import JyroPlatform
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
-from ._robots import Cells, Robots
+from ._robots import Cells, Platform, Robots
 
 Array = NDArray[np.float64]
 
@@ -41,8 +40,8 @@ class ScribblerCoverageVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         self,
         num_envs: int = 1,
         *,
-        noise: float = 0.1,
-        platform: JyroPlatform | Mapping[str, Any] | None = None,
+        noise: float | None = None,
+        platform: Platform = None,
         arena: ArenaSettings | Mapping[str, Any] | None = None,
         cells: Cells = "line",
     ) -> None:

@@ -34,6 +34,7 @@ from realitygap.records._ledger_kinds import (
     TrialState,
     Turn,
 )
+from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._observations_file import (
@@ -41,6 +42,7 @@ from realitygap.records._observations_file import (
     Observations,
     ObservationsFile,
     ObservationsHead,
+    not_compared,
     read_observations,
     trial_from_dict,
     trial_to_dict,
@@ -48,11 +50,13 @@ from realitygap.records._observations_file import (
 )
 from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
+from realitygap.records._published_results import PublishedResults
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # the folder and what is in it
     "ResultsFolder",
+    "PublishedResults",
     "Chunk",
     "Delivery",
     "MissingInboxError",
@@ -73,6 +77,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "list_column",
     # the ledger of physical trials
     "Ledger",
+    "LedgerReader",
     "Generation",
     "Individual",
     "Turn",
@@ -94,6 +99,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Observations",
     "ObservationsFile",
     "ObservationsHead",
+    "not_compared",
     "read_observations",
     "write_observations",
     "trial_from_dict",

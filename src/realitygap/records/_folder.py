@@ -1,73 +1,53 @@
-"""A folder with the results of one study."""
+"""A folder with the results of one study: who writes it, and how."""
 
 from __future__ import annotations
 
 import contextlib
-import copy
-import itertools
 import threading
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
-from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
+from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records._chunk import (
-    MAX_REPLICATE,
     Chunk,
     ChunkName,
-    check_condition,
-    digest_rows,
     encode_chunk,
-    load_chunk,
-    read_rows,
 )
-from realitygap.records._columns import EXTRA_SCHEMA, SCHEMA, schema_with
-from realitygap.records._derived import DERIVED, DerivedFrame
 from realitygap.records._description import DESCRIPTION_NAME, Description
-from realitygap.records._digest import RowsDigest, row_streams, study_digest
 from realitygap.records._files import reading, sync_folder, write_durably, writing
 from realitygap.records._inbox import Delivery, is_inbox, make_inbox, remove_inbox
-from realitygap.records._ledger import Ledger
-from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import (
     LEDGER_NAME,
-    TRIALS_NAME,
     is_temporary,
     is_trace,
     list_chunks,
     listed,
 )
 from realitygap.records._lock import LOCK_NAME, FolderLock
-from realitygap.records._log import LOG_NAME, append_line, read_lines
-from realitygap.records._output import refuse_results
-from realitygap.records._parquet import write_frames
+from realitygap.records._log import LOG_NAME, append_line
 from realitygap.records._published import PublishedNames
+from realitygap.records._published_results import PublishedResults
 from realitygap.records._seal import BrokenSeal, check_ends
-from realitygap.records._version import RESULTS_VERSION, RecordWarning
+from realitygap.records._version import RESULTS_VERSION
 
 
-class ResultsFolder:
+class ResultsFolder(PublishedResults):
     """The results of one study: `study.json`, `trials/*.parquet`, `log.jsonl`, and with a robot `ledger.sqlite`.
-
-    The rows of conditions that a robot drove come out of the ledger, those of complete runs, beside the others'.
 
     Make one with `create` or `open`. Any number of processes may read while one writes; whatever is read was
     published as a whole. Writing takes the lock by itself; `locked` keeps others out for longer.
     """
 
     def __init__(self, path: Path, description: Description) -> None:
-        self._path = path
-        self._trials = path / TRIALS_NAME
-        self._description = description
+        super().__init__(path, description)
         self._lock = FolderLock(path)
         self._publishing = threading.Lock()
         self._published: PublishedNames | None = None
-        self._checked: dict[str, tuple[tuple[int, ...], Chunk]] = {}
 
-    # making and opening
+    # making
 
     @classmethod
     def create(cls, path: str | Path, description: Mapping[str, Any]) -> ResultsFolder:
@@ -94,76 +74,6 @@ class ResultsFolder:
             folder._begin()
         return folder
 
-    @classmethod
-    def open(cls, path: str | Path) -> ResultsFolder:
-        """The study in a folder.
-
-        Raises:
-            RecordError: there is no such folder, it holds no results, or its `study.json` is torn or foreign.
-        """
-        path = Path(path)
-        if not path.is_dir():
-            what = "is a file, not a folder of results" if path.exists() else "does not exist"
-            raise RecordError(
-                f"{path} {what}. Check the path, or run a study with it as the folder for results."
-            )
-        if not (path / DESCRIPTION_NAME).exists():
-            with reading(path):
-                found = sorted(entry.name for entry in path.iterdir())
-            raise RecordError(
-                f"{path} holds no results: there is no {DESCRIPTION_NAME}. Found {listed(found)}. "
-                "Check the path; if the file was lost, restore it from a copy."
-            )
-        return cls(path, Description.read(path / DESCRIPTION_NAME))
-
-    # what it is
-
-    @property
-    def path(self) -> Path:
-        """The folder."""
-        return self._path
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """A copy of the study as resolved."""
-        return copy.deepcopy(self._description.study)
-
-    @property
-    def conditions(self) -> list[str]:
-        """Names of the conditions, in the description's order."""
-        return self._description.conditions
-
-    @property
-    def results_version(self) -> int:
-        """The version of what computed the numbers in this folder; see `RESULTS_VERSION`."""
-        return self._description.results_version
-
-    @property
-    def version_note(self) -> str | None:
-        """A sentence for reports when another version computed the numbers; None when it was this one."""
-        if self.results_version == RESULTS_VERSION:
-            return None
-        return (
-            f"The results in {self._path} were computed by results version {self.results_version}; "
-            f"this realitygap computes version {RESULTS_VERSION}, whose numbers may differ."
-        )
-
-    @property
-    def missing_note(self) -> str | None:
-        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
-        replicates = self._description.study.get("replicates")
-        if not isinstance(replicates, int):
-            return None
-        n_runs = replicates * len(self.conditions)
-        n_there = sum(max(0, min(name.last + 1, replicates) - name.first) for name in self._names())
-        n_there += sum(run < replicates for runs in self._complete_runs().values() for run in runs)
-        if n_there >= n_runs:
-            return None
-        return (
-            f"{n_there:,} of {n_runs:,} runs are there, and the digest is theirs alone. The command that ran the study "
-            "goes on with what is missing."
-        )
-
     def update_description(self, description: Mapping[str, Any]) -> None:
         """Replace the description, when a study gets more replicates or conditions.
 
@@ -187,36 +97,6 @@ class ResultsFolder:
             self._description = new
 
     # chunks
-
-    def chunks(self, condition: str | None = None) -> list[Chunk]:
-        """All published chunks, or those of one condition, in key order; every byte of them was checked.
-
-        A file that was checked before and has not changed since is not read again.
-
-        Raises:
-            RecordError: a file in `trials/` is torn, foreign or in the wrong place, or chunks overlap or
-                disagree.
-            RecordVersionError: a chunk is of another version than the folder.
-        """
-        chunks = [self._load(name) for name in self._names(condition)]
-        self._check_together(chunks)
-        return chunks
-
-    def missing(self, condition: str, n_replicates: int) -> list[range]:
-        """The replicates of 0 to `n_replicates` - 1 that are not published, as ranges in order.
-
-        Raises:
-            RecordError: as `chunks`.
-            ValueError: the condition cannot name a file.
-        """
-        check_condition(condition)
-        gaps: list[range] = []
-        begin = 0
-        for chunk in self.chunks(condition):
-            gaps.append(range(begin, min(chunk.first, n_replicates)))
-            begin = chunk.last + 1
-        gaps.append(range(begin, n_replicates))
-        return [gap for gap in gaps if gap]
 
     def publish(self, condition: str, first: int, frame: pl.DataFrame, condition_hash: str) -> Chunk:
         """Add the rows of one or more whole replicates; once this returns, they survive a crash.
@@ -297,149 +177,6 @@ class ResultsFolder:
         with self._hold():
             yield
 
-    # rows
-
-    def scan(self) -> pl.LazyFrame:
-        """All rows, lazily, in key order; warns when another version computed them.
-
-        Raises:
-            RecordError: as `chunks`.
-        """
-        self._warn_of_version()
-        parts: list[pl.LazyFrame] = []
-        physical = self._complete_runs()
-        for name in self.conditions:
-            if name in physical:
-                parts += [frame.lazy() for frame in self._driven(name)]
-            elif paths := [chunk.path for chunk in self.chunks(name)]:
-                parts.append(pl.scan_parquet(paths, glob=False, hive_partitioning=False))
-        return pl.concat(parts, how="diagonal") if parts else pl.LazyFrame(schema=SCHEMA)
-
-    def frames(
-        self, condition: str | None = None, columns: Sequence[str] | None = None
-    ) -> Iterator[pl.DataFrame]:
-        """The rows chunk by chunk, in key order, so that memory holds one chunk at a time.
-
-        Args:
-            condition: only this one; without it, all, in the description's order.
-            columns: only these.
-
-        Raises:
-            RecordError: as `chunks`.
-            TypeError: a replicate is not a whole number.
-            ValueError: no such condition or column.
-        """
-        self._check_selection(condition, columns)
-        self._warn_of_version()
-        return self._all_frames(condition, columns)
-
-    def read(
-        self,
-        condition: str | None = None,
-        replicates: Iterable[int] | None = None,
-        columns: Sequence[str] | None = None,
-    ) -> pl.DataFrame:
-        """Rows in key order: conditions as in the description, then replicate, generation and individual.
-
-        Args:
-            condition: only this one.
-            replicates: only these; those that are not there are left out.
-            columns: only these, in this order.
-
-        Raises:
-            RecordError: as `chunks`.
-            TypeError: a replicate is not a whole number.
-            ValueError: no such condition or column.
-        """
-        self._check_selection(condition, columns)
-        self._warn_of_version()
-        if replicates is None:
-            parts = list(self._all_frames(condition, columns))
-        else:
-            wanted = _wanted(replicates)
-            needed = None if columns is None else list(dict.fromkeys([*columns, "replicate"]))
-            chosen = pl.col("replicate").cast(pl.Int64).is_in(wanted.implode())
-            parts = [frame.filter(chosen) for frame in self._all_frames(condition, needed, wanted)]
-        frame = pl.concat(parts, how="diagonal") if parts else pl.DataFrame(schema=schema_with(columns or ()))
-        return frame if columns is None else frame.select(columns)
-
-    def derive(
-        self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
-    ) -> pl.DataFrame:
-        """Species, innovations or lineage of the runs, derived from their rows.
-
-        Args:
-            what: species (a row is one species in one generation), innovations (one innovation number in one run), or
-                lineage (one individual); `derived_table` has their columns.
-            condition: only this one.
-            replicates: only these; those that are not there are left out.
-
-        Raises:
-            RecordError: as `chunks`.
-            TypeError: a replicate is not a whole number.
-            ValueError: no such condition, or nothing of that name to derive.
-        """
-        parts = list(self.derived_frames(what, condition, replicates))
-        return pl.concat(parts) if parts else pl.DataFrame(schema=DERIVED[what].schema)
-
-    def derived_frames(
-        self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
-    ) -> Iterator[pl.DataFrame]:
-        """As `derive`, chunk by chunk, so that memory holds one chunk at a time."""
-        if what not in DERIVED:
-            raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
-        self._check_selection(condition, None)
-        self._warn_of_version()
-        wanted = None if replicates is None else _wanted(replicates)
-        return self._derived(what, condition, wanted)
-
-    def write_derived(
-        self,
-        what: DerivedFrame,
-        path: str | Path,
-        condition: str | None = None,
-        replicates: Iterable[int] | None = None,
-    ) -> int:
-        """Write `derive` to a Parquet file, chunk by chunk; one that is there gives way once the new one is complete.
-
-        Args:
-            what, condition, replicates: As of `derive`.
-            path: The file; none of a study's own.
-
-        Returns:
-            How many rows it has.
-
-        Raises:
-            RecordError: as `chunks`, or the file is one of a study's own or cannot be written.
-            ValueError: as `derive`.
-        """
-        path = Path(path)
-        refuse_results(path)
-        return write_frames(path, self.derived_frames(what, condition, replicates), DERIVED[what].schema)
-
-    def digest(self) -> str:
-        """Sha256 of all rows, as 64 hexadecimal digits.
-
-        It depends on the values, the conditions' names and hashes, and the results version: not on the order
-        of the conditions, on how replicates were split into chunks, nor on when, where and with how many
-        threads they were computed.
-
-        Raises:
-            RecordError: as `chunks`.
-        """
-        self._warn_of_version()
-        rows: dict[str, RowsDigest] = {}
-        chunks: list[Chunk] = []
-        for name in self._names():
-            digest = rows.setdefault(name.condition, RowsDigest())
-            chunks.append(digest_rows(self._trials / str(name), digest))
-        self._check_together(chunks)
-        hashes = {chunk.condition: chunk.condition_hash for chunk in chunks}
-        hashes |= self._digest_driven(rows)
-        return study_digest(
-            self.results_version, {name: (hashes[name], rows[name].hexdigest()) for name in hashes}
-        )
-
     # log
 
     def append_log(self, event: Mapping[str, Any]) -> bool:
@@ -448,10 +185,6 @@ class ResultsFolder:
         A failure never stops a run, since no result depends on the log; it is told by a `RecordWarning`.
         """
         return append_line(self._path / LOG_NAME, event)
-
-    def read_log(self) -> list[dict[str, Any]]:
-        """The events in the log, oldest first; warns of lines that a crash has torn."""
-        return read_lines(self._path / LOG_NAME)
 
     # starting anew
 
@@ -583,139 +316,6 @@ class ResultsFolder:
             self._published = PublishedNames(self._names())
         return self._published
 
-    def _names(self, condition: str | None = None) -> list[ChunkName]:
-        """What is published, by name and in key order, after all that names can tell was checked."""
-        names = list_chunks(self._trials)
-        if not {name.condition for name in names} <= set(self.conditions):
-            # another process may have extended the study since it was read here
-            self._description = Description.read(self._path / DESCRIPTION_NAME)
-        order = {name: index for index, name in enumerate(self.conditions)}
-        for name in names:
-            if name.condition not in order:
-                raise RecordError(
-                    f"{self._trials / str(name)} belongs to condition {name.condition!r}, which "
-                    f"{DESCRIPTION_NAME} does not list. Move it elsewhere or delete it."
-                )
-        names.sort(key=lambda name: (order[name.condition], name.first, name.last))
-        for before, name in itertools.pairwise(names):
-            if before.condition == name.condition and name.first <= before.last:
-                raise RecordError(
-                    f"{self._trials / str(before)} and {name} overlap. "
-                    "Move one of them elsewhere or delete it."
-                )
-        return [name for name in names if condition in (None, name.condition)]
-
-    def _frames(self, names: Iterable[ChunkName], columns: Sequence[str] | None) -> Iterator[pl.DataFrame]:
-        before: list[Chunk] = []
-        for name in names:
-            chunk, frame = read_rows(self._trials / str(name), columns)
-            self._check_together([*before, chunk])
-            before = [chunk]
-            yield frame
-
-    def _all_frames(
-        self, condition: str | None, columns: Sequence[str] | None, replicates: pl.Series | None = None
-    ) -> Iterator[pl.DataFrame]:
-        """Rows in key order, of chunks and of the ledger; of chunks only those with some of the replicates."""
-        names = self._names(condition)
-        if replicates is not None:
-            names = [name for name in names if replicates.is_between(name.first, name.last).any()]
-        chunks = {
-            key: list(group) for key, group in itertools.groupby(names, key=lambda name: name.condition)
-        }
-        physical = self._complete_runs()
-        for name in self.conditions if condition is None else [condition]:
-            if name in physical:
-                lacking = [pl.lit(None, dtype).alias(extra) for extra, dtype in EXTRA_SCHEMA.items()]
-                yield from (
-                    frame if columns is None else frame.with_columns(lacking).select(columns)
-                    for frame in self._driven(name)
-                )
-            else:
-                yield from self._frames(chunks.get(name, []), columns)
-
-    def _digest_driven(self, rows: dict[str, RowsDigest]) -> dict[str, str]:
-        """Add the rows of the ledger to those digested; the hashes of their conditions."""
-        if not (self._path / LEDGER_NAME).exists():
-            return {}
-        hashes: dict[str, str] = {}
-        with self._ledger() as ledger:
-            for name, about in ledger.conditions().items():
-                frame = ledger_frame(ledger, name)
-                if frame.height:
-                    rows[name] = RowsDigest()
-                    rows[name].update(row_streams(frame), frame.height)
-                    hashes[name] = about["hash"]
-        return hashes
-
-    def _driven(self, condition: str) -> Iterator[pl.DataFrame]:
-        """The rows of the complete runs that a robot drove; nothing where there are none."""
-        with self._ledger() as ledger:
-            frame = ledger_frame(ledger, condition)
-        if frame.height:
-            yield frame
-
-    def _complete_runs(self) -> dict[str, list[int]]:
-        """The complete runs of each condition in the ledger; nothing where there is no ledger."""
-        if not (self._path / LEDGER_NAME).exists():
-            return {}
-        with self._ledger() as ledger:
-            return {name: complete_runs(ledger, name) for name in ledger.conditions()}
-
-    def _ledger(self) -> Ledger:
-        return Ledger.open(self._path / LEDGER_NAME, writable=False)
-
-    def _derived(
-        self, what: DerivedFrame, condition: str | None, replicates: pl.Series | None
-    ) -> Iterator[pl.DataFrame]:
-        derived = DERIVED[what]
-        for frame in self._all_frames(condition, derived.needs, replicates):
-            if replicates is not None:
-                frame = frame.filter(pl.col("replicate").cast(pl.Int64).is_in(replicates.implode()))
-            yield derived.frame(frame)
-
-    def _load(self, name: ChunkName) -> Chunk:
-        path = self._trials / str(name)
-        with reading(path):
-            status = path.stat()
-        identity = (status.st_size, status.st_mtime_ns, status.st_ctime_ns, status.st_ino)
-        known = self._checked.get(path.name)
-        chunk = known[1] if known is not None and known[0] == identity else load_chunk(path)
-        self._checked[path.name] = (identity, chunk)
-        return chunk
-
-    def _check_together(self, chunks: Sequence[Chunk]) -> None:
-        """All chunks must be of the folder's version, and those of a condition of the same settings."""
-        first_of: dict[str, Chunk] = {}
-        for chunk in chunks:
-            if chunk.results_version != self.results_version:
-                raise RecordVersionError(
-                    f"{chunk.path} was computed by results version {chunk.results_version}, "
-                    f"{DESCRIPTION_NAME} says {self.results_version}. "
-                    "Move it elsewhere or delete it, or start anew (--fresh)."
-                )
-            first = first_of.setdefault(chunk.condition, chunk)
-            if chunk.condition_hash != first.condition_hash:
-                raise RecordError(
-                    f"{chunk.path} and {first.path.name} come from two different settings of condition "
-                    f"{chunk.condition!r}. Move one of them elsewhere, or start anew (--fresh)."
-                )
-
-    def _check_known(self, condition: str) -> None:
-        if condition not in self.conditions:
-            raise ValueError(f"Unknown condition {condition!r}. {did_you_mean(condition, self.conditions)}")
-
-    def _check_selection(self, condition: str | None, columns: Sequence[str] | None) -> None:
-        if condition is not None:
-            self._check_known(condition)
-        for column in columns or ():
-            if column not in (known := schema_with(EXTRA_SCHEMA)):
-                raise ValueError(f"Unknown column {column!r}. {did_you_mean(column, known)}")
-
-    def _warn_of_version(self) -> None:
-        if self.version_note is not None:
-            warnings.warn(self.version_note, RecordWarning, stacklevel=3)
-
     def _delete_results(self, also: Iterable[str]) -> None:
         if (self._path / LEDGER_NAME).exists():
             raise RecordError(
@@ -734,9 +334,3 @@ class ResultsFolder:
             sync_folder(self._path)
         self._checked.clear()
         self._published = None
-
-
-def _wanted(replicates: Iterable[int]) -> pl.Series:
-    """The replicates that there may be, ascending; what is beyond any chunk may be beyond polars' numbers, too."""
-    numbers = {whole_number("replicate", number) for number in replicates}
-    return pl.Series(sorted(number for number in numbers if 0 <= number <= MAX_REPLICATE), dtype=pl.Int64)

@@ -8,11 +8,10 @@ import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self
 
 from realitygap.errors import LedgerError
-from realitygap.records._ledger_file import connect, create_file, speaking
+from realitygap.records._ledger_file import create_file, speaking
 from realitygap.records._ledger_kinds import (
     Generation,
     Score,
@@ -22,17 +21,11 @@ from realitygap.records._ledger_kinds import (
     TrialState,
     Turn,
 )
+from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._version import RESULTS_VERSION
 
-_TRIALS = """
-SELECT trials.*, generations.closed IS NOT NULL AS is_closed, (
-    SELECT cells FROM scores WHERE trial = trials.id AND role = 'score' AND undone IS NULL ORDER BY id DESC LIMIT 1
-) AS cells
-FROM trials JOIN generations USING (condition, replicate, generation)
-"""
 
-
-class Ledger:
+class Ledger(LedgerReader):
     """The ledger of a study's physical trials.
 
     Each method that writes is one transaction, and what it wrote survives a crash once it returns. Several
@@ -43,32 +36,11 @@ class Ledger:
             asked; what was written before is safe.
     """
 
-    def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
-        self.path = path
-        self._connection = connection
-
     @classmethod
     def create(cls, path: str | Path) -> Self:
         """Begin a ledger where none is."""
         create_file(Path(path))
         return cls.open(path)
-
-    @classmethod
-    def open(cls, path: str | Path, *, writable: bool = True) -> Self:
-        """The ledger in a file."""
-        return cls(Path(path), connect(Path(path), writable=writable))
-
-    def close(self) -> None:
-        """Let go of the file."""
-        self._connection.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # conditions and sittings
 
@@ -99,10 +71,6 @@ class Ledger:
                     "which may differ. Use the version that began it."
                 )
 
-    def conditions(self) -> dict[str, dict[str, Any]]:
-        """Hash, label (None before the first trial) and sizes of each condition, by name."""
-        return {row["name"]: dict(row) for row in self._all("SELECT * FROM conditions ORDER BY rowid")}
-
     def begin_sitting(
         self,
         label: str,
@@ -132,21 +100,6 @@ class Ledger:
         with self._writing():
             self._run("UPDATE sittings SET ended = ? WHERE id = ?", _now(), sitting)
 
-    def sittings(self) -> list[dict[str, Any]]:
-        """All sittings, oldest first; `robot` and `preflight` as they were given."""
-        rows = self._all("SELECT * FROM sittings ORDER BY id")
-        return [
-            {**dict(row), "robot": json.loads(row["robot"]), "preflight": json.loads(row["preflight"])}
-            for row in rows
-        ]
-
-    def robots(self) -> list[dict[str, str]]:
-        """What each robot that drove a trial was told by, every one once, oldest first."""
-        rows = self._all(
-            "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
-        )
-        return [json.loads(text) for text in dict.fromkeys(row["robot"] for row in rows)]
-
     # generations
 
     def plan(self, generations: Sequence[Generation], turns: Sequence[Turn]) -> None:
@@ -164,27 +117,6 @@ class Ledger:
             for turn in turns:
                 trial = self._insert_trial(turn, attempt=0)
                 self._note_event(trial, "planned", {})
-
-    def generations(self, condition: str, replicate: int) -> list[tuple[int, bool]]:
-        """Number of each generation planned, and whether it is closed, in order."""
-        rows = self._all(
-            "SELECT generation, closed FROM generations WHERE condition = ? AND replicate = ? ORDER BY generation",
-            *(condition, replicate),
-        )
-        return [(row["generation"], row["closed"] is not None) for row in rows]
-
-    def individuals(self, condition: str, replicate: int, generation: int) -> list[dict[str, Any]]:
-        """The individuals of a generation in order; once it is closed with `fitness`, `novelty` and `cells`."""
-        rows = self._all(
-            "SELECT individuals.*, scores.cells FROM individuals LEFT JOIN scores ON scores.id = individuals.score "
-            "WHERE condition = ? AND replicate = ? AND generation = ? ORDER BY individual",
-            *(condition, replicate, generation),
-        )
-        found = []
-        for row in rows:
-            one = dict(row) | {name: json.loads(row[name]) for name in ("parents", "genome")}
-            found.append(one | {"cells": None if row["cells"] is None else json.loads(row["cells"])})
-        return found
 
     def close_generation(
         self,
@@ -245,39 +177,6 @@ class Ledger:
                 )
 
     # trials
-
-    def trials(
-        self,
-        condition: str | None = None,
-        replicate: int | None = None,
-        generation: int | None = None,
-        *,
-        states: Iterable[TrialState] | None = None,
-    ) -> list[Trial]:
-        """Trials in the order of their turns; all of them, or those chosen."""
-        wanted = {"condition": condition, "replicate": replicate, "generation": generation}
-        given = {name: value for name, value in wanted.items() if value is not None}
-        clauses = [f"{name} = ?" for name in given]
-        values: list[Any] = list(given.values())
-        if states is not None:
-            chosen = list(states)
-            clauses.append(f"state IN ({', '.join('?' * len(chosen))})")
-            values += chosen
-        where = f"WHERE {' AND '.join(clauses)} " if clauses else ""
-        return [_trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
-
-    def trial(self, number: int) -> Trial:
-        """A trial by its number.
-
-        Raises:
-            LedgerError: there is none.
-        """
-        row = self._one(f"{_TRIALS}WHERE trials.id = ?", number)
-        if row is None:
-            (most,) = self._one("SELECT max(id) FROM trials") or (None,)
-            has = f"its trials are 1 to {most}" if most else "it has none yet"
-            raise LedgerError(f"{self.path} has no trial {number}: {has}.")
-        return _trial(row)
 
     def start(self, number: int, sitting: int) -> None:
         """A planned trial begins; call before its robot moves. The first one gives its condition its label.
@@ -371,52 +270,6 @@ class Ledger:
                 "INSERT INTO notes (trial, text, who, time) VALUES (?, ?, ?, ?)", number, text, who, _now()
             )
 
-    # what is said of trials
-
-    def notes(self, number: int | None = None) -> list[dict[str, Any]]:
-        """Notes, oldest first; of one trial, or all."""
-        where, values = ("", ()) if number is None else ("WHERE trial = ? ", (number,))
-        return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
-
-    def steps(self, number: int) -> list[Step]:
-        """What a trial's robot saw and was told, step by step."""
-        rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
-        return [
-            Step(
-                row["time"],
-                tuple(json.loads(row["raw"])),
-                tuple(json.loads(row["readings"])),
-                bool(row["stalled"]),
-                row["move"],
-                row["turn"],
-            )
-            for row in rows
-        ]
-
-    def scores(self) -> list[dict[str, Any]]:
-        """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
-        rows = self._all("SELECT * FROM scores ORDER BY id")
-        return [
-            {**dict(row), "cells": json.loads(row["cells"]), "path": json.loads(row["path"] or "null")}
-            for row in rows
-        ]
-
-    def events(self) -> list[dict[str, Any]]:
-        """Everything that changed a trial, oldest first."""
-        return [
-            {**dict(row), "details": json.loads(row["details"])}
-            for row in self._all("SELECT * FROM events ORDER BY id")
-        ]
-
-    def used_codes(self) -> set[str]:
-        """Codes that stand for a trial."""
-        return {row["code"] for row in self._all("SELECT code FROM trials")}
-
-    def last_sheet(self) -> int:
-        """The highest number of a sheet of paper; 0 before the first."""
-        row = self._one("SELECT coalesce(max(sheet), 0) AS sheet FROM trials")
-        return 0 if row is None else int(row["sheet"])
-
     # inside
 
     @contextlib.contextmanager
@@ -439,19 +292,6 @@ class Ledger:
     def _run(self, command: str, *values: Any) -> int:
         """Carry out a command; the number of the row that it inserted."""
         return int(self._connection.execute(command, values).lastrowid or 0)
-
-    def _count(self, command: str, *values: Any) -> int:
-        """Carry out a command; how many rows it changed."""
-        return self._connection.execute(command, values).rowcount
-
-    def _one(self, query: str, *values: Any) -> sqlite3.Row | None:
-        with speaking(self.path):
-            row: sqlite3.Row | None = self._connection.execute(query, values).fetchone()
-            return row
-
-    def _all(self, query: str, *values: Any) -> list[sqlite3.Row]:
-        with speaking(self.path):
-            return self._connection.execute(query, values).fetchall()
 
     def _insert_trial(self, turn: Turn, attempt: int, place: int | None = None) -> int:
         if place is None:
@@ -595,16 +435,6 @@ class Ledger:
             what,
             _json(details),
         )
-
-
-def _trial(row: sqlite3.Row) -> Trial:
-    cells = None if row["cells"] is None else tuple(json.loads(row["cells"]))
-    names = (
-        *("condition", "replicate", "generation", "individual", "attempt", "place", "sheet", "pen", "code"),
-        *("state", "reason", "end", "problem", "n_steps", "stalls"),
-    )
-    given = {name: row[name] for name in names}
-    return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
 
 def _json(value: Any) -> str:

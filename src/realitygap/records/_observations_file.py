@@ -40,6 +40,7 @@ class ObservationsHead:
         arena: Where, as `Arena.to_dict` has it.
         step_s: How long one command lasts [s].
         observe: How much was looked at.
+        identity: What tells the target from others whatever its name; empty where only the name does.
     """
 
     target: str
@@ -48,6 +49,7 @@ class ObservationsHead:
     arena: Mapping[str, Any]
     step_s: float
     observe: Observe
+    identity: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, equal to those that come out of a file."""
@@ -68,6 +70,11 @@ class Observations:
     head: ObservationsHead
     trials: tuple[ObservedTrial, ...]
     problem: str = ""
+
+
+def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    """Which of `target` and `identity` does not tell two targets apart: the name, where identities are known."""
+    return "target" if there.get("identity") and wanted.get("identity") else "identity"
 
 
 def trial_to_dict(trial: ObservedTrial) -> dict[str, Any]:
@@ -135,7 +142,8 @@ def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
 class ObservationsFile:
     """A file to which trials are added as they end.
 
-    One that is there is taken up where it ends: a torn last line is cut off, and what it was is told in `problem`.
+    One that is there is taken up where it ends: a torn last line is cut off, and what it was is told in `problem`. A
+    target whose identity is known on both sides may have another name, such as another port.
 
     Args:
         path: Where; made where there is none.
@@ -177,7 +185,8 @@ class ObservationsFile:
             return 0  # a crash while the first line was written
         found, held = _parse(self.path, data)
         there, wanted = found.head.to_dict(), self.head.to_dict()
-        other = [name for name in wanted if there[name] != wanted[name]]
+        of_no_matter = not_compared(there, wanted)
+        other = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
         if other:
             what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
             raise RecordError(
@@ -290,6 +299,7 @@ def _head(path: Path, line: bytes) -> ObservationsHead:
             f"{path} is no file of observed trials, or of another version: its first line does not say "
             f"{OBSERVATIONS_FORMAT!r}. Name one that this realitygap ({__version__}) wrote."
         )
+    values.setdefault("identity", "")
     names = ObservationsHead.__dataclass_fields__
     missing = [name for name in names if name not in values]
     if missing or values["observe"] not in OBSERVATIONS:

@@ -62,6 +62,7 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
         n_twins=len(summary["twins"]),
         goal_head=GOAL_HEAD,
         goals=goal_table(summary),
+        not_counted=not_counted(summary),
         why_head=WHY_HEAD,
         why=why_table(summary),
         family_head=FAMILY_HEAD,
@@ -90,11 +91,21 @@ def goal_table(summary: Mapping[str, Any]) -> Table:
             f"{goal['sense']} {_plain(goal, goal['goal'])}",
             _plain(goal, goal["figure"]),
             _span(goal, lambda value, goal=goal: _plain(goal, value)),
-            str(goal["n"]),
+            _counted(goal),
             met[goal["met"]],
         )
         for goal in summary["goals"]
     ]
+
+
+def not_counted(summary: Mapping[str, Any]) -> list[str]:
+    """A sentence for each goal that not all twins are judged by: how many are, and why the others are not."""
+    sentences = []
+    for goal in summary["goals"]:
+        reasons = [f"{each['twin']} is not: {each['why']}" for each in goal["unknown"]]
+        if reasons:
+            sentences.append(f"{goal['name']}: {_counted(goal)} twins are judged. {'; '.join(reasons)}.")
+    return sentences
 
 
 def why_table(summary: Mapping[str, Any]) -> Table:
@@ -153,6 +164,12 @@ def strategy_table(summary: Mapping[str, Any]) -> Table:
         (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row, _number))
         for row in summary["strategies"]
     ]
+
+
+def _counted(goal: Mapping[str, Any]) -> str:
+    """How many twins a goal is judged by, and of how many."""
+    n, n_unknown = goal["n"], len(goal["unknown"])
+    return f"{n} of {n + n_unknown}" if n_unknown else str(n)
 
 
 def _plain(goal: Mapping[str, Any], value: float | None) -> str:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 from pydantic import Field
 
-from realitygap.drawing import Picture
-from realitygap.settings import Settings
-from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
+from realitygap.world import JYRO_SCRIBBLER, RangeSensors
+
+from ._figures import ScribblerFigures
 
 STEP_S = 0.1  # one step of Jyro, one command [s]
 
 
-class JyroPlatform(Settings):
+class JyroPlatform(ScribblerFigures):
     """The Scribbler as the paper simulated it.
 
     Box body, a blocked robot freezes, three thin rays, uniform noise. A step lasts 0.1 s; full output
@@ -67,11 +66,6 @@ class JyroPlatform(Settings):
         return "SIM"
 
     @property
-    def body(self) -> Body:
-        """The outline that collides: a box of 0.18 x 0.16 m."""
-        return JYRO_SCRIBBLER
-
-    @property
     def sensors(self) -> RangeSensors:
         """Three rays from the front edge, straight ahead."""
         front = max(forward for forward, _ in JYRO_SCRIBBLER.corners)
@@ -89,13 +83,6 @@ class JyroPlatform(Settings):
         return self.turn_per_step / STEP_S
 
     @property
-    def body_radius(self) -> float:
-        """Distance of the farthest corner from the center [m]."""
-        return max(math.hypot(forward, left) for forward, left in self.body.corners)
-
-    def picture(self) -> Picture:
-        """The robot from above, to scale, with its dimensions."""
-        return robot_picture(f"jyro ({self.label})", self.body, self.sensors)
-
-    def _repr_svg_(self) -> str:
-        return self.picture().to_svg(300.0)
+    def title(self) -> str:
+        """Of its picture."""
+        return f"jyro ({self.label})"

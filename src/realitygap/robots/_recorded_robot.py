@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from realitygap.errors import RecordError, RobotError
 from realitygap.world import Pose
 
 from ._contract import Command, Label, Observation, check_command
+from ._in_program import ProgramRobot
 from ._recording import Recording, read_recording
 
 NAME = "recording:"
@@ -31,7 +31,7 @@ class RecordedClock:
         self._now += seconds
 
 
-class RecordedRobot:
+class RecordedRobot(ProgramRobot):
     """Answers what a robot answered, as long as it is asked what it was asked.
 
     `reset` goes to the next recorded one. `stop` may come at any moment, as on every robot.
@@ -57,15 +57,14 @@ class RecordedRobot:
         self.step_s = float(header["step_s"])
         self.n_sensors = int(header["n_sensors"])
         self.clock = RecordedClock()
+        self._closed = f"{recording.path} is closed: open the recording anew."
         self._lines = [line for line in recording.lines if line["kind"] != "wire" and line["name"] != "stop"]
         self._next = 0
         self._n_steps = 0
-        self._is_open = True
 
     def _take(self, name: str) -> Mapping[str, Any]:
         """What was recorded at this point, which must be such a call."""
-        if not self._is_open:
-            raise RobotError(f"{self.recording.path} is closed: open the recording anew.")
+        self._check_open()
         is_over = self._next == len(self._lines)
         line: Mapping[str, Any] = {"name": "end"} if is_over else self._lines[self._next]
         if line["name"] != name:
@@ -115,18 +114,3 @@ class RecordedRobot:
             )
         self._n_steps += 1
         self.clock.sleep(self.step_s)
-
-    def stop(self) -> None:
-        """Nothing: it does not move."""
-
-    def close(self) -> None:
-        """Let go of it; safe to call twice."""
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 from pydantic import Field
 
-from realitygap.drawing import Picture
-from realitygap.settings import Settings
-from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
+from ._figures import ScribblerFigures
 
 
-class ScribblerPlatform(Settings):
+class ScribblerPlatform(ScribblerFigures):
     """The Scribbler as the paper drove it; the port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command. A reading is the raw value of an
@@ -44,25 +41,3 @@ class ScribblerPlatform(Settings):
     def label(self) -> str:
         """What a figure says as long as nothing was driven; then REAL or EMULATED, as the driver found."""
         return "not driven"
-
-    @property
-    def body(self) -> Body:
-        """What figures draw: the box of 0.18 x 0.16 m that holds the body, whose corners are round."""
-        return JYRO_SCRIBBLER
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """What figures draw: three rays from the front, as far as readings were reasonable to the paper (9 in)."""
-        return RangeSensors(((0.09, 0.05, 0.0), (0.09, 0.0, 0.0), (0.09, -0.05, 0.0)), 0.2286)
-
-    @property
-    def body_radius(self) -> float:
-        """Distance of the farthest corner from the center [m]."""
-        return max(math.hypot(forward, left) for forward, left in self.body.corners)
-
-    def picture(self) -> Picture:
-        """The robot from above, to scale, with its dimensions."""
-        return robot_picture("scribbler", self.body, self.sensors)
-
-    def _repr_svg_(self) -> str:
-        return self.picture().to_svg(300.0)

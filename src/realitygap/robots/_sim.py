@@ -12,7 +12,9 @@ from pydantic import (
     BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
+    ValidationInfo,
     field_serializer,
+    field_validator,
     model_serializer,
     model_validator,
 )
@@ -71,33 +73,40 @@ def _as_robot(value: Any) -> Any:
     return RobotModel.from_dict(value) if isinstance(value, Mapping) else value
 
 
-def _as_numbers(values: Any) -> Any:
-    """Numbers by name, and distributions made of tables."""
-    if not isinstance(values, Mapping):
-        return values
-    found: dict[str, Any] = {}
+def as_numbers(values: Mapping[Any, Any]) -> tuple[dict[str, float | Distribution], list[str]]:
+    """Numbers by name, and distributions made of tables; and what is wrong with the others."""
+    found: dict[str, float | Distribution] = {}
     problems: list[str] = []
     for name, value in values.items():
         if isinstance(value, Mapping):
             try:
-                value = Distribution(**value)
+                found[name] = Distribution(**value)
             except ValueError as error:
-                problems += [
-                    f"{name}{line.removeprefix('Distribution')}"
-                    for line in str(error).rstrip(".").split("\n")
-                ]
-        elif isinstance(value, bool) or not isinstance(value, int | float | Distribution):
+                lines = str(error).split("\n")
+                problems += [name + line.removeprefix("Distribution") for line in lines]
+        elif isinstance(value, Distribution):
+            found[name] = value
+        elif isinstance(value, bool) or not isinstance(value, int | float):
             problems.append(
                 f"{name}: expected a number, or how it is drawn, such as {{ uniform = [0.1, 0.2] }}, came {value!r}"
             )
-        elif not isinstance(value, Distribution):
-            if not math.isfinite(value):
-                problems.append(f"{name}: expected a finite number, came {value!r}")
-            value = float(value)
-        found[name] = value
-    if problems:
-        raise ValueError("; ".join(problems))
-    return found
+        elif not math.isfinite(value):
+            problems.append(f"{name}: expected a finite number, came {value!r}")
+        else:
+            found[name] = float(value)
+    return found, problems
+
+
+def _why_not(robot: RobotModel, numbers: Mapping[str, float | Distribution]) -> list[str]:
+    """What is wrong with numbers of a robot."""
+    own = {name: value for name, value in numbers.items() if not name.startswith(ARENA)}
+    settings = [name for name in own if name in SimPlatform.model_fields]
+    problems = [f"{name}: a setting of [platform.sim] itself, write it there" for name in settings]
+    try:
+        robot.with_numbers({name: value for name, value in own.items() if name not in settings})
+    except ValueError as error:
+        problems += [line.removeprefix("RobotModel").lstrip(".: ") for line in str(error).split("\n")]
+    return problems
 
 
 class SimPlatform(Settings):
@@ -134,7 +143,7 @@ class SimPlatform(Settings):
         description="Of sensors with a linear response: after adding the paper's noise, leave the reading as it is, or "
         "limit it to 0..1.",
     )
-    set: Annotated[dict[str, float | Distribution], BeforeValidator(_as_numbers)] = Field(
+    set: dict[str, float | Distribution] = Field(
         default_factory=dict,
         description="Numbers of the robot and of the arena by dotted name: a value, or how it is drawn: uniform = "
         "[least, most], normal = [mean, standard deviation], log_uniform or choice, with per = trial (when not given), "
@@ -169,6 +178,19 @@ class SimPlatform(Settings):
         if calibration is None or not calibration.draws:
             return values
         return {**values, "draws": dict(calibration.draws)}
+
+    @field_validator("set", mode="before")
+    @classmethod
+    def _numbers_are_such(cls, values: Any, info: ValidationInfo) -> Any:
+        """All that is wrong with them at once; numbers of the arena are looked at where that is known."""
+        if not isinstance(values, Mapping):
+            return values
+        numbers, problems = as_numbers(values)
+        if "robot" in info.data:
+            problems += _why_not(info.data["robot"], numbers)
+        if problems:
+            raise ValueError("; ".join(line.rstrip(".") for line in problems))
+        return numbers
 
     @model_validator(mode="after")
     def _draws_are_as_many(self) -> Self:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import subprocess
 import sys
 from typing import Literal
 
 from pydantic import Field
 
-from realitygap.drawing import Picture
-from realitygap.settings import Settings
-from realitygap.world import JYRO_SCRIBBLER, Body, RangeSensors, robot_picture
+from ._figures import ScribblerFigures
 
 _HASH = """
 import hashlib, sys
@@ -23,7 +20,7 @@ except OSError as error:
 """
 
 
-class TwinPlatform(Settings):
+class TwinPlatform(ScribblerFigures):
     """A twin, as pseudo-reality to evolve on.
 
     It is tried in processes of their own, which alone read its file; here it is known by its hash. Figures draw the
@@ -50,26 +47,9 @@ class TwinPlatform(Settings):
         return "TWIN"
 
     @property
-    def body(self) -> Body:
-        """What figures draw: the box of 0.18 x 0.16 m that holds a Scribbler."""
-        return JYRO_SCRIBBLER
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """What figures draw: three rays from the front, as far as readings were reasonable to the paper (9 in)."""
-        return RangeSensors(((0.09, 0.05, 0.0), (0.09, 0.0, 0.0), (0.09, -0.05, 0.0)), 0.2286)
-
-    @property
-    def body_radius(self) -> float:
-        """Distance of the farthest corner from the center [m]."""
-        return max(math.hypot(forward, left) for forward, left in self.body.corners)
-
-    def picture(self) -> Picture:
-        """The robot from above, to scale, with its dimensions."""
-        return robot_picture(f"twin ({self.label})", self.body, self.sensors)
-
-    def _repr_svg_(self) -> str:
-        return self.picture().to_svg(300.0)
+    def title(self) -> str:
+        """Of its picture."""
+        return f"twin ({self.label})"
 
 
 def hash_elsewhere(file: str) -> str:

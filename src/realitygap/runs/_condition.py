@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, model_validator
@@ -19,7 +17,7 @@ from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, Twin
 from realitygap.settings import Settings, mistakes
 from realitygap.tasks import CoverageTask, Task, as_task
 from realitygap.trials import Trajectory, paper_inputs, sim_scene
-from realitygap.world import Arena, ArenaSettings, check_start
+from realitygap.world import Arena, ArenaSettings, check_drawn_starts
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -179,8 +177,7 @@ class Condition(Settings):
         if self.platform == "jyro":
             self.arena.arena().straight_walls()  # which says where there are none
         robot = self.sim.model if self.platform == "sim" else self.tried_on.body
-        for arena in _at_the_ends(self.placed_arena):
-            check_start(arena, robot)
+        check_drawn_starts(self.placed_arena, robot)
         return self
 
     @model_validator(mode="after")
@@ -320,17 +317,6 @@ class Condition(Settings):
                 f"({' '.join(lines[:3])}{more}). Use the version that ran the study."
             )
         return condition
-
-
-def _at_the_ends(arena: Arena) -> Iterator[Arena]:
-    """The arena with its start at each end of what is drawn of its place; as it is where nothing is."""
-    axes = [arena.vary.get(f"arena.start.{axis}") for axis in "xy"]
-    ends = [
-        (at,) if drawn is None else (drawn.lowest, drawn.highest)
-        for at, drawn in zip(arena.start, axes, strict=False)
-    ]
-    for x, y in itertools.product(*ends):
-        yield replace(arena, start=arena.start._replace(x=x, y=y))
 
 
 def _hashed(twin: dict[str, Any]) -> dict[str, Any]:

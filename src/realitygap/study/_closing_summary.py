@@ -40,8 +40,8 @@ def summarize_closing(folder: str | Path) -> dict[str, Any]:
     Returns:
         `plan`; `twins`: of each one the RMS gap before and after by observation and budget, whether it counts, and
         what its calibrations found; `families`; `strategies`; `goals`: each with `name`, `figure`, `low`, `high` (95 %
-        interval, over twins), `n`, `goal`, `met` (None where nothing counts) and `why` for those twins that miss it;
-        `n_done` and `n_units`.
+        interval, over twins), `n`, `goal`, `met` (None where nothing counts), `why` for those twins that miss it, and
+        `unknown`: twins of which the figure is not known, and why; `n_done` and `n_units`.
 
     Raises:
         RecordError: There is no such study.
@@ -255,7 +255,11 @@ def _median_goal(
         "low": figure["low"],
         "high": figure["high"],
         "n": len(known),
-        "n_unknown": len(found) - len(known),
+        "unknown": [
+            {"twin": twin["twin"], "why": _why_unknown(name, after)}
+            for twin, after, value in found
+            if value is None
+        ],
         "goal": goal,
         "sense": "at least" if above else "at most",
         "met": met,
@@ -278,7 +282,7 @@ def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row,
         "low": figure["low"],
         "high": figure["high"],
         "n": len(by_family[worst]) if worst is not None else 0,
-        "n_unknown": 0,
+        "unknown": [],
         "goal": 0.0,
         "sense": "at least",
         "met": None if worst is None else figure["estimate"] >= 0,
@@ -304,7 +308,11 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
         "low": low,
         "high": high,
         "n": len(pairs),
-        "n_unknown": len(counted) - len(pairs),
+        "unknown": [
+            {"twin": twin["twin"], "why": "its transfer is not done"}
+            for twin in counted
+            if twin["twin"] not in [each["twin"] for each, _ in pairs]
+        ],
         "goal": least,
         "sense": "more than" if most else "at least",
         "met": met,
@@ -314,6 +322,14 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
             if difference < 0
         ],
     }
+
+
+def _why_unknown(name: str, after: Row) -> str:
+    """Why a twin has no such figure."""
+    gap = after["gap"]
+    if name.startswith("MMRV") and gap["mmrv_floor"] == 0 and gap["mmrv"] is not None:
+        return f"its floor is 0, the same order in both halves of its trials; MMRV is {gap['mmrv']:.3f}"
+    return "its trials are too few to tell"
 
 
 def _why(twin: Row, after: Row, value: float) -> Row:

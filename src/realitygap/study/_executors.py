@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
-from realitygap.trials import close_twins, usable_processors
+from realitygap.trials import close_twins, release_twins, usable_processors
 
 __all__ = ["ChunkTask", "Executor", "Listener", "Threads", "usable_processors"]
 
@@ -89,3 +89,5 @@ class Threads:
                     future.cancel()
                 close_twins()  # else a chunk would be carried out to its end
                 raise
+            finally:
+                release_twins()

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
+from realitygap.robots import ARENA, JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, as_numbers
 from realitygap.runs import Condition
 from realitygap.tasks import CoverageTask, task_model
 from realitygap.world import ArenaSettings
@@ -251,6 +251,22 @@ def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> di
     return merged
 
 
+def _check_arena_numbers(merged: dict[str, Any], place: str, problems: Problems) -> None:
+    """Note what is wrong with the arena's numbers among those of `sim`, which a condition looks at last."""
+    given = merged["sim"].get("set")
+    try:
+        arena = ArenaSettings(**merged["arena"]).arena()
+        numbers, _ = as_numbers(given if isinstance(given, dict) else {})
+    except ValueError:
+        return  # the arena has mistakes of its own
+    try:
+        arena.with_numbers({name: value for name, value in numbers.items() if name.startswith(ARENA)})
+    except ValueError as error:
+        for line in str(error).split("\n"):
+            said = line.removeprefix("ArenaFile").lstrip(".: ").replace("mean '", f"mean '{ARENA}")
+            problems.add(f"{place}.sim.set", ARENA + said)
+
+
 def _condition(
     values: dict[str, Any],
     base: dict[str, dict[str, Any]],
@@ -291,5 +307,7 @@ def _condition(
         for problem in error.errors():
             if not problem["loc"]:  # what is wrong within a section was noted there
                 problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
+        if any(problem["loc"][:1] == ("sim",) for problem in error.errors()):
+            _check_arena_numbers(merged, place, problems)
         return None, notes
     return condition, notes

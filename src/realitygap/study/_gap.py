@@ -23,11 +23,11 @@ from realitygap.gap import (
     replay_error,
 )
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import Target, TrialPlan
+from realitygap.trials import SimTarget, Target, TrialPlan
 from realitygap.world import Arena, Pose
 
 from ._controllers import Controller
-from ._targets import observations_head
+from ._targets import observations_head, steps_as_a_robot
 
 Tell = Callable[[str, int, int], None]
 """Called with what is being done, the trials done, and the trials in all."""
@@ -121,6 +121,7 @@ def study_gap(
     seed: int = 1,
     tell: Tell | None = None,
     results: str | Path | None = None,
+    at_its_pace: bool = False,
 ) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
@@ -138,6 +139,7 @@ def study_gap(
         seed: Of the bootstrap.
         tell: Called as trials are done.
         results: A file where the target's trials are kept as they come; those in it are not carried out again.
+        at_its_pace: Whether commands of a `sim` that was not calibrated last as long as those of the target did.
 
     Raises:
         ValueError: A number is out of range, or so much cannot be seen.
@@ -153,6 +155,7 @@ def study_gap(
     plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM)
     more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM)
     on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
+    source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
     one = side_of(source, in_source, len(controllers))
@@ -162,7 +165,7 @@ def study_gap(
         result,
         luck=_luck(controllers),
         reevolved=_reevolved(controllers, one, reevolved, on_target[len(plans) :], target),
-        notes=_notes([*in_source, *on_target]),
+        notes=(*_notes([*in_source, *on_target]), *said),
     )
     return GapStudy(
         result,
@@ -176,6 +179,20 @@ def study_gap(
         _replay(source, on_target[: len(plans)], tell),
         observe,
     )
+
+
+def _paced(
+    source: Target, target: Target, on_target: Sequence[ObservedTrial]
+) -> tuple[Target, tuple[str, ...]]:
+    """The simulator with commands as long as most of a robot's trials had, and what there is to say of it."""
+    step_s = float(np.median([trial.step_s for trial in on_target]))
+    if not (isinstance(source, SimTarget) and steps_as_a_robot(source) and steps_as_a_robot(target)):
+        return source, ()
+    if step_s == source.step_s:
+        return source, ()
+    lasted = f"{step_s:g} s in place of {source.step_s:g} s"
+    said = f"Commands of {source.name} last {lasted}, as those of {target.name} did."
+    return source.lasting(step_s), (said,)
 
 
 # --- trials -------------------------------------------------------------------------------------------------

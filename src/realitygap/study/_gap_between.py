@@ -115,6 +115,7 @@ def gap_between(
             seed=seed,
             tell=tell,
             results=results,
+            at_its_pace=calibration is None or not calibration.step_s,
         )
     parts = None
     if why and calibration is not None:

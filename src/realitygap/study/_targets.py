@@ -75,7 +75,13 @@ def open_target(
 
 def observations_head(target: Target, observe: Observe, robot: str = DEFAULT_ROBOT) -> ObservationsHead:
     """What a file of trials of a target begins with."""
-    return ObservationsHead(target.name, target.label, robot, target.arena.to_dict(), target.step_s, observe)
+    arena = target.arena.to_dict()
+    return ObservationsHead(target.name, target.label, robot, arena, target.step_s, observe, target.identity)
+
+
+def steps_as_a_robot(target: Target) -> bool:
+    """Whether a step of a target lasts as long as a robot's command; Jyro's is its own, of 0.1 s at 1 m/s."""
+    return not (isinstance(target, SimTarget) and isinstance(target.platform, JyroPlatform))
 
 
 def _witness(port: str, address: str | None) -> Attendant:

@@ -10,12 +10,14 @@ from typing import Any
 
 from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, write_whole
+from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
+from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target
 
 from ._file import load_study
 from ._study import Study
+from ._targets import steps_as_a_robot
 from ._transfer_attempt import Attempt, Simulation, plans_of
 from ._transfer_calibrated import Calibrating, calibrated, posterior
 from ._transfer_direct import direct
@@ -55,6 +57,7 @@ class TransferPlan:
         condition: Of the study.
         settings: Of that condition, as resolved.
         target: Its name.
+        identity: What tells it from others whatever its name; empty where only the name does.
         budgets: Trials on the target, one transfer each.
         replicates: Times that everything is done, each with evolution of its own.
         fresh_trials: Of each champion.
@@ -69,6 +72,7 @@ class TransferPlan:
     condition: str
     settings: dict[str, Any]
     target: str
+    identity: str
     budgets: tuple[int, ...]
     replicates: int = 1
     fresh_trials: int = 20
@@ -99,7 +103,8 @@ def transfer(
     """Evolve in simulation, spend a budget of trials on a target, and try what each strategy chose on fresh trials.
 
     All strategies have the same evolution in simulation: `runs` runs of the condition, every individual tried `repeats`
-    times. Every trial on the target is kept as it comes; the same call goes on where an interrupted one stopped.
+    times. Where the study does not say how long a command of `sim` lasts, it is as long as the target's. Every trial on
+    the target is kept as it comes; the same call goes on where an interrupted one stopped.
 
     Args:
         study: A study, its name or its file.
@@ -129,6 +134,7 @@ def transfer(
         condition="",
         settings={},
         target=target.name,
+        identity=target.identity,
         budgets=budgets,
         replicates=whole_number("replicates", replicates, 1, 1000),
         fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
@@ -138,7 +144,7 @@ def transfer(
         calibration="" if calibration is None else str(calibration),
         seed=whole_number("seed", seed, 0, 2**63 - 1),
     )
-    chosen = choose_condition(study, condition, plan.seed)
+    chosen = _at_the_pace_of(target, choose_condition(study, condition, plan.seed))
     plan = _with(plan, condition=chosen.name, settings=chosen.settings())
     names = strategy_names(strategies)
     folder = Path(out)
@@ -200,6 +206,18 @@ def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> 
     return chosen.model_copy(update={"seed": seed})
 
 
+def _at_the_pace_of(target: Target, condition: Condition) -> Condition:
+    """The condition with a robot whose commands last as long as the target's, unless it says itself how long."""
+    sim = condition.sim
+    if condition.platform != "sim" or sim.step_s or sim.robot.step_s == target.step_s:
+        return condition
+    if not steps_as_a_robot(target):
+        return condition
+    settings = {name: getattr(sim, name) for name in SimPlatform.model_fields}
+    settings["robot"] = sim.robot.model_copy(update={"step_s": target.step_s})
+    return condition.model_copy(update={"sim": SimPlatform(**settings)})
+
+
 @dataclass
 class _Work:
     """A transfer under way."""
@@ -258,8 +276,8 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
     path = folder / "transfer.json"
     if path.exists():
         there = json.loads(path.read_text("utf-8"))
-        extends = ("replicates", "budgets", "fresh_trials")
         now = json.loads(json.dumps(asdict(plan)))
+        extends = ("replicates", "budgets", "fresh_trials", not_compared(there, now))
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
         if different:
             shown = "; ".join(

@@ -33,6 +33,7 @@ class KeptTarget:
         self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
     ) -> None:
         self.name, self.label, self.arena = target.name, target.label, target.arena
+        self.identity = target.identity
         self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
         self.budget = budget
         self.spent = 0

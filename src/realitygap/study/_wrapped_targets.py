@@ -42,6 +42,7 @@ class _Around:
     def __init__(self, target: Target) -> None:
         self.target = target
         self.name, self.label, self.arena = target.name, target.label, target.arena
+        self.identity = target.identity
         self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
 
     def carry_out(

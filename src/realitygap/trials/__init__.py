@@ -2,6 +2,7 @@
 
 from ._attendant import Attendant, RobotsOwnSenses, WitnessAttendant
 from ._batch import (
+    REAL,
     NoiseKey,
     PlatformTrials,
     Trajectory,
@@ -11,6 +12,7 @@ from ._batch import (
     poses_of,
 )
 from ._carry_out import Onlooker, TrialStopped, carry_out_on_robot
+from ._draws import Draws
 from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
@@ -22,7 +24,7 @@ from ._preflight import Preflight, preflight
 from ._processors import usable_processors
 from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
-from ._sim import SimTrials
+from ._sim import SimTrials, sim_rules
 from ._sim_robot import SimRobot
 from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
@@ -32,12 +34,14 @@ from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
-from ._twin_trials import close_twins
+from ._twin_trials import close_twins, release_twins
 
 __all__ = [
     "PATH_PARTS",
+    "REAL",
     "Attendant",
     "Card",
+    "Draws",
     "DrivenTrial",
     "EndReason",
     "JyroRobot",
@@ -85,7 +89,9 @@ __all__ = [
     "paper_inputs",
     "poses_of",
     "preflight",
+    "release_twins",
     "retry_genomes",
+    "sim_rules",
     "sim_scene",
     "simulate_case",
     "simulate_file",

@@ -31,9 +31,11 @@ class Attendant(Onlooker, Protocol):
 
     Attributes:
         observes: The most that can be seen with it.
+        identity: Of the robot that was met, as `Target.identity`.
     """
 
     observes: Observe
+    identity: str
 
     def meet(self, robot: Robot, arena: Arena) -> Clock:
         """A robot was opened; the clock by which its commands are timed.
@@ -50,6 +52,8 @@ class Attendant(Onlooker, Protocol):
 
 class RobotsOwnSenses:
     """What a Scribbler says of itself beyond its observations: its battery and, an S2, its encoders."""
+
+    identity = ""
 
     def __init__(self) -> None:
         self._robot: Any = None
@@ -120,6 +124,7 @@ class WitnessAttendant(RobotsOwnSenses):
                 "address of one's witness, HOST:PORT (realitygap emulate --witness PORT)."
             )
         self._witness: Witness = found
+        self.identity = found.identity()
         refuse_other_arena(found.arena(), arena)
         clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
         return clock if own is not None else WitnessClock(found, clock)

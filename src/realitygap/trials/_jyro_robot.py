@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
-from realitygap.errors import RobotError
 from realitygap.kernels._fleet import make_fleet, read_robots, start_robots, step_robots
-from realitygap.robots import STEP_S, Command, JyroPlatform, Label, Observation, check_command
+from realitygap.robots import STEP_S, Command, JyroPlatform, Label, Observation, ProgramRobot, check_command
 from realitygap.world import Arena, Pose, paper_arena
 
 from ._batch import NoiseKey, counters_of, poses_of
 from ._jyro import jyro_rules, jyro_scene
 
 
-class JyroRobot:
+class JyroRobot(ProgramRobot):
     """The paper's simulated Scribbler, one command at a time.
 
     A controller that answers each observation drives the very trial that `try_genomes` gives its genome with the same
@@ -57,7 +54,6 @@ class JyroRobot:
         self.noise_key = noise_key or NoiseKey(0)
         self.n_sensors = len(self.platform.sensors.mounts)
         self._rules = jyro_rules(self.platform, noise=noise, bias_input=False, bias_value=1.0)
-        self._is_open = True
         self._begin(self.arena)
 
     def _begin(self, arena: Arena) -> None:
@@ -92,25 +88,6 @@ class JyroRobot:
         given = np.array([check_command(command)], np.float64)
         step_robots(self._scene, self._fleet, given, self._cells, self._counts)
         self.n_steps += 1
-
-    def stop(self) -> None:
-        """Nothing to do: it moves only while a command lasts."""
-
-    def close(self) -> None:
-        """Let go of it; safe to call twice."""
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RobotError("This simulated robot is closed: make a new one.")
 
     @property
     def pose(self) -> Pose:

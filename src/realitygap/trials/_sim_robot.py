@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from realitygap.evolution import NeatSettings
 from realitygap.kernels._lanes import LANES
 from realitygap.kernels._sim_crowd import begin_sim, look_sim, move_sim
 from realitygap.kernels._sim_lanes import make_sim_room
-from realitygap.robots import Command, Label, Observation, SimPlatform, check_command
+from realitygap.robots import Command, Label, Observation, ProgramRobot, SimPlatform, check_command
 from realitygap.world import Arena, Pose, paper_arena
 
 from ._batch import REAL, NoiseKey, counters_of, poses_of
@@ -27,7 +26,7 @@ from ._sim_scene import sim_scene
 T = TypeVar("T")
 
 
-class SimRobot:
+class SimRobot(ProgramRobot):
     """A robot of a file, simulated, one command at a time.
 
     It is stepped by the kernels that try whole populations: a controller that answers each observation drives the very
@@ -69,7 +68,6 @@ class SimRobot:
         self._dtype = REAL[self.platform.precision]
         # Networks are not asked here: the least one will do.
         self._neat = NeatSettings.named("default").rules(1, 2)
-        self._is_open = True
         self._begin(self.platform, self.arena)
 
     def _begin(self, platform: SimPlatform, arena: Arena) -> None:
@@ -110,25 +108,6 @@ class SimRobot:
         move_sim(shape, rules, self._key, room, self._cells, self.n_steps, self._commands)
         self.n_steps += 1
         look_sim(shape, rules, self._key, room, self.n_steps)
-
-    def stop(self) -> None:
-        """Nothing to do: it moves only while a command lasts."""
-
-    def close(self) -> None:
-        """Let go of it; safe to call twice."""
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RobotError("This simulated robot is closed: make a new one.")
 
     @property
     def sensors(self) -> tuple[str, ...]:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Point
-from realitygap.errors import RobotError
 from realitygap.kernels import _sim_crowd as crowd
 from realitygap.kernels._lanes import LANES
 from realitygap.kernels._sim_lanes import make_sim_room
-from realitygap.robots import Command, Label, Observation, SimPlatform, check_command
+from realitygap.robots import Command, Label, Observation, ProgramRobot, SimPlatform, check_command
 from realitygap.world import Arena, Obstacle, Pose, RobotModel
 
 from ._batch import REAL, NoiseKey, counters_of
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
 _NO_INPUTS = ("time",)  # no network looks at what a driven robot sees
 
 
-class SimWorldRobot:
+class SimWorldRobot(ProgramRobot):
     """One robot of a `SimWorld`, made by `SimWorld.add`; also a robot under the contract that a physical one meets.
 
     Under the contract `drive` is a command and one step of the whole world, and `reset` is one of the whole world.
@@ -69,7 +67,6 @@ class SimWorldRobot:
         self.model = _drawn(platform.model, noise_key)
         self.n_sensors = len(self.model.range)
         self.command = Command(0.0, 0.0)
-        self._is_open = True
 
     # -- what it is told --------------------------------------------------------------------------------------
 
@@ -150,23 +147,6 @@ class SimWorldRobot:
     def stop(self) -> None:
         """Tell it to stand from the next step on."""
         self.command = Command(0.0, 0.0)
-
-    def close(self) -> None:
-        """Stop it and let go of it; safe to call twice."""
-        self.stop()
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RobotError("This simulated robot is closed: make a new one.")
 
     # -- what the world asks ----------------------------------------------------------------------------------
 

@@ -43,6 +43,8 @@ class Target(Protocol):
 
     Attributes:
         name: As the user named it, such as `twin:worn-1.toml`.
+        identity: What tells it from others whatever it is called: equal where it is the same twin or emulated robot.
+            Empty where only the name does.
         label: What figures of its trials say.
         arena: Where.
         step_s: How long one command lasts [s].
@@ -51,6 +53,7 @@ class Target(Protocol):
     """
 
     name: str
+    identity: str
     label: Label
     arena: Arena
     step_s: float

@@ -131,6 +131,7 @@ class RobotTarget:
         self.label: Label = robot.label
         self.n_sensors = robot.n_sensors
         self.observes: Observe = attendant.observes
+        self.identity = attendant.identity
 
     def _ready(self) -> PacedRobot:
         """The robot, opened where it is not."""

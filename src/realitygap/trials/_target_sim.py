@@ -48,6 +48,7 @@ class SimTarget:
         name: As the user named it; the platform's when not given.
     """
 
+    identity = ""
     label: Label = "SIM"
     observes: Observe = "track"
 
@@ -81,6 +82,17 @@ class SimTarget:
                 if tell is not None:
                     tell(len(trials) - 1, trial)
         return trials
+
+    def lasting(self, step_s: float) -> SimTarget:
+        """The same with commands of another length [s].
+
+        Raises:
+            ValueError: It is `jyro`, whose step is always the same.
+        """
+        if not isinstance(self.platform, SimPlatform):
+            raise ValueError(f"A step of {self.name} lasts {self.step_s:g} s, and no other time.")
+        platform = self.platform.model_copy(update={"step_s": step_s})
+        return SimTarget(platform, self.arena, self.noise, key=self.key, name=self.name)
 
     def close(self) -> None:
         """Nothing is held."""

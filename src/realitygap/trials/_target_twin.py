@@ -44,6 +44,7 @@ class TwinTarget:
         self._pool = TwinPool(file, arena, processes)
         self.step_s = self._pool.step_s
         self.n_sensors = self._pool.n_sensors
+        self.identity = f"twin {self.sha256}"
 
     @property
     def pids(self) -> tuple[int, ...]:

@@ -23,7 +23,7 @@ from ._batch import TrialBatch, Tried
 from ._twin_pool import TwinPool
 
 _pools: weakref.WeakValueDictionary[tuple[str, str, Arena], TwinPool] = weakref.WeakValueDictionary()
-_last: list[TwinPool] = []  # the one used last is kept: the next chunk wants it, too
+_last: list[TwinPool] = []  # the one used last is kept: the next chunk or trial wants it, too
 _lock = threading.Lock()
 
 
@@ -125,6 +125,12 @@ def _number(key: int, counter: NDArray[np.uint32]) -> int:
     """The number of a trial on a twin, a function of what other platforms draw their random numbers by."""
     text = ":".join(map(str, (key, *counter.tolist())))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")
+
+
+def release_twins() -> None:
+    """Keep no twin for the next trials: the processes of those that nobody else uses end."""
+    with _lock:
+        _last.clear()
 
 
 def close_twins() -> None:

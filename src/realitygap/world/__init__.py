@@ -11,6 +11,7 @@ from ._arena_file import ArenaFile
 from ._calibration import Calibration, Fitted
 from ._case import Case
 from ._distribution import Distribution
+from ._drawn_places import check_drawn_starts
 from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_calibration, load_robot, read_calibration, robot_names
 from ._obstacle import Goal, Light, Obstacle
@@ -49,6 +50,7 @@ __all__ = [
     "RobotModel",
     "arena_names",
     "arena_picture",
+    "check_drawn_starts",
     "check_start",
     "floor_shapes",
     "goal_shapes",

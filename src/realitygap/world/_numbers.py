@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from realitygap.errors import did_you_mean
-from realitygap.settings import Settings
+from realitygap.settings import Settings, table_in
 
 from ._distribution import KINDS, Distribution
 from ._units import INCH
@@ -85,17 +85,32 @@ class Described(Settings):
     def _takes_distributions(cls, values: Any) -> Any:
         if not isinstance(values, Mapping):
             return values
-        plain, vary = _split(in_si(values))
+        plain, vary = _split(in_si(values), cls)
         return plain | ({"vary": vary | dict(plain.get("vary", {}))} if vary else {})
 
     @model_validator(mode="after")
     def _varies_within_limits(self) -> Self:
         numbers = dict(_walk(self))
+        problems = []
         for name, drawn in list(self.vary.items()):
             if name not in numbers:
-                raise ValueError(f"{name}: no number of this name. {did_you_mean(name, numbers)}".rstrip("."))
-            self.vary[name] = _limited(name, drawn, numbers[name][1])
+                problems.append(self._why_no_number(name, numbers).rstrip("."))
+                continue
+            try:
+                self.vary[name] = _limited(name, drawn, numbers[name][1])
+            except ValueError as error:
+                problems.append(str(error))
+        if problems:
+            raise ValueError("\n".join(problems))
         return self
+
+    @classmethod
+    def _why_no_number(cls, name: str, known: Iterable[str]) -> str:
+        if _is_fixed(cls, name.split(".")):
+            return (
+                f"{name}: the same in all trials, and no number that has a name. Give its value in the file."
+            )
+        return f"{name}: no number of this name. {did_you_mean(name, known)}"
 
     def numbers(self) -> dict[str, float | Distribution]:
         """Every number by its dotted name, in the order of the description."""
@@ -115,20 +130,31 @@ class Described(Settings):
             ValueError: There is no such number, or it cannot be this; every mistake.
         """
         known = dict(_walk(self))
-        unknown = [name for name in values if name not in known]
-        if unknown:
-            raise ValueError(
-                "\n".join(f"{name}: no number of this name. {did_you_mean(name, known)}" for name in unknown)
-            )
+        problems = []
         tree = self.to_dict()
         vary = tree.pop("vary", {})
         for name, value in values.items():
-            drawn = _distribution(name, value) if isinstance(value, Mapping) else value
+            if name not in known:
+                problems.append(self._why_no_number(name, known))
+                continue
+            try:
+                drawn = _distribution(name, value) if isinstance(value, Mapping) else value
+                if isinstance(drawn, Distribution):
+                    drawn = _limited(name, drawn, known[name][1])
+            except ValueError as error:
+                problems.append(f"{error}.")
+                continue
             vary.pop(name, None)
             if isinstance(drawn, Distribution):
                 vary[name], drawn = drawn, drawn.center
             _set(tree, name.split("."), drawn)
-        return type(self)(**tree, vary=vary)
+        try:
+            made = type(self)(**tree, vary=vary)
+        except ValueError as error:
+            problems += str(error).split("\n")
+        if problems:
+            raise ValueError("\n".join(problems))
+        return made
 
     def to_dict(self) -> dict[str, Any]:
         """The description as plain values; `from_dict` makes it again."""
@@ -170,6 +196,16 @@ def _walk(model: Settings, place: str = "") -> Iterator[tuple[str, tuple[float, 
             for k, part in enumerate(value):
                 if isinstance(part, Settings):
                     yield from _walk(part, f"{place}{key}.{k}.")
+
+
+def _is_fixed(model: type[BaseModel], path: Sequence[str]) -> bool:
+    """Whether a dotted name is that of a setting, or of a table of them, which is the same in all trials."""
+    field = model.model_fields.get(path[0]) if path else None
+    if field is None:
+        return False
+    inner, is_list = table_in(field.annotation)
+    rest = path[2:] if is_list else path[1:]
+    return _is_fixed(inner, rest) if inner is not None and rest else NUMBER not in field.metadata
 
 
 def _limits(metadata: list[Any]) -> Limits:
@@ -269,8 +305,12 @@ def _converted(value: Any, unit: str) -> Any:
     return value
 
 
-def _split(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Distribution]]:
+def _split(
+    values: Mapping[str, Any], model: type[BaseModel]
+) -> tuple[dict[str, Any], dict[str, Distribution]]:
     """Values with every distribution replaced by its center, and the distributions by dotted name.
+
+    One in the place of what is the same in all trials stays, and its field says what it expects.
 
     Raises:
         ValueError: A distribution is none; every mistake.
@@ -279,7 +319,10 @@ def _split(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Distrib
     problems: list[str] = []
 
     def plain(value: Any, place: str) -> Any:
-        if isinstance(value, Mapping) and set(value) & set(KINDS):
+        is_drawn = isinstance(value, Distribution) or (isinstance(value, Mapping) and set(value) & set(KINDS))
+        if is_drawn and _is_fixed(model, place.split(".")):
+            return value
+        if is_drawn and isinstance(value, Mapping):
             try:
                 value = _distribution(place, value)
             except ValueError as error:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -12,11 +10,12 @@ from realitygap.errors import RobotError
 from realitygap.world import Pose
 
 from .._contract import Command, Label, Observation, check_command
+from .._in_program import ProgramRobot
 from ._range import RangeSensor
 from ._robot import SceneRobot
 
 
-class DrivenRobot:
+class DrivenRobot(ProgramRobot):
     """One robot of a world as a controller drives it; the others follow their brains or their last command.
 
     | command | least | most | unit |
@@ -54,7 +53,6 @@ class DrivenRobot:
         self.sensors = [sensor for sensor in given if isinstance(sensor, RangeSensor)]
         self.n_sensors = sum(len(sensor) for sensor in self.sensors)
         self.step_s = self.world.step_s
-        self._is_open = True
         if not self.n_sensors:
             raise RobotError(
                 f"{robot.name} has no range sensor: give it one with robot.add(RangeSensor(...))."
@@ -84,20 +82,3 @@ class DrivenRobot:
     def stop(self) -> None:
         """Stop it."""
         self.robot.stop()
-
-    def close(self) -> None:
-        """Stop it and let go of it; safe to call twice."""
-        self.robot.stop()
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RobotError("This simulated robot is closed: make a new one.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections import deque
 
@@ -35,6 +36,7 @@ class TwinBody:
         arena: Where.
 
     Attributes:
+        identity: Equal where the twin is the same.
         pose: Of the pen; the heading is that of the end without the caster.
         stalled: Whether the caster rolls too little for what the wheels turn.
         rolls: Whether it still moves, or will, though the firmware asks for nothing.
@@ -51,6 +53,7 @@ class TwinBody:
                 "and cannot stand behind the emulator"
             )
         self.model = model
+        self.identity = f"twin {model.name} {hashlib.sha256(model.to_toml().encode()).hexdigest()[:16]}"
         self._physics = Physics(model, arena)
         self._number = 0
         self.place(arena.start)

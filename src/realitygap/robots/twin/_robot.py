@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.errors import RobotError, whole_number
+from realitygap.errors import whole_number
 from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.robots._in_program import ProgramRobot
 from realitygap.world import Arena, Pose
 
 from ._cells import cells_along
@@ -49,7 +48,7 @@ class TwinClock:
             self._wait(seconds)
 
 
-class TwinRobot:
+class TwinRobot(ProgramRobot):
     """A twin, one command at a time: pseudo-reality of the wheels, motors and sensors that its file describes.
 
     Everything is a function of the twin, the arena, the trial's number and the commands.
@@ -74,6 +73,7 @@ class TwinRobot:
     """
 
     label: Label = "TWIN"
+    _closed = "This twin is closed: make a new one."
 
     def __init__(self, model: TwinModel, arena: Arena, *, number: int = 0) -> None:
         if model.engine != "mujoco":
@@ -87,7 +87,6 @@ class TwinRobot:
         self.n_sensors = len(model.ir.mount)
         self.clock = TwinClock(self.wait)
         self._physics = Physics(model, arena)
-        self._is_open = True
         self.reset()
 
     @property
@@ -187,22 +186,6 @@ class TwinRobot:
             self._heard.clear()
             self._regulator.drive(0.0, 0.0)
             self._phase = 0
-
-    def close(self) -> None:
-        """Let go of it; safe to call twice."""
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _check_open(self) -> None:
-        if not self._is_open:
-            raise RobotError("This twin is closed: make a new one.")
 
     @property
     def pose(self) -> Pose:

@@ -1,0 +1,99 @@
+"""Robots of the platform `sim`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.evolution import NeatSettings
+from realitygap.kernels._lanes import LANES
+from realitygap.kernels._sim import start_sim, step_sim
+from realitygap.kernels._sim_lanes import make_sim_room
+from realitygap.robots import SimPlatform
+from realitygap.trials import REAL, Draws, NoiseKey, counters_of, poses_of, sim_rules, sim_scene
+from realitygap.world import Arena, check_drawn_starts
+
+from ._fleet import Array
+
+INPUTS = ("obstacle", "stall", "time")
+
+
+class SimFleet:
+    """A `Fleet` of a robot of a file, `LANES` robots in each call of the kernels.
+
+    Raises:
+        ValueError: The robot has no range sensor, or does not fit at the start.
+    """
+
+    def __init__(self, platform: SimPlatform, arena: Arena, noise: float, n: int) -> None:
+        self._scene = sim_scene(platform, arena, INPUTS, noise)
+        check_drawn_starts(self._scene.arena, self._scene.robot)
+        self.arena, self.n_steps = self._scene.arena, platform.steps
+        self._clip = platform.noisy_reading == "clip"
+        self._n, self._n_range = n, len(self._scene.robot.range)
+        self._rules = sim_rules(self._scene, 1.0)
+        self._draws = Draws(self._scene.numbers)
+        real = REAL[platform.precision]
+        neat = NeatSettings.named("default").rules(1, 2)  # networks are not asked here: the least one will do
+        self._blocks = [slice(first, min(first + LANES, n)) for first in range(0, n, LANES)]
+        self._rooms = [make_sim_room(self._scene.shape, neat, 1, real) for _ in self._blocks]
+        self._commands = np.zeros((2, LANES), real)
+        self.cells = np.zeros((n, arena.grid.n_cells), np.uint8)
+        self._step = 0
+
+    @property
+    def counts(self) -> NDArray[np.int32]:
+        """As `Fleet.counts`."""
+        line = self._gathered([room.lanes.n_line[None] for room in self._rooms])
+        ends = self._gathered([np.bitwise_count(room.lanes.ends) for room in self._rooms])
+        return np.stack([line[:, 0], ends.sum(axis=1)], axis=1).astype(np.int32)
+
+    def bounds(self) -> NDArray[Any]:
+        """As `Fleet.bounds`: a linear response and what is added to it has no limits unless the platform clips it."""
+        is_open = not self._clip and any(sensor.response == "linear" for sensor in self._scene.robot.range)
+        return np.array([-math.inf, math.inf] if is_open else [0.0, 1.0])
+
+    def start(self, key: NoiseKey) -> None:
+        """As `Fleet.start`."""
+        self._key, self._step = np.uint64(key.key), 0
+        counters = counters_of(key, self._n)
+        drawn = self._draws.draw(key.key, counters)
+        shape = self._scene.shape
+        for block, room in zip(self._blocks, self._rooms, strict=True):
+            values = dict(zip(self._draws.names, drawn[block].T, strict=True))
+            table = self._scene.table({**self._scene.fixed, **values})
+            n = block.stop - block.start
+            start_sim(shape, table, self._rules, self._key, counters[block], n, room, self.cells[block])
+
+    def step(self, commands: Array) -> None:
+        """As `Fleet.step`."""
+        commands = np.clip(np.where(np.isnan(commands), 0.0, commands), -1.0, 1.0)
+        for block, room in zip(self._blocks, self._rooms, strict=True):
+            n = block.stop - block.start
+            self._commands[:, :n] = commands[block].T
+            step_sim(
+                self._scene.shape, self._rules, self._key, n, room, self.cells[block], self._step, self._commands
+            )  # fmt: skip
+        self._step += 1
+
+    def observe(self) -> Array:
+        """As `Fleet.observe`."""
+        real = self._commands.dtype.type
+        stalled = self._gathered([room.lanes.stalled[None] for room in self._rooms])
+        readings = self._gathered([room.lanes.readings[: self._n_range] for room in self._rooms])
+        obstacle = readings.max(axis=1, keepdims=True)
+        time = np.full((self._n, 1), real(self._step) / real(self.n_steps), np.float64)
+        return np.concatenate([obstacle, stalled, time], axis=1)
+
+    def facts(self) -> dict[str, Array]:
+        """As `Fleet.facts`."""
+        poses = [np.stack(room.lanes.pose[:3]) for room in self._rooms]
+        near = [room.lanes.senses.near[: self._n_range] for room in self._rooms]
+        return {"pose": poses_of(self._gathered(poses), self.arena.start), "readings": self._gathered(near)}
+
+    def _gathered(self, blocks: list[NDArray[Any]]) -> Array:
+        """(m, LANES) numbers of each block as (n, m)."""
+        return np.concatenate(blocks, axis=1)[:, : self._n].T.astype(np.float64)

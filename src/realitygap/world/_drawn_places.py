@@ -1,0 +1,55 @@
+"""Where trials may begin, and what may stand there, where an arena's numbers are drawn."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from ._arena import Arena
+from ._placing import check_start
+from ._robot import Body
+from ._robot_model import RobotModel
+
+START = "arena.start."
+PLACES = (START, "arena.obstacle.", "arena.wall.")
+"""What the names of numbers begin with that can bring a robot's start and something solid together."""
+
+N_DRAWN = 64
+"""Draws that are looked at beside the ends: what goes wrong in one trial of twenty stays unseen in one of 25 arenas."""
+
+TOP = 1.0 - 2.0**-32
+"""The largest of the random numbers that draws are made of."""
+
+
+def check_drawn_starts(arena: Arena, robot: Body | RobotModel) -> None:
+    """Refuse an arena in which the robot would not fit at the start for some of what is drawn.
+
+    Looked at are the ends of what is drawn of the start, and some draws of all that moves it, obstacles or walls.
+
+    Raises:
+        ValueError: As `check_start`, with what was drawn.
+    """
+    places = {name: drawn for name, drawn in arena.vary.items() if name.startswith(PLACES)}
+    if not places:
+        check_start(arena, robot)
+        return
+    words = {name: drawn.together or name for name, drawn in places.items()}
+    for row in _rows(words):
+        values = {name: float(drawn.of(np.array(row[words[name]]))) for name, drawn in places.items()}
+        try:
+            check_start(arena.with_numbers(values), robot)
+        except ValueError as error:
+            said = ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+            raise ValueError(f"{str(error).removeprefix('ArenaFile: ')} Drawn: {said}") from None
+
+
+def _rows(words: dict[str, str]) -> Iterator[dict[str, float]]:
+    """Uniform random numbers by the word that numbers are drawn by: the ends of the start, then draws of all."""
+    every = list(dict.fromkeys(words.values()))
+    ends = list(dict.fromkeys(word for name, word in words.items() if name.startswith(START)))
+    for corner in itertools.product((0.0, TOP), repeat=len(ends)):
+        yield dict.fromkeys(every, 0.5) | dict(zip(ends, corner, strict=True))
+    for row in np.random.default_rng(1).random((N_DRAWN, len(every))):
+        yield dict(zip(every, row.tolist(), strict=True))

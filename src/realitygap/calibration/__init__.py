@@ -1,6 +1,6 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
-from ._abc import Effort, Posterior, fit_all
+from ._abc import Effort, Posterior, fit_all, mixed
 from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
 from ._contact_plans import contact_plans
@@ -52,6 +52,7 @@ __all__ = [
     "independence",
     "information_of",
     "misfits",
+    "mixed",
     "motion_plans",
     "moved_in",
     "next_trials",

@@ -116,6 +116,14 @@ def fit_all(
     return Posterior(keep, values_of(prior, keep), off, n_simulated)
 
 
+def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter]) -> Posterior:
+    """Draws of two posteriors by turns, as many of each."""
+    n = min(len(one.places), len(other.places))
+    places = np.stack([one.places[:n], other.places[:n]], axis=1).reshape(2 * n, -1)
+    off = (one.off + other.off) / 2
+    return Posterior(places, values_of(prior, places), off, one.n_simulated + other.n_simulated)
+
+
 def _groups(prior: Sequence[Parameter]) -> list[NDArray[np.int64]]:
     """Sensors apart from all else: what they answer somewhere has nothing to do with how the robot gets there."""
     of_sensors = np.array([parameter.name.startswith("range.") for parameter in prior])
@@ -199,4 +207,4 @@ def _next_box(draws: Floats) -> tuple[Floats, Floats]:
     return np.maximum(low - margin, -END), np.minimum(high + margin, END)
 
 
-__all__ = ["Compression", "Effort", "Posterior", "Simulate", "fit_all"]
+__all__ = ["Compression", "Effort", "Posterior", "Simulate", "fit_all", "mixed"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -22,6 +23,7 @@ from realitygap.calibration import (
     fit_from_poses,
     information_of,
     misfits,
+    mixed,
     next_trials,
     numbers_of,
     random_controllers,
@@ -41,7 +43,8 @@ from ._calibrate_kinds import Parts
 
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
-    "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002)."
+    "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002). "
+    "With poses, half of the draws are from likelihoods of single commands (multiple shooting, Bock 1983)."
 )
 STEPS = 100  # of a trial
 IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
@@ -178,11 +181,22 @@ class _Fit:
         return evidence_of(trials, genomes, self.arena.grid.n_cells)
 
     def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+        """What is left of the prior.
+
+        With poses it is half that of single commands and half that of whole trials as seen without poses: where `sim`
+        cannot make both, the first knows how the robot moves and the second what comes of it, and draws of both
+        predict controllers better than either.
+        """
         told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
-        if told and all(trial.observe == "track" for trial in told):
-            return fit_from_poses(
-                told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
-            )
+        if not told or any(trial.observe != "track" for trial in told):
+            return self._posterior_of_trials(trials, effort)
+        of_commands = fit_from_poses(
+            told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
+        )
+        blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
+        return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior)
+
+    def _posterior_of_trials(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
         return fit_all(
             self.evidence(trials), self.simulate, self.prior, self.robot,
             seed=self.seed, effort=effort, tell=self.tell,

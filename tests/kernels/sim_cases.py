@@ -36,6 +36,7 @@ class Driven(NamedTuple):
     stalled: NDArray[np.bool_]  # (t + 1, n)
     wheels: NDArray[np.float64]  # (t + 1, n, 2)
     distances: NDArray[np.float64]  # (t + 1, n, rays)
+    cosines: NDArray[np.float64]  # (t + 1, n, rays) between rays and the normals of what they meet
 
 
 def outline(corners: Sequence[tuple[float, float]], prefix: str = "body.0") -> dict[str, Number]:
@@ -93,7 +94,7 @@ def drive_robots(
     counters[:, 0] = (np.arange(n) + first) << 8 | 1
     cells = np.zeros((n, 1), np.uint8)
     lanes = space.lanes
-    seen: list[list[NDArray[Any]]] = [[], [], [], []]
+    seen: list[list[NDArray[Any]]] = [[], [], [], [], []]
 
     def keep() -> None:
         pose = lanes.pose
@@ -101,6 +102,7 @@ def drive_robots(
         seen[1].append(lanes.stalled[:n] > 0)
         seen[2].append(lanes.wheels.T[:n].astype(np.float64))
         seen[3].append(lanes.distances.T[:n].astype(np.float64))
+        seen[4].append(lanes.rates.T[:n].astype(np.float64))
 
     start_sim(shape, table, rules, np.uint64(key), counters, n, space, cells)
     keep()

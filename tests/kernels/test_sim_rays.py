@@ -36,6 +36,16 @@ def far(x: float, y: float, angle: float, things: list[Any]) -> float:
     return min(gone, REACH)
 
 
+def cosine(x: float, y: float, angle: float, gone: float, things: list[Any]) -> float:
+    """How fast what is nearest comes nearer, along a ray, where it is met."""
+
+    def gap(way: float) -> float:
+        at = (x + way * math.cos(angle), y + way * math.sin(angle))
+        return min(reference.gap(at, corners, radius) for corners, radius in things)
+
+    return (gap(gone - 2e-5) - gap(gone - 1e-5)) / 1e-5
+
+
 @pytest.mark.parametrize("enclosed", [True, False])
 def test_rays_of_a_cone_end_where_the_reference_meets_something(enclosed: bool) -> None:
     rng = np.random.default_rng(1)
@@ -74,4 +84,10 @@ def test_rays_of_a_cone_end_where_the_reference_meets_something(enclosed: bool) 
                 angle = heading + direction + (ray - 1) * CONE
                 seen.append(far(x + c * a - s * b, y + s * a + c * b, angle, things))
                 assert driven.distances[0, k, 3 * sensor + ray] == pytest.approx(seen[-1], abs=1e-6)
+                found = driven.cosines[0, k, 3 * sensor + ray]
+                if seen[-1] < REACH:
+                    from_x, from_y = x + c * a - s * b, y + s * a + c * b
+                    assert found == pytest.approx(cosine(from_x, from_y, angle, seen[-1], things), abs=2e-3)
+                else:
+                    assert found == 1.0
     assert 0.5 < np.mean(np.array(seen) < REACH) < 0.99

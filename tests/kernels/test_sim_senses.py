@@ -49,6 +49,7 @@ def numbers_of(rng: np.random.Generator) -> Numbers:
         "reach": (0.4, 0.8), "amplitude": (0.5, 2.0), "decay": (0.05, 0.3), "noise_uniform": (0.0, 0.1),
         "noise_gain": (0.0, 0.2), "drop_most": (0.0, 0.6), "drop_at": (0.1, 0.4), "drop_width": (0.02, 0.1),
         "outlier_most": (0.0, 0.4), "outlier_at": (0.1, 0.4), "outlier_width": (0.02, 0.1), "burst": (0.0, 1.0),
+        "incidence": (0.0, 0.0),
     }  # fmt: skip
     numbers = {
         f"range.{s}.{name}": rng.uniform(*span, LANES)
@@ -88,7 +89,8 @@ class Block:
         self.lanes.counters[2] = 3
         _sim_senses.start_senses(shape, self.rules, self.lanes)
 
-    def readings(self, pose: Any, distances: np.ndarray, step: int) -> np.ndarray:
+    def readings(self, pose: Any, distances: np.ndarray, step: int, cosines: Any = 1.0) -> np.ndarray:
+        self.lanes.rates[:] = cosines
         for ours, given in zip(self.lanes.pose, poses(*pose, self.lanes.low.dtype.type), strict=True):
             ours[:] = given
         self.lanes.distances[:] = distances
@@ -120,14 +122,18 @@ class Plain:
         left, more = first & 0x7FF, spare >> 10 * place & 0x3FF
         return first, left << 21 | more << 11 | left
 
-    def range(self, s: int, rays: Any) -> float:
+    def range(self, s: int, rays: Any, cosines: Any) -> float:
         kind = RESPONSES[s]
+        k, reach, decay = (self.number(f"range.{s}.{name}") for name in ("incidence", "reach", "decay"))
+        far = min(rays)
+        if kind in ("ir", "pulses"):
+            far = reference.dim_distance(rays, cosines, reach, decay, k)
         of = {name: self.number(f"range.{s}.{name}") for name in (
             "reach", "amplitude", "decay", "noise_gain", "burst", "noise_uniform"
         )}  # fmt: skip
         nothing, anything = (
             reference.logistic(
-                min(rays), *(self.number(f"range.{s}.{kind}_{name}") for name in ("most", "at", "width"))
+                far, *(self.number(f"range.{s}.{kind}_{name}") for name in ("most", "at", "width"))
             )
             for kind in ("drop", "outlier")
         )
@@ -140,7 +146,8 @@ class Plain:
             ]
             reading = reference.table(min(rays), entries)
         else:
-            reading = reference.infrared(rays, of["reach"], of["amplitude"], of["decay"])
+            factors = reference.at_a_slant(cosines, k)
+            reading = of["amplitude"] * reference.returned(rays, reach, decay, factors)
         if kind == "pulses":
             block = (self.step * len(RESPONSES) + s) * 2
             shared = (self.word(8, block, 0) >> 9) / 2**23 < of["burst"]
@@ -178,9 +185,12 @@ class Plain:
         return reference.limited(1 - bright) if k == 1 else float(bright < self.number(f"line.{k}.threshold"))
 
 
-def test_every_sensor_answers_what_its_own_words_say() -> None:
+@pytest.mark.parametrize("most_incidence", [0.0, 3.0])
+def test_every_sensor_answers_what_its_own_words_say(most_incidence: float) -> None:
     rng = np.random.default_rng(1)
     numbers = numbers_of(rng)
+    for s in range(len(RESPONSES)):
+        numbers[f"range.{s}.incidence"] = most_incidence * np.arange(LANES) / LANES
     block = Block(numbers)
     for step in [0, 1, 7, *range(100, 100 + cases(8, 1))]:
         x, y, heading = rng.uniform(-0.5, 0.5, (3, LANES)) * [[1], [1], [6]]
@@ -189,12 +199,14 @@ def test_every_sensor_answers_what_its_own_words_say() -> None:
             n = 1 if s in (0, 2) else 3
             reach = numbers[f"range.{s}.reach"]
             distances[first : first + n] = np.minimum(rng.uniform(0, 1.2, (n, LANES)) * reach, reach)
-        answer = block.readings((x, y, heading), distances, step)
+        cosines = rng.uniform(0.01, 1.0, (8, LANES))
+        answer = block.readings((x, y, heading), distances, step, cosines)
         for lane in range(0, LANES, 5):
             plain, pose = Plain(numbers, lane, step), (float(x[lane]), float(y[lane]), float(heading[lane]))
-            rays = distances[:, lane].tolist()
+            rays, slants = distances[:, lane].tolist(), cosines[:, lane].tolist()
+            parts = (slice(0, 1), slice(1, 4), slice(4, 5), slice(5, 8))
             wanted = [
-                *(plain.range(s, part) for s, part in enumerate((rays[:1], rays[1:4], rays[4:5], rays[5:]))),
+                *(plain.range(s, rays[part], slants[part]) for s, part in enumerate(parts)),
                 *(plain.light(k, pose) for k in range(2)),
                 *(plain.line(k, pose) for k in range(2)),
             ]

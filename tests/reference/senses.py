@@ -25,17 +25,34 @@ def linear(distances: Sequence[float], reach: float) -> float:
     return (reach - min(distances)) / reach
 
 
-def infrared(distances: Sequence[float], reach: float, amplitude: float, decay: float) -> float:
+def returned(distances: Sequence[float], reach: float, decay: float, factors: Sequence[float]) -> float:
     """Rays from one edge of the cone to the other; the lobe has half its power at the edges."""
     n = len(distances)
     angles = [0.0] if n == 1 else [2 * k / (n - 1) - 1 for k in range(n)]
     lobe = [1 - angle**2 / 2 for angle in angles]
     back = [
-        weight * math.exp(-d / decay)
-        for weight, d in zip(lobe, distances, strict=True)
+        weight * factor * math.exp(-d / decay)
+        for weight, d, factor in zip(lobe, distances, factors, strict=True)
         if d < reach and (decay > 0 or d == 0)
     ]
-    return amplitude * sum(back) / sum(lobe)
+    return sum(back) / sum(lobe)
+
+
+def infrared(distances: Sequence[float], reach: float, amplitude: float, decay: float) -> float:
+    return amplitude * returned(distances, reach, decay, [1.0] * len(distances))
+
+
+def at_a_slant(cosines: Sequence[float], incidence: float) -> list[float]:
+    return [c / (c + incidence * (1 - c)) for c in cosines]
+
+
+def dim_distance(
+    distances: Sequence[float], cosines: Sequence[float], reach: float, decay: float, incidence: float
+) -> float:
+    """Where what is nearest would send back as little if it were faced."""
+    faced = returned(distances, reach, decay, [1.0] * len(distances))
+    slanted = returned(distances, reach, decay, at_a_slant(cosines, incidence))
+    return min(distances) + (decay * math.log(faced / slanted) if slanted > 0 else 0.0)
 
 
 def table(distance: float, entries: Sequence[Point]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._compile import inlined, kernel, stage
-from ._lanes import LANES, Rows, Words, fill
+from ._lanes import LANES, Rows, Words, copy_row, fill
 from ._philox import (
     PURPOSE_ENCODER,
     PURPOSE_LIGHT,
@@ -180,6 +180,8 @@ def _respond(shape, lanes, senses):
         rays = lanes.distances[shape.first_ray[s] : shape.first_ray[s + 1]]
         near, reading = senses.near[s], lanes.readings[s]
         nearest_ray(rays, near)
+        if senses.slanted[0] > 0:
+            copy_row(near, senses.dim[s])
         kind = shape.range_response[s]
         if kind == LINEAR:
             linear_response(near, p[row + REACH], reading)

@@ -22,6 +22,15 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._tracked import (
+    TrackedTrial,
+    TrialToTrack,
+    keep_tracked,
+    place_trial,
+    score_tracked,
+    trial_of_file,
+    trial_of_ledger,
+)
 from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
@@ -56,9 +65,11 @@ __all__ = [
     "Study",
     "StudyResult",
     "StudySection",
+    "TrackedTrial",
     "TransferPlan",
     "TransferResult",
     "Transferred",
+    "TrialToTrack",
     "TrialsSection",
     "calibrate",
     "calibrate_all",
@@ -70,6 +81,7 @@ __all__ = [
     "drive_study",
     "estimate_mean",
     "gap_between",
+    "keep_tracked",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -82,6 +94,7 @@ __all__ = [
     "parse_study",
     "part_of",
     "pilot_spreads",
+    "place_trial",
     "plan_gap",
     "recorded_spreads",
     "refuse_port_without_robot",
@@ -89,12 +102,15 @@ __all__ = [
     "run_study",
     "sample_controllers",
     "save_calibration",
+    "score_tracked",
     "strategy_names",
     "study_gap",
     "study_template",
     "summarize_closing",
     "task_settings",
     "transfer",
+    "trial_of_file",
+    "trial_of_ledger",
     "try_on",
     "usable_processors",
     "why_gap",

@@ -29,7 +29,10 @@ class Seen(StrEnum):
 def gap(
     sim: Annotated[str, typer.Argument(metavar="SIM", help="The simulator: sim, sim:FILE or jyro.")],
     target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="twin:FILE, scribbler:PORT, sim, sim:FILE or jyro.")
+        str,
+        typer.Argument(
+            metavar="TARGET", help="twin:FILE, scribbler:PORT, recorded:FILE, sim, sim:FILE or jyro."
+        ),
     ],
     controllers: Annotated[
         str,
@@ -91,6 +94,8 @@ def gap(
     Example: realitygap gap sim jyro --n-controllers 10 --trials 5
 
     Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
+
+    Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
 
     In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
     """

@@ -42,6 +42,9 @@ TARGET_FROM = MOST_TRIALS * MOST_CONTROLLERS
 REEVOLVED_FROM = 2 * TARGET_FROM
 REPLAYED_FROM = 3 * TARGET_FROM
 
+STEPS = 100
+"""Commands in a trial."""
+
 REPLAYS = 4
 """How often the commands of a trial are replayed in simulation."""
 
@@ -121,6 +124,7 @@ def study_gap(
     seed: int = 1,
     tell: Tell | None = None,
     results: str | Path | None = None,
+    steps: int = STEPS,
 ) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
@@ -138,6 +142,7 @@ def study_gap(
         seed: Of the bootstrap.
         tell: Called as trials are done.
         results: A file where the target's trials are kept as they come; those in it are not carried out again.
+        steps: Commands in each trial.
 
     Raises:
         ValueError: A number is out of range, or so much cannot be seen.
@@ -150,8 +155,8 @@ def study_gap(
     if source.arena.grid != target.arena.grid:
         raise StudyError(f"{source.name} and {target.name} have different grids, expected the same arena.")
     seen = _as_much(observe, source)
-    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM)
-    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM)
+    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM, steps)
+    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM, steps)
     on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
@@ -181,10 +186,10 @@ def study_gap(
 # --- trials -------------------------------------------------------------------------------------------------
 
 
-def plans_of(genomes: Sequence[Genome], trials: int, first: int) -> list[TrialPlan]:
+def plans_of(genomes: Sequence[Genome], trials: int, first: int, steps: int = STEPS) -> list[TrialPlan]:
     """Round the controllers, again and again."""
     return [
-        TrialPlan(genome=genome, number=first + MOST_TRIALS * i + k)
+        TrialPlan(genome=genome, steps=steps, number=first + MOST_TRIALS * i + k)
         for k in range(trials)
         for i, genome in enumerate(genomes)
     ]

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 CORNERS_AT_FIRST = 10  # pictures in which the corner tags are looked for
 CORNERS_EVERY = 45  # pictures, later
-FAMILY_AFTER = 5  # pictures with the robot's tag settle its family
+FAMILY_AFTER = 3  # pictures with the robot's tag settle its family: small tags are also seen where none is
 MARGIN = 1.0  # sides of the tag around it, in which it is looked for next
 FASTEST = 1.5  # sides of the tag from one picture to the next, beyond what it moved before
 
@@ -96,6 +96,10 @@ class Tracker:
     _robot: list[Floats | None] = field(default_factory=list)
     _corners: dict[int, list[Floats]] = field(default_factory=dict)
     _size: tuple[int, int] = (0, 0)
+    _last: Floats | None = None
+    _last_number: int = 0
+    _moved: Floats = field(default_factory=lambda: np.zeros(2))
+    _was_just_seen: bool = False
 
     def __post_init__(self) -> None:
         """Make ready the detectors."""
@@ -125,30 +129,37 @@ class Tracker:
         gray = gray_of(image)
         self._size = (gray.shape[1], gray.shape[0])
         number = len(self._times)
+        found: Floats | None = None
         if number < CORNERS_AT_FIRST or number % CORNERS_EVERY == 0:
-            self._look_for_corners(gray)
-        found = self._look_nearby(gray) if self._robot and self._robot[-1] is not None else None
-        if found is None:
+            there = find_tags(gray, self._corner_detector)
+            self._keep_corners(there)
+            if self.corner_family in self._detectors:
+                found = there.get(self.tag.number)
+        if found is not None:
+            self._seen_of[self.corner_family] += 1
+        elif self._last is not None:
+            found = self._look_nearby(gray, self._last, number - self._last_number)
+        else:
             found = self._look_everywhere(gray)
+        if found is not None:
+            is_near = self._was_just_seen and self._last is not None
+            self._moved = (found - self._last).mean(axis=0) if is_near else np.zeros(2)  # type: ignore[operator]
+            self._last, self._last_number = found, number
+        self._was_just_seen = found is not None
         self._times.append(time)
         self._robot.append(found)
         return found
 
-    def _look_for_corners(self, gray: Image) -> None:
-        for number, corners in find_tags(gray, self._corner_detector).items():
+    def _keep_corners(self, there: Mapping[int, Floats]) -> None:
+        for number, corners in there.items():
             if number in CORNER_IDS:
                 self._corners.setdefault(number, []).append(corners)
 
-    def _look_nearby(self, gray: Image) -> Floats | None:
-        """Where it should be by now."""
-        last = self._robot[-1]
-        if last is None or not self.family:
-            return None
-        before = self._robot[-2] if len(self._robot) > 1 else None
-        moved = np.zeros(2) if before is None else (last - before).mean(axis=0)
-        expected = last + moved
+    def _look_nearby(self, gray: Image, last: Floats, n_pictures: int) -> Floats | None:
+        """Where it can be by now; the longer it was not seen, the farther away."""
+        expected = last + self._moved
         side = float(np.hypot(*(last - np.roll(last, 1, axis=0)).T).max())
-        room = (MARGIN + FASTEST) * side / 2 + float(np.hypot(*moved)) / 2
+        room = MARGIN * side / 2 + n_pictures * (FASTEST * side + float(np.hypot(*self._moved))) / 2
         low = np.maximum(np.floor(expected.min(axis=0) - room).astype(int), 0)
         high = np.minimum(np.ceil(expected.max(axis=0) + room).astype(int) + 1, gray.shape[::-1])
         if (high - low < 2 * side / 3).any():
@@ -158,16 +169,14 @@ class Tracker:
         return None if found is None else found + low
 
     def _look_everywhere(self, gray: Image) -> Floats | None:
-        is_settled = max(self._seen_of.values()) >= FAMILY_AFTER
-        names = [self.family] if is_settled else list(self._detectors)
-        found: Floats | None = None
-        for name in names:
-            corners = find_tags(gray, self._detectors[name]).get(self.tag.number)
-            if corners is not None:
-                self._seen_of[name] += 1
-                if name == self.family:
-                    found = corners
-        return found
+        """In all families, until one of them has shown it often enough."""
+        seen = {name: find_tags(gray, each).get(self.tag.number) for name, each in self._detectors.items()}
+        for name, corners in seen.items():
+            self._seen_of[name] += corners is not None
+        best = self.family
+        if not best or seen[best] is None:
+            return None
+        return seen[best] if self._seen_of[best] >= FAMILY_AFTER or len(self._detectors) == 1 else None
 
     def sightings(self) -> Sightings:
         """All that was seen so far."""

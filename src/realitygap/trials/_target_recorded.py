@@ -24,7 +24,9 @@ MOST_NUMBER = 2**63 - 1
 
 
 class RecordedTarget:
-    """The trials of controllers that a file holds; the k-th plan with a controller gets its k-th trial with as many steps.
+    """The trials of controllers that a file holds.
+
+    The k-th plan with a controller gets its k-th trial with as many steps.
 
     Trials that were cut off are left out; of several with one number and controller the last counts.
 
@@ -85,8 +87,8 @@ class RecordedTarget:
             ]
             if taken[genome] >= len(there):
                 raise RecordError(
-                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, and one more is asked "
-                    f"for; most of its trials have {self.steps} steps. Ask for fewer, or record more."
+                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, and one more is "
+                    f"asked for; most of its trials have {self.steps} steps. Ask for fewer, or record more."
                 )
             trial = _seen_as(there[taken[genome]], observe)
             taken[genome] += 1

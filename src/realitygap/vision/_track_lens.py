@@ -153,8 +153,11 @@ def fit_lens(images: Iterable[NDArray[np.uint8]], columns: int, rows: int, squar
         n += 1
         height, width = image.shape
         found, corners = cv2.findChessboardCornersSB(image, (columns, rows))
-        if found and (not views or np.abs(views[-1] - corners[:, 0]).mean() > LEAST_APART * width):
-            views.append(corners[:, 0].astype(np.float64))
+        if not found:
+            continue
+        view = np.asarray(corners, np.float64).reshape(-1, 2)
+        if not views or np.abs(views[-1] - view).mean() > LEAST_APART * width:
+            views.append(view)
         if len(views) == MOST_VIEWS:
             break
     if len(views) < LEAST_VIEWS:

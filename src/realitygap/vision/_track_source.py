@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from realitygap.errors import VisionError, from_extra
 Image = NDArray[np.uint8]
 
 USUAL_RATE = 30.0  # pictures a second, where a file does not say
+LOG_ERRORS = 2  # of OpenCV's levels
 CAMERA_SIZE = (1280, 720)  # asked for [px]; a camera gives what it has
 
 
@@ -39,6 +41,18 @@ class Source(Protocol):
     def close(self) -> None:
         """Let go of it."""
         ...
+
+
+def _capture(what: str | int) -> Any:
+    """OpenCV's capture, which says nothing by itself: what is wrong is told by us."""
+    cv2 = from_extra("cv2", "vision")
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET
+    before = cv2.getLogLevel()
+    cv2.setLogLevel(LOG_ERRORS)
+    try:
+        return cv2.VideoCapture(what)
+    finally:
+        cv2.setLogLevel(before)
 
 
 @dataclass
@@ -72,8 +86,7 @@ class VideoFile:
         self.rate = float(rate) if 1 <= rate <= 1000 else USUAL_RATE
 
     def _open(self) -> Any:
-        cv2 = from_extra("cv2", "vision")
-        return cv2.VideoCapture(str(self.path))
+        return _capture(str(self.path))
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
         """All pictures."""
@@ -109,7 +122,7 @@ class CameraDevice:
     def __init__(self, number: int, clock: Callable[[], float] = time.monotonic) -> None:
         cv2 = from_extra("cv2", "vision")
         self.name, self._clock = f"camera {number}", clock
-        self._capture = cv2.VideoCapture(number)
+        self._capture = _capture(number)
         self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, CAMERA_SIZE[0])
         self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, CAMERA_SIZE[1])
         is_read, image = self._capture.read() if self._capture.isOpened() else (False, None)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from realitygap.records import ScoreRole
     from realitygap.study import TrackedTrial, TrialToTrack
     from realitygap.vision import Marks, RobotTag, Source, Tracked
+    from realitygap.world import Arena
 
 _Tag = Annotated[
     str,
@@ -128,7 +129,7 @@ def track(
         raise StudyError(
             "--sheet says where the corner tags are. Leave --corner-size and --corner-inset out."
         )
-    marks = _marks(arena, wanted, _tag_of(tag, tag_size, tag_height, tag_at), lens, corner_size, corner_inset)
+    marks = _marks(arena, wanted, tag_of(tag, tag_size, tag_height, tag_at), lens, corner_size, corner_inset)
     _refuse_outputs(out, save_lens, overlay, into, camera)
     source = open_source(camera)
     found = _tracked(source, marks, seconds)
@@ -176,7 +177,7 @@ def print_tags(
         raise StudyError(f"{out} does not end in .pdf. Expected a name such as tags.pdf.")
     _refuse_folder(out)
     try:
-        n = write(out, _tag_of(tag, tag_size, 0.1, "0,0,0"), corner_size, paper)  # type: ignore[arg-type]
+        n = write(out, tag_of(tag, tag_size, 0.1, "0,0,0"), corner_size, paper)  # type: ignore[arg-type]
     except ValueError as error:
         raise StudyError(str(error)) from None
     typer.echo(f"Written: {out} ({n} pages)")
@@ -250,7 +251,12 @@ def _wanted(
     return trial_of_file(trials, trial)  # type: ignore[arg-type]
 
 
-def _tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
+def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
+    """The robot's tag by options: number or FAMILY:NUMBER, side [m], height [m], and AHEAD,LEFT,DEGREES.
+
+    Raises:
+        StudyError: One of them cannot be.
+    """
     from realitygap.errors import did_you_mean
     from realitygap.vision import FAMILIES, RobotTag
 
@@ -277,7 +283,6 @@ def _marks(
     corner_size: float | None,
     corner_inset: float | None,
 ) -> Marks:
-    from realitygap.vision import CORNER_SIZE_M, Marks, read_lens
     from realitygap.world import load_arena
 
     place = load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
@@ -285,10 +290,21 @@ def _marks(
         raise StudyError(
             f"The trial was in arena {wanted.arena.name!r}, and --arena is another. Leave it out."
         )
-    return Marks(
-        place, tag, None if lens is None else read_lens(lens),
-        CORNER_SIZE_M if corner_size is None else corner_size, corner_inset,
-    )  # fmt: skip
+    return marks_of(place, tag, lens, corner_size, corner_inset)
+
+
+def marks_of(
+    arena: Arena, tag: RobotTag, lens: Path | None, corner_size: float | None, corner_inset: float | None
+) -> Marks:
+    """What is known before a camera looks, by options.
+
+    Raises:
+        VisionError: The lens cannot be read.
+    """
+    from realitygap.vision import CORNER_SIZE_M, Marks, read_lens
+
+    known = None if lens is None else read_lens(lens)
+    return Marks(arena, tag, known, CORNER_SIZE_M if corner_size is None else corner_size, corner_inset)
 
 
 def _refuse_outputs(

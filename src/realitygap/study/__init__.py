@@ -3,6 +3,7 @@
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._calibrate_all import calibrate_all
+from ._camera_attendant import CameraAttendant
 from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
@@ -46,6 +47,7 @@ __all__ = [
     "SECTIONS",
     "SMALL",
     "STRATEGIES",
+    "CameraAttendant",
     "ClosingPlan",
     "ClosingProgress",
     "ConditionNotes",

@@ -7,6 +7,7 @@ from ._track import Track, cells_along, track_of
 from ._track_align import Beginning, find_beginning
 from ._track_camera import Camera, fit_camera
 from ._track_lens import Lens, fit_lens, read_lens
+from ._track_live import LiveTrack
 from ._track_overlay import draw_overlay, save_overlay
 from ._track_source import CameraDevice, Source, VideoFile, open_source
 from ._track_video import Marks, Tracked, track_video
@@ -20,6 +21,7 @@ __all__ = [
     "Camera",
     "CameraDevice",
     "Lens",
+    "LiveTrack",
     "Marks",
     "RobotTag",
     "Sightings",

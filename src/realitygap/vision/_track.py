@@ -71,6 +71,16 @@ class Track:
         times = np.concatenate([[first_s], self.times[inside], [last_s]])
         return Track(times, poses, seen, self.size_error)
 
+    def held(self, first_s: float, last_s: float) -> Track:
+        """The same, at rest from a time before its first picture, and to one after its last [s]."""
+        times = np.concatenate([[first_s], self.times, [last_s]])
+        poses = np.concatenate([self.poses[:1], self.poses, self.poses[-1:]])
+        seen = np.concatenate([[False], self.seen, [False]])
+        there = np.concatenate(
+            [[first_s < self.times[0]], np.ones(len(self.times), np.bool_), [last_s > self.times[-1]]]
+        )
+        return Track(times[there], poses[there], seen[there], self.size_error)
+
     def cells(self, grid: Grid) -> tuple[int, ...]:
         """The cells that its line crosses, in the order of their first visits."""
         return cells_along(self.poses[:, :2], grid)

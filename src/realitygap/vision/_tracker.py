@@ -96,6 +96,7 @@ class Tracker:
     _robot: list[Floats | None] = field(default_factory=list)
     _corners: dict[int, list[Floats]] = field(default_factory=dict)
     _size: tuple[int, int] = (0, 0)
+    _n_taken: int = 0
     _last: Floats | None = None
     _last_number: int = 0
     _moved: Floats = field(default_factory=lambda: np.zeros(2))
@@ -128,7 +129,8 @@ class Tracker:
         """(4, 2) pixels of the corners of the robot's tag in the next picture; None where it is not found."""
         gray = gray_of(image)
         self._size = (gray.shape[1], gray.shape[0])
-        number = len(self._times)
+        number = self._n_taken
+        self._n_taken += 1
         found: Floats | None = None
         if number < CORNERS_AT_FIRST or number % CORNERS_EVERY == 0:
             there = find_tags(gray, self._corner_detector)
@@ -177,6 +179,10 @@ class Tracker:
         if not best or seen[best] is None:
             return None
         return seen[best] if self._seen_of[best] >= FAMILY_AFTER or len(self._detectors) == 1 else None
+
+    def forget(self) -> None:
+        """Begin anew with the robot, as with a trial; the corner tags and its tag's family are remembered."""
+        self._times, self._robot = [], []
 
     def sightings(self) -> Sightings:
         """All that was seen so far."""

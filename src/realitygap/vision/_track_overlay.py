@@ -71,10 +71,9 @@ def draw_overlay(image: Image, time: float, tracked: Tracked, arena: Arena) -> I
     if np.isfinite(corners).all():
         _line(drawn, np.concatenate([corners, corners[:1]]), SEEN)
     words = f"{time:6.2f} s  x {x:.3f} m  y {y:.3f} m  {np.degrees(heading) % 360:.0f} deg"
-    cv2.putText(
-        drawn, words + ("" if track.seen[until - 1] else "  filled in"), (12, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.7,
-        SEEN if track.seen[until - 1] else FILLED, 2, cv2.LINE_AA,
-    )  # fmt: skip
+    words += "" if track.seen[until - 1] else "  filled in"
+    for color, width in (((255, 255, 255), 5), (SEEN if track.seen[until - 1] else FILLED, 2)):
+        cv2.putText(drawn, words, (14, 32), cv2.FONT_HERSHEY_SIMPLEX, 0.9, color, width, cv2.LINE_AA)
     return drawn
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -409,12 +410,15 @@ def _enter(
     told: str,
     role: ScoreRole,
 ) -> None:
-    from realitygap.study import keep_tracked, score_tracked
+    from realitygap.records import ObservationsFile
+    from realitygap.study import score_tracked
 
-    if study is not None:
-        score_tracked(study, trial, placed, told, role)
-    if into is not None:
-        keep_tracked(into, wanted, placed)
+    with contextlib.ExitStack() as stack:  # a file that does not do is refused before the ledger is written
+        file = None if into is None else stack.enter_context(ObservationsFile(into, wanted.head))
+        if study is not None:
+            score_tracked(study, trial, placed, told, role)
+        if file is not None:
+            file.append(placed.trial)
 
 
 @dataclass(frozen=True)

@@ -101,6 +101,8 @@ class Film:
         missed: Times [s] from and to which a hand hides the robot's tag.
         lost: Share of pictures that never arrive.
         seed: Of noise, and of which are lost.
+        n_exposures: Places of the robot of which a picture is the mean, as it moves while that is exposed.
+        name: For people.
     """
 
     path: Path

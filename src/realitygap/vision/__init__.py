@@ -11,7 +11,7 @@ from ._track_live import LiveTrack
 from ._track_overlay import draw_overlay, save_overlay
 from ._track_source import CameraDevice, Source, VideoFile, open_source
 from ._track_video import Marks, Tracked, track_video
-from ._tracker import Sightings, Tracker, gray_of, watch_tags
+from ._tracker import Sightings, Tracker, gray_of
 
 __all__ = [
     "CORNER_FAMILY",
@@ -44,5 +44,4 @@ __all__ = [
     "tag_bits",
     "track_of",
     "track_video",
-    "watch_tags",
 ]

@@ -98,11 +98,17 @@ def fit_camera(
         )
     points = np.concatenate([layout[number] for number in both])
     pixels = np.concatenate([seen[number] for number in both])
-    if lens is not None:
-        made = _placed(lens.scaled_to(*size), points, pixels)
-    else:
-        views = np.empty((0, 4, 2)) if robot is None or tag is None else _spread(robot)
-        made = _with_lens(size, points, pixels, views, tag or RobotTag())
+    try:
+        if lens is not None:
+            made = _placed(lens.scaled_to(*size), points, pixels)
+        else:
+            views = np.empty((0, 4, 2)) if robot is None or tag is None else _spread(robot)
+            made = _with_lens(size, points, pixels, views, tag or RobotTag())
+    except (from_extra("cv2", "vision").error, np.linalg.LinAlgError) as error:
+        raise VisionError(
+            f"Where the camera stands cannot be worked out from the corner tags ({str(error).strip()}). Film it anew, "
+            "with all four in sight."
+        ) from error
     if not made.rms <= MOST_OFF:
         raise VisionError(
             f"The tags at the arena's corners are {made.rms:.1f} pixels from where they should be. Are numbers 0 to 3 "

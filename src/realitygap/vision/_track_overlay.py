@@ -15,6 +15,7 @@ from ._track_source import Image
 from ._track_video import Tracked
 
 SEEN, FILLED, WALLS, ARROW = (80, 170, 20), (0, 120, 255), (200, 80, 0), (30, 30, 220)  # blue, green, red
+WORDS_WIDTH, WORDS_HEIGHT = 640, 44  # px
 ARROW_M = 0.08
 STEPS_A_SIDE = 24  # of a wall's line, which a lens bends
 
@@ -72,8 +73,9 @@ def draw_overlay(image: Image, time: float, tracked: Tracked, arena: Arena) -> I
         _line(drawn, np.concatenate([corners, corners[:1]]), SEEN)
     words = f"{time:6.2f} s  x {x:.3f} m  y {y:.3f} m  {np.degrees(heading) % 360:.0f} deg"
     words += "" if track.seen[until - 1] else "  filled in"
-    for color, width in (((255, 255, 255), 5), (SEEN if track.seen[until - 1] else FILLED, 2)):
-        cv2.putText(drawn, words, (14, 32), cv2.FONT_HERSHEY_SIMPLEX, 0.9, color, width, cv2.LINE_AA)
+    cv2.rectangle(drawn, (0, 0), (WORDS_WIDTH, WORDS_HEIGHT), (255, 255, 255), cv2.FILLED)
+    color = SEEN if track.seen[until - 1] else FILLED
+    cv2.putText(drawn, words, (14, WORDS_HEIGHT - 14), cv2.FONT_HERSHEY_SIMPLEX, 0.9, color, 2, cv2.LINE_AA)
     return drawn
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -194,20 +194,6 @@ class Tracker:
             np.array(self._times), np.array(robot).reshape(-1, 4, 2), middle, float(max(moved, default=0.0)),
             self.family, self._size,
         )  # fmt: skip
-
-
-def watch_tags(frames: Iterable[tuple[float, Image]], tag: RobotTag) -> Sightings:
-    """All that is seen in a row of pictures.
-
-    Raises:
-        VisionError: There is no picture, or the robot's tag is in none.
-    """
-    tracker = Tracker(tag)
-    for time, image in frames:
-        tracker.take(time, image)
-    found = tracker.sightings()
-    refuse_unseen(found, tag)
-    return found
 
 
 def refuse_unseen(found: Sightings, tag: RobotTag) -> None:

@@ -36,7 +36,15 @@ POSES = np.array([
 
 @pytest.fixture(scope="module")
 def film():
-    return Film(path_through(TIMES, POSES), 3.0, rate=15.0, filmed=SMALL, missed=((1.6, 1.85),), lost=0.05)
+    return Film(
+        path_through(TIMES, POSES),
+        3.0,
+        rate=15.0,
+        filmed=SMALL,
+        missed=((1.6, 1.85),),
+        lost=0.05,
+        n_exposures=3,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from realitygap.errors import VisionError, from_extra
 Image = NDArray[np.uint8]
 
 USUAL_RATE = 30.0  # pictures a second, where a file does not say
+LOG_ERRORS = 2  # of OpenCV's levels
 CAMERA_SIZE = (1280, 720)  # asked for [px]; a camera gives what it has
 
 
@@ -46,12 +47,11 @@ def _capture(what: str | int) -> Any:
     """OpenCV's capture, which says nothing by itself: what is wrong is told by us."""
     cv2 = from_extra("cv2", "vision")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET
-    log = cv2.utils.logging
-    before = log.setLogLevel(log.LOG_LEVEL_ERROR)
-    try:
-        return cv2.VideoCapture(what)
-    finally:
-        log.setLogLevel(before)
+    if hasattr(cv2, "setLogLevel"):  # OpenCV 4
+        cv2.setLogLevel(LOG_ERRORS)
+    else:
+        cv2.utils.logging.setLogLevel(LOG_ERRORS)
+    return cv2.VideoCapture(what)
 
 
 @dataclass

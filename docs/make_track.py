@@ -97,8 +97,8 @@ def table(measured: dict[str, Any]) -> str:
     n = sum(one["pictures"] for one in films)
     lines += [
         "",
-        f"Root mean squares over {len(films)} films with {n:,} pictures; the slowest took {measured['slowest']:.0f} "
-        "pictures a second of one core, reading the video included.",
+        f"Root mean squares over {len(films)} films with {n:,} pictures; in the slowest one core did "
+        f"{measured['slowest']:.0f} pictures a second, reading the video included.",
         "",
     ]
     return "\n".join(lines)

@@ -36,7 +36,8 @@ class FilmedCamera:
     """How a camera stands, and what it does to pictures.
 
     Attributes:
-        width, height: Of pictures [px].
+        width: Of pictures [px].
+        height: Likewise.
         focal: Focal length, in widths.
         off_center: Of the optical axis [px].
         distortion: k1, k2, p1, p2, k3.
@@ -97,7 +98,8 @@ class Film:
         tag: On the robot; its family 36h11 where none is named.
         arena: Where.
         filmed: The camera.
-        corner_size, corner_inset: Of the corner tags, as in `corner_tags`.
+        corner_size: Of the corner tags, as in `corner_tags`.
+        corner_inset: Likewise.
         missed: Times [s] from and to which a hand hides the robot's tag.
         lost: Share of pictures that never arrive.
         seed: Of noise, and of which are lost.

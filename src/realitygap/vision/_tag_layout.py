@@ -31,7 +31,8 @@ class RobotTag:
         size: Side of its black square [m].
         height: Above the floor [m].
         family: A key of `FAMILIES`; empty where it is found by looking.
-        ahead, left: Its middle, seen from the point of the robot that poses tell of [m].
+        ahead: Its middle, seen from the point of the robot that poses tell of [m].
+        left: Likewise.
         turned: How much it is turned counter-clockwise against the robot [rad].
     """
 

@@ -26,7 +26,8 @@ class Lens:
     """A pinhole and its distortion, for pictures of one size.
 
     Attributes:
-        width, height: Of pictures [px].
+        width: Of pictures [px].
+        height: Likewise.
         focal: Focal length across and down [px].
         center: Where the optical axis meets the picture [px].
         distortion: k1, k2, p1, p2, k3 of the Brown-Conrady model, as OpenCV has it.

@@ -47,7 +47,8 @@ class Marks:
         arena: At whose corners tags lie.
         tag: The robot's.
         lens: The camera's; None where it is to be fitted to the tags.
-        corner_size, corner_inset: As in `corner_tags`.
+        corner_size: As in `corner_tags`.
+        corner_inset: Likewise.
     """
 
     arena: Arena

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError, StudyError, VisionError
+from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.robots import ScribblerPlatform
-from realitygap.study import CameraAttendant, connect_robot
+from realitygap.study import CameraAttendant, CameraOperator, connect_robot, run_study
 from realitygap.testing import Film, FilmedCamera, path_through
-from realitygap.trials import RobotTarget, TrialPlan, WitnessAttendant
+from realitygap.trials import RobotTarget, TrialPlan, WitnessAttendant, WitnessOperator
 from realitygap.vision import LiveTrack, Marks, Track, Tracked
 from realitygap.world import paper_arena
+from tests.study.physical import small_study
 
 ARENA = paper_arena()
 
@@ -115,6 +117,51 @@ def test_a_trial_under_a_camera_has_poses_and_cells_like_those_of_the_witness():
 def test_a_trial_that_the_camera_saw_in_part_is_lost_and_said_to_be():
     with pytest.raises(RobotError, match=r"saw the robot from 0\.\d to 3\.\d s of a trial of 3\.\d s"):
         _drive(late_s=1.0)
+
+
+class _Beside:
+    """A person, in place of whom a witness puts the robot down; counts nothing."""
+
+    def __init__(self, witness):
+        self._as = witness
+        self._as.drawn = lambda card, driven: None
+
+    def __getattr__(self, name):
+        return getattr(self._as, name)
+
+
+class _AboveStudy(_AboveEmulator):
+    """The same, where the witness is an operator's."""
+
+    def begin(self):
+        self._beside._witness = self._beside.witness
+        super().begin()
+
+
+def test_a_study_is_scored_by_a_camera_as_by_the_witness_and_says_what_it_did_not_see(tmp_path):
+    study = small_study("coverage", steps="6")
+    witness, said = WitnessOperator(), []
+    operator = CameraOperator(_Beside(witness), _AboveStudy(witness), ARENA.grid, said.append)
+    port = "emulator://s2?fluke=1&speed=off"
+    run_study(study, tmp_path / "seen", port=port, operator=operator)
+    run_study(study, tmp_path / "true", port=port)
+    with (
+        Ledger.open(tmp_path / "seen" / LEDGER_NAME, writable=False) as seen,
+        Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as true,
+    ):
+        pairs = list(zip(seen.scores(), true.scores(), strict=True))[:3]  # later ones are bred from these
+    assert len(pairs) == 3
+    for one, other in pairs:
+        assert one["who"] == "camera"
+        assert len(set(one["cells"]) ^ set(other["cells"])) <= 1
+        off = np.array(one["path"])[:, :2] - np.array(other["path"])[:, :2]
+        assert np.hypot(*off.T).max() < 0.01
+    assert said[0].startswith("The camera counts ")
+    late = WitnessOperator()
+    operator = CameraOperator(_Beside(late), _AboveStudy(late, late_s=1.0), ARENA.grid, said.append)
+    result = run_study(study, tmp_path / "late", port=port, operator=operator)
+    assert result.physical.waiting
+    assert "Count its cells by hand" in said[-1]
 
 
 def test_a_camera_as_an_option_says_what_it_looks_for():

@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
+import typer
+
 from realitygap.errors import StudyError, did_you_mean
 
 if TYPE_CHECKING:
-    from realitygap.trials import Attendant
+    from realitygap.study import Study
+    from realitygap.trials import Attendant, Operator
     from realitygap.vision import Marks
     from realitygap.world import Arena
 
@@ -48,6 +51,37 @@ def under_camera(spec: str | None, arena: Arena, attendant: Attendant | None) ->
     number, marks = parse_camera(spec, arena)
     with LiveTrack(CameraDevice(number), marks) as live:
         yield CameraAttendant(attendant, live)
+
+
+@contextlib.contextmanager
+def operated_under_camera(spec: str | None, study: Study, operator: Operator) -> Iterator[Operator]:
+    """The operator of a physical study, with a camera where one is named.
+
+    Args:
+        spec: Of the camera; None where there is none.
+        study: Whose first physical condition says in which arena.
+        operator: Without a camera.
+
+    Raises:
+        StudyError: The camera's options cannot be, or the robot is an emulated one.
+        VisionError: There is no such camera.
+    """
+    if spec is None:
+        yield operator
+        return
+    from realitygap.trials import WitnessOperator
+
+    if isinstance(operator, WitnessOperator):
+        raise StudyError(
+            "--camera goes with a robot on the floor: an emulator's witness sees where it drives."
+        )
+    from realitygap.study import CameraOperator, physical_conditions
+    from realitygap.vision import CameraDevice, LiveTrack
+
+    arena = physical_conditions(study)[0].arena.arena()
+    number, marks = parse_camera(spec, arena)
+    with LiveTrack(CameraDevice(number), marks) as live:
+        yield CameraOperator(operator, live, arena.grid, lambda text: typer.echo(text, err=True))
 
 
 def parse_camera(spec: str, arena: Arena) -> tuple[int, Marks]:

@@ -4,6 +4,7 @@ from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._calibrate_all import calibrate_all
 from ._camera_attendant import CameraAttendant
+from ._camera_operator import CameraOperator
 from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
@@ -15,7 +16,7 @@ from ._gap import GapStudy, run_gap, study_gap
 from ._gap_between import GapBetween, gap_between
 from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
-from ._physical import PhysicalResult, PhysicalStudy
+from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
 from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
@@ -48,6 +49,7 @@ __all__ = [
     "SMALL",
     "STRATEGIES",
     "CameraAttendant",
+    "CameraOperator",
     "ClosingPlan",
     "ClosingProgress",
     "ConditionNotes",
@@ -95,6 +97,7 @@ __all__ = [
     "open_target",
     "parse_study",
     "part_of",
+    "physical_conditions",
     "pilot_spreads",
     "place_trial",
     "plan_gap",

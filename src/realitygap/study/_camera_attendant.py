@@ -93,16 +93,24 @@ class CameraAttendant:
     def _seen(self) -> Track:
         """From the first look to the last."""
         if self._track is None:
-            first, last = self._times[0], self._times[-1]
-            try:
-                track = self._camera.tracked(last).track
-            except (VisionError, ValueError) as error:
-                raise RobotError(f"The camera did not see the trial: {error}") from error
-            if track.times[0] > first + AT_REST_S or track.times[-1] < last - AT_REST_S:
-                from_s, to_s = track.times[0] - first, track.times[-1] - first
-                raise RobotError(
-                    f"The camera saw the robot from {from_s:.1f} to {to_s:.1f} s of a trial of {last - first:.1f} s, "
-                    "expected all of it. Does it see the whole arena?"
-                )
-            self._track = track.held(min(first, track.times[0]), max(last, track.times[-1]))
+            self._track = seen_between(self._camera, self._times[0], self._times[-1])
         return self._track
+
+
+def seen_between(camera: Looking, first: float, last: float) -> Track:
+    """The track of a trial from one time to another [s].
+
+    Raises:
+        RobotError: The camera did not see all of it.
+    """
+    try:
+        track = camera.tracked(last).track
+    except (VisionError, ValueError) as error:
+        raise RobotError(f"The camera did not see the trial: {error}") from error
+    if track.times[0] > first + AT_REST_S or track.times[-1] < last - AT_REST_S:
+        from_s, to_s = track.times[0] - first, track.times[-1] - first
+        raise RobotError(
+            f"The camera saw the robot from {from_s:.1f} to {to_s:.1f} s of a trial of {last - first:.1f} s, expected "
+            "all of it. Does it see the whole arena?"
+        )
+    return track.held(min(first, track.times[0]), max(last, track.times[-1]))

@@ -25,7 +25,7 @@ from realitygap.robots import DEFAULT_ROBOT
 from realitygap.runs import Condition, genome_of
 from realitygap.trials import PATH_PARTS, cell_at
 from realitygap.vision import Beginning, Track, find_beginning
-from realitygap.world import Arena
+from realitygap.world import Arena, Grid
 
 from ._targets import FULL_SCALE
 
@@ -161,16 +161,26 @@ def place_trial(
             f"{track.times[0]:.2f} to {track.times[-1]:.2f} s. Film it from before it begins until it stands, or "
             "correct --begins."
         )
-    part = track.between(first, last)
-    rows = np.arange(len(wanted.times), dtype=np.float64)
-    fine = np.interp(np.arange((len(rows) - 1) * PATH_PARTS + 1) / PATH_PARTS, rows, wanted.times)
-    poses = track.at(first + wanted.times)
-    grid = wanted.arena.grid
-    cells = part.cells(grid)
-    ends = {cell_at(grid, x, y) for x, y, _ in poses.tolist()} - {None}
-    trial = replace(wanted.trial, poses=poses, cells=tuple(sorted(cells)))
-    score = Score(cells, who, n_ends=len(ends), path=np.round(track.at(first + fine), 6).tolist())
-    return TrackedTrial(trial, score, begun, float(part.seen.mean()))
+    times = first + wanted.times
+    score = score_along(track, times, wanted.arena.grid, who)
+    trial = replace(wanted.trial, poses=track.at(times), cells=tuple(sorted(score.cells)))
+    return TrackedTrial(trial, score, begun, float(track.between(first, last).seen.mean()))
+
+
+def score_along(track: Track, times: Floats, grid: Grid, who: str) -> Score:
+    """What a trial scores by its track.
+
+    Args:
+        track: With all of the trial in it.
+        times: (t + 1,) when each command began, and when the last ended [s].
+        grid: Whose cells are counted.
+        who: Enters it.
+    """
+    rows = np.arange(len(times), dtype=np.float64)
+    fine = np.interp(np.arange((len(rows) - 1) * PATH_PARTS + 1) / PATH_PARTS, rows, times)
+    cells = track.between(float(times[0]), float(times[-1])).cells(grid)
+    ends = {cell_at(grid, x, y) for x, y, _ in track.at(times).tolist()} - {None}
+    return Score(cells, who, n_ends=len(ends), path=np.round(track.at(fine), 6).tolist())
 
 
 def score_tracked(

@@ -115,8 +115,9 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
     seen &= ~_leaps(found.times, middles, seen)
     if seen.sum() < LEAST_SEEN:
         raise VisionError(
-            f"The robot's tag was seen in {seen.sum()} of {len(seen)} pictures, expected at least {LEAST_SEEN}. See "
-            "that its size and height above the floor are as said (--tag-size, --tag-height)."
+            f"The robot's tag was seen in {seen.sum()} of {len(seen)} pictures, expected at least {LEAST_SEEN}. Is "
+            "it lit well enough for the camera to expose shortly, and are its size and height as said (--tag-size, "
+            "--tag-height)?"
         )
     heading = headings - tag.turned
     shift = np.exp(1j * heading) * (tag.ahead + 1j * tag.left)

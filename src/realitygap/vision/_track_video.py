@@ -17,6 +17,7 @@ from ._track_source import Image
 from ._tracker import Sightings, Tracker, refuse_unseen, with_family
 
 MOST_SIZE_ERROR = 0.03  # beyond, what was said of the tag cannot be
+ROUND_PX = 1.0  # by which a square looks smaller, as blurred corners are round
 MOST_MOVED_PX = 3.0
 
 
@@ -93,7 +94,9 @@ def track_video(frames: Iterable[tuple[float, Image]], marks: Marks) -> Tracked:
 
 def _warnings(found: Sightings, track: Track) -> list[str]:
     said = []
-    if abs(track.size_error) > MOST_SIZE_ERROR:
+    there = found.robot[np.isfinite(found.robot).all(axis=(1, 2))]
+    side_px = float(np.median(np.hypot(*np.moveaxis(there - np.roll(there, 1, axis=1), -1, 0))))
+    if abs(track.size_error) > MOST_SIZE_ERROR + ROUND_PX / side_px:
         how = "larger" if track.size_error > 0 else "smaller"
         said.append(
             f"The robot's tag looks {abs(track.size_error):.0%} {how} than its size and height say: measure both again "

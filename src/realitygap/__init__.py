@@ -82,6 +82,7 @@ _PACKAGES = {
     "study",
     "tasks",
     "trials",
+    "vision",
     "world",
 }
 

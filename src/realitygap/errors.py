@@ -66,6 +66,10 @@ class LedgerError(RecordError):
     """A ledger of physical trials cannot be trusted, written, or does not allow what was asked."""
 
 
+class VisionError(RealityGapError):
+    """A picture or video does not show what it has to, or cannot be read; the text says what was missing."""
+
+
 class MissingExtraError(RealityGapError, ImportError):
     """Something needs packages that come with an extra of realitygap, which is not installed."""
 

@@ -20,6 +20,7 @@ from ._robot import robot
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
+from ._track import lens, print_tags, track
 from ._transfer import transfer
 from ._trials import trials
 from ._try import try_genome
@@ -68,6 +69,9 @@ app.command("bench")(bench)
 app.add_typer(robot, name="robot")
 app.add_typer(twin, name="twin")
 app.command("trials")(trials)
+app.command("track")(track)
+app.command("print-tags")(print_tags)
+app.command("lens")(lens)
 app.command("gap")(gap)
 app.command("plan")(plan)
 app.command("transfer")(transfer)

@@ -12,6 +12,8 @@ import typer
 
 from realitygap.errors import StudyError
 
+from ._camera import CAMERA_HELP, under_camera
+
 if TYPE_CHECKING:
     from realitygap.world import Calibration
 
@@ -68,6 +70,7 @@ def calibrate(
             metavar="HOST:PORT", help="Of an emulator: it places its robot and sees where it drives."
         ),
     ] = None,
+    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     figure: Annotated[
         Path | None,
         typer.Option(
@@ -87,6 +90,8 @@ def calibrate(
 
     Example: realitygap calibrate path --robot scribbler:/dev/rfcomm0 -o path.toml
 
+    Example: realitygap calibrate motion --robot scribbler:/dev/rfcomm0 --camera 0 -o motion.toml
+
     Example: realitygap calibrate all --robot twin:worn.toml --observe track --budget 20 -o worn-fit.toml
 
     Example: realitygap calibrate sensors --from sensors.trials.jsonl -o sensors.toml
@@ -95,12 +100,12 @@ def calibrate(
     """
     from realitygap.study import calibrate_from, save_calibration
 
-    out = _checked(what, robot, out, observe, data, witness, figure, choose=choose)
+    out = _checked(what, robot, out, observe, data, witness, camera, figure, choose=choose)
     if data is not None:
         made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
     else:
         made = _measured(
-            *(what, robot or "", out, observe, budget, base, seed, arena, witness),
+            *(what, robot or "", out, observe, budget, base, seed, arena, witness, camera),
             choose=choose,
             quiet=as_json,
         )
@@ -119,6 +124,7 @@ def _checked(
     observe: str | None,
     data: Path | None,
     witness: str | None,
+    camera: str | None,
     figure: Path | None,
     *,
     choose: bool,
@@ -144,8 +150,8 @@ def _checked(
         raise StudyError(f"--observe is {observe!r}, expected cells, encoders or track.")
     if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):
         raise StudyError("--figure draws the readings of `calibrate sensors` into a .svg, .pdf or .png.")
-    if data is not None and (witness is not None or choose):
-        raise StudyError("--witness and --choose go with --robot: --from drives nothing.")
+    if data is not None and (witness is not None or camera is not None or choose):
+        raise StudyError("--witness, --camera and --choose go with --robot: --from drives nothing.")
     return out
 
 
@@ -163,6 +169,7 @@ def _measured(
     seed: int,
     arena: str,
     witness: str | None,
+    camera: str | None,
     *,
     choose: bool,
     quiet: bool,
@@ -181,14 +188,17 @@ def _measured(
     is_led = _is_led(robot, witness)
     again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."
     try:
-        attendant = TerminalAttendant(where) if is_led else None
+        beside = TerminalAttendant(where) if is_led else None
         guide = TerminalGuide(where, model) if is_led else None
-        with open_target(robot, where, key=seed, witness=witness, attendant=attendant) as target:
+        with (
+            under_camera(camera, where, beside) as attendant,
+            open_target(robot, where, key=seed, witness=witness, attendant=attendant) as target,
+        ):
             return calibrate(
                 what,
                 target,
                 robot=base,
-                observe=_seen(observe or "cells"),
+                observe=_seen(observe or ("cells" if camera is None else "track")),
                 budget=budget,
                 seed=seed,
                 trials_file=kept,

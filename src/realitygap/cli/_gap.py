@@ -12,6 +12,8 @@ import typer
 
 from realitygap.errors import StudyError
 
+from ._camera import CAMERA_HELP, under_camera
+
 if TYPE_CHECKING:
     from realitygap.gap import Estimate, GapResult, Why
     from realitygap.study import GapPlan
@@ -29,7 +31,10 @@ class Seen(StrEnum):
 def gap(
     sim: Annotated[str, typer.Argument(metavar="SIM", help="The simulator: sim, sim:FILE or jyro.")],
     target: Annotated[
-        str, typer.Argument(metavar="TARGET", help="twin:FILE, scribbler:PORT, sim, sim:FILE or jyro.")
+        str,
+        typer.Argument(
+            metavar="TARGET", help="twin:FILE, scribbler:PORT, recorded:FILE, sim, sim:FILE or jyro."
+        ),
     ],
     controllers: Annotated[
         str,
@@ -81,6 +86,7 @@ def gap(
     witness: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Of an emulated robot in another program.")
     ] = None,
+    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of all random numbers.")] = 1,
 ) -> None:
     """Measure the gap: the same controllers on a simulator and on a target, again and again.
@@ -92,9 +98,12 @@ def gap(
 
     Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
 
+    Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
+
     In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
     """
     from realitygap.study import gap_between
+    from realitygap.world import load_arena
 
     if margin is not None and not 0 < margin < float("inf"):
         raise StudyError(f"--margin is {margin}, expected a coverage above 0, such as 0.05.")
@@ -103,7 +112,10 @@ def gap(
 
         refuse_gap_page(report)
     try:
-        with _TrialsBar(quiet=as_json) as bar:
+        with (
+            _TrialsBar(quiet=as_json) as bar,
+            under_camera(camera, load_arena(arena), _attendant(target, witness, arena)) as attendant,
+        ):
             found = gap_between(
                 sim,
                 target,
@@ -118,7 +130,7 @@ def gap(
                 why=why,
                 processes=processes,
                 witness=witness,
-                attendant=_attendant(target, witness, arena),
+                attendant=attendant,
                 seed=seed,
                 results=out,
                 tell=bar.show,

@@ -13,6 +13,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._browser import show_page
+from ._camera import CAMERA_HELP, operated_under_camera
 from ._closing import CLOSING, closing_plan, refuse_options, run_closing
 from ._operator import Answers, choose_operator
 from ._results import written_report
@@ -81,6 +82,7 @@ def run(
             help="Of an emulator in another program: it places its robot and sees what it drew.",
         ),
     ] = None,
+    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     in_flight: Annotated[
         str | None,
         typer.Option(
@@ -150,7 +152,10 @@ def run(
     """
     if study == CLOSING:
         others = {"replicates": replicates, "cluster": cluster, "chunk": chunk, "fresh": fresh, "port": port}
-        refuse_options(study, {**others, "randomize": randomize, "witness": witness, "in-flight": in_flight})
+        refuse_options(
+            study,
+            {**others, "randomize": randomize, "witness": witness, "camera": camera, "in-flight": in_flight},
+        )
         plan = closing_plan(
             small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed
         )
@@ -166,10 +171,10 @@ def run(
             "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
     answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
-    if port is None and (witness is not None or answers != Answers()):
+    if port is None and (witness is not None or camera is not None or answers != Answers()):
         raise StudyError(
-            "--witness, --in-flight, --score, --no-wait, --despite-preflight and --who go with --port: they are about "
-            "the robot there."
+            "--witness, --camera, --in-flight, --score, --no-wait, --despite-preflight and --who go with --port: they "
+            "are about the robot there."
         )
     resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     if port is not None:
@@ -182,7 +187,8 @@ def run(
         if port is not None:
             path = result.folder.path
             operator = choose_operator(port, witness, answers, path, quiet=as_json)
-            driven = run_study(resolved, path, port=port, operator=operator)
+            with operated_under_camera(camera, resolved, operator) as looking:
+                driven = run_study(resolved, path, port=port, operator=looking)
             result = dataclasses.replace(result, physical=driven.physical)
     except KeyboardInterrupt:
         typer.echo(

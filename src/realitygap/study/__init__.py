@@ -3,6 +3,8 @@
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._calibrate_all import calibrate_all
+from ._camera_attendant import CameraAttendant
+from ._camera_operator import CameraOperator
 from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
@@ -14,7 +16,7 @@ from ._gap import GapStudy, run_gap, study_gap
 from ._gap_between import GapBetween, gap_between
 from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
-from ._physical import PhysicalResult, PhysicalStudy
+from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
 from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
@@ -22,6 +24,15 @@ from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSe
 from ._targets import observations_head, open_target
 from ._task import measure_task, task_settings
 from ._template import study_template
+from ._tracked import (
+    TrackedTrial,
+    TrialToTrack,
+    keep_tracked,
+    place_trial,
+    score_tracked,
+    trial_of_file,
+    trial_of_ledger,
+)
 from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer_target import KeptTarget
@@ -37,6 +48,8 @@ __all__ = [
     "SECTIONS",
     "SMALL",
     "STRATEGIES",
+    "CameraAttendant",
+    "CameraOperator",
     "ClosingPlan",
     "ClosingProgress",
     "ConditionNotes",
@@ -56,9 +69,11 @@ __all__ = [
     "Study",
     "StudyResult",
     "StudySection",
+    "TrackedTrial",
     "TransferPlan",
     "TransferResult",
     "Transferred",
+    "TrialToTrack",
     "TrialsSection",
     "calibrate",
     "calibrate_all",
@@ -70,6 +85,7 @@ __all__ = [
     "drive_study",
     "estimate_mean",
     "gap_between",
+    "keep_tracked",
     "load_study",
     "machine_facts",
     "measure_maze",
@@ -81,7 +97,9 @@ __all__ = [
     "open_target",
     "parse_study",
     "part_of",
+    "physical_conditions",
     "pilot_spreads",
+    "place_trial",
     "plan_gap",
     "recorded_spreads",
     "refuse_port_without_robot",
@@ -89,12 +107,15 @@ __all__ = [
     "run_study",
     "sample_controllers",
     "save_calibration",
+    "score_tracked",
     "strategy_names",
     "study_gap",
     "study_template",
     "summarize_closing",
     "task_settings",
     "transfer",
+    "trial_of_file",
+    "trial_of_ledger",
     "try_on",
     "usable_processors",
     "why_gap",

@@ -14,7 +14,7 @@ from realitygap.errors import StudyError, whole_number
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, genome_of, run_replicates
-from realitygap.trials import NoiseKey, retry_genomes
+from realitygap.trials import NoiseKey, RecordedTarget, retry_genomes
 
 from ._file import DEFAULT_NEAT, load_study
 
@@ -74,6 +74,23 @@ def sample_controllers(kind: str | Path, n: int, seed: int = 1) -> list[Controll
         chosen = sorted(np.random.default_rng(seed).permutation(len(found))[:n])
         return _with_fresh_scores([found[k] for k in chosen])
     return _with_fresh_scores(_of_study(kind, n, seed))
+
+
+def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
+    """The controllers of a target of recorded trials, and of how many trials of each there are at least.
+
+    Args:
+        target: By name; of any other there are none.
+
+    Raises:
+        RecordError: The file cannot be read.
+    """
+    name, _, path = target.partition(":")
+    if name != "recorded" or not path:
+        return []
+    found = RecordedTarget(path).controllers
+    least = min(n for _, n in found)
+    return [(Controller(genome, f"recorded-{k}", "random"), least) for k, (genome, _) in enumerate(found)]
 
 
 def _random(n: int, seed: int) -> list[Controller]:

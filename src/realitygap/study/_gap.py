@@ -42,6 +42,9 @@ TARGET_FROM = MOST_TRIALS * MOST_CONTROLLERS
 REEVOLVED_FROM = 2 * TARGET_FROM
 REPLAYED_FROM = 3 * TARGET_FROM
 
+STEPS = 100
+"""Commands in a trial."""
+
 REPLAYS = 4
 """How often the commands of a trial are replayed in simulation."""
 
@@ -122,6 +125,7 @@ def study_gap(
     tell: Tell | None = None,
     results: str | Path | None = None,
     at_its_pace: bool = False,
+    steps: int = STEPS,
 ) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
@@ -140,6 +144,7 @@ def study_gap(
         tell: Called as trials are done.
         results: A file where the target's trials are kept as they come; those in it are not carried out again.
         at_its_pace: Whether commands of a `sim` that was not calibrated last as long as those of the target did.
+        steps: Commands in each trial.
 
     Raises:
         ValueError: A number is out of range, or so much cannot be seen.
@@ -152,8 +157,8 @@ def study_gap(
     if source.arena.grid != target.arena.grid:
         raise StudyError(f"{source.name} and {target.name} have different grids, expected the same arena.")
     seen = _as_much(observe, source)
-    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM)
-    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM)
+    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM, steps)
+    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM, steps)
     on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
     source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
@@ -198,10 +203,10 @@ def _paced(
 # --- trials -------------------------------------------------------------------------------------------------
 
 
-def plans_of(genomes: Sequence[Genome], trials: int, first: int) -> list[TrialPlan]:
+def plans_of(genomes: Sequence[Genome], trials: int, first: int, steps: int = STEPS) -> list[TrialPlan]:
     """Round the controllers, again and again."""
     return [
-        TrialPlan(genome=genome, number=first + MOST_TRIALS * i + k)
+        TrialPlan(genome=genome, steps=steps, number=first + MOST_TRIALS * i + k)
         for k in range(trials)
         for i, genome in enumerate(genomes)
     ]

@@ -9,11 +9,11 @@ from pathlib import Path
 from realitygap.errors import StudyError
 from realitygap.gap import Why
 from realitygap.records import OBSERVATIONS, Observe
-from realitygap.trials import Attendant, Target
+from realitygap.trials import Attendant, RecordedTarget, Target
 from realitygap.world import Arena, Calibration, load_arena
 
-from ._controllers import sample_controllers
-from ._gap import GapStudy, Tell, study_gap
+from ._controllers import recorded_controllers, sample_controllers
+from ._gap import STEPS, GapStudy, Tell, study_gap
 from ._targets import open_target
 from ._why import calibration_of, why_gap
 
@@ -62,7 +62,7 @@ def gap_between(
     Args:
         sim: The simulator: `sim`, `sim:FILE` or `jyro`.
         target: Any platform, such as `twin:FILE` or `scribbler:PORT`.
-        controllers: As in `sample_controllers`.
+        controllers: As in `sample_controllers`; of recorded trials those that drove, unless others are named.
         n_controllers: How many.
         trials: Of each on each platform.
         margin: Of equivalence in level, in coverage.
@@ -83,6 +83,12 @@ def gap_between(
         StudyError: A platform, study or number that cannot be.
         RealityGapError: The robot failed, or files cannot be read or written.
     """
+    recorded = recorded_controllers(target) if controllers == "random" else []
+    steps = STEPS
+    if recorded:
+        n_controllers, trials = min(n_controllers, len(recorded)), min(trials, recorded[0][1])
+        there_before = RecordedTarget(target.partition(":")[2])
+        arena, steps = there_before.arena, there_before.steps
     place = arena if isinstance(arena, Arena) else load_arena(arena)
     calibration = calibration_of(sim)
     if why and calibration is None:
@@ -95,8 +101,12 @@ def gap_between(
             "Why there is a gap needs at least 2 trials of each controller, to tell it from noise."
         )
     tell_of = say or (lambda _: None)
-    tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
-    chosen = sample_controllers(controllers, n_controllers, seed)
+    if recorded:
+        tell_of(f"The {n_controllers} controllers of {target}, {trials} trials each.")
+        chosen = [each for each, _ in recorded[:n_controllers]]
+    else:
+        tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
+        chosen = sample_controllers(controllers, n_controllers, seed)
     there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
     with (
         _open(sim, place, noise, 2 * seed) as source,
@@ -116,6 +126,7 @@ def gap_between(
             tell=tell,
             results=results,
             at_its_pace=calibration is None or not calibration.step_s,
+            steps=steps,
         )
     parts = None
     if why and calibration is not None:

@@ -1,4 +1,4 @@
-"""What a user names as a target, opened: `jyro`, `sim`, `sim:FILE`, `twin:FILE`, `scribbler:PORT`."""
+"""What a user names as a target, opened: `jyro`, `sim`, `sim:FILE`, `twin:FILE`, `scribbler:PORT`, `recorded:FILE`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from realitygap.robots.scribbler import is_in_this_program
 from realitygap.trials import (
     Attendant,
     OnLost,
+    RecordedTarget,
     RobotTarget,
     SimTarget,
     Target,
@@ -23,7 +24,7 @@ from ._robot import connect_robot
 
 FULL_SCALE = 6400.0
 """The largest reading of a Fluke's obstacle sensors: readings of robots and simulators are shares of it."""
-TARGETS = ("jyro", "sim", "sim:FILE", "twin:FILE", "scribbler:PORT")
+TARGETS = ("jyro", "sim", "sim:FILE", "twin:FILE", "scribbler:PORT", "recorded:FILE")
 
 
 def open_target(
@@ -42,7 +43,7 @@ def open_target(
 
     Args:
         spec: Its name: `jyro`, `sim`, `sim:FILE`, where the file is of a robot or a calibration, `twin:FILE`,
-            or `scribbler:PORT`.
+            `scribbler:PORT`, or `recorded:FILE`, trials that were observed before.
         arena: Where.
         processes: Of a twin: how many; one a processor that may be used when not given.
         witness: Of an emulated robot in another program: the address of its witness, HOST:PORT.
@@ -65,6 +66,8 @@ def open_target(
         return SimTarget(_sim(rest), arena, noise, key=key, name=spec)
     if name == "twin" and rest:
         return TwinTarget(rest, arena, processes, name=spec)
+    if name == "recorded" and rest:
+        return RecordedTarget(rest, name=spec)
     if name == "scribbler" and rest:
         platform = ScribblerPlatform(reading_max=FULL_SCALE)
         chosen = attendant or _witness(rest, witness)

@@ -30,6 +30,7 @@ from ._sim_scene import SimScene, sim_scene
 from ._sim_world import SimWorld
 from ._sim_world_robot import SimWorldRobot
 from ._target import Target, TrialPlan
+from ._target_recorded import RecordedTarget
 from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
@@ -54,6 +55,7 @@ __all__ = [
     "PlatformTrials",
     "Play",
     "Preflight",
+    "RecordedTarget",
     "Rehearsal",
     "RobotOnlooker",
     "RobotTarget",

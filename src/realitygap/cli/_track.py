@@ -1,0 +1,479 @@
+"""`realitygap track`, `realitygap print-tags` and `realitygap lens`: a robot under a camera."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import StudyError
+
+if TYPE_CHECKING:
+    from realitygap.records import ScoreRole
+    from realitygap.study import TrackedTrial, TrialToTrack
+    from realitygap.vision import Marks, RobotTag, Source, Tracked
+    from realitygap.world import Arena
+
+_Tag = Annotated[
+    str,
+    typer.Option(
+        metavar="ID",
+        help="On the robot: its number, or FAMILY:ID such as aruco4x4:7. [families: 36h11 (AprilTag), 25h9, 16h5, "
+        "aruco4x4 to aruco7x7, aruco; found by looking when not named]",
+    ),
+]
+_TagSize = Annotated[float, typer.Option(metavar="M", help="Side of its black square [m].")]
+
+
+def track(
+    camera: Annotated[
+        str, typer.Option(metavar="CAMERA", help="A camera's number, such as 0, or a video file.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="The track as a table (.csv).")
+    ] = None,
+    arena: Annotated[
+        str | None, typer.Option(metavar="ARENA", help="By name or file. [default: the trial's, or paper]")
+    ] = None,
+    sheet: Annotated[
+        bool,
+        typer.Option(
+            "--sheet",
+            help="The corner tags are those of print-sheet and print-tags; also when nothing is said.",
+        ),
+    ] = False,
+    tag: _Tag = "10",
+    tag_size: _TagSize = 0.07,
+    tag_height: Annotated[float, typer.Option(metavar="M", help="Of the tag above the floor [m].")] = 0.1,
+    tag_at: Annotated[
+        str,
+        typer.Option(
+            metavar="AHEAD,LEFT,DEG",
+            help="Its middle from the robot's middle [m], and how it is turned counter-clockwise [degrees].",
+        ),
+    ] = "0,0,0",
+    corner_size: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Side of the corner tags' black squares. [default: 0.06]"),
+    ] = None,
+    corner_inset: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="From the walls to them, below 0 outside. [default: 0.01, or outside]"
+        ),
+    ] = None,
+    lens: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The camera's, of realitygap lens. [default: fitted to the tags]"),
+    ] = None,
+    save_lens: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Keep the lens that was fitted to the tags (.toml).")
+    ] = None,
+    overlay: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The video with what was found drawn into it (.mp4).")
+    ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(min=0.1, metavar="S", help="Of a camera: how long. [default: until Ctrl-C]"),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Enter cells and path of --trial into this study's ledger."),
+    ] = None,
+    trials: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="--trial is one of this file of trials (.jsonl).")
+    ] = None,
+    trial: Annotated[int | None, typer.Option(metavar="NUMBER", help="Which trial the video shows.")] = None,
+    into: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Add the trial with its poses to this file, for calibrate and gap (.jsonl)."
+        ),
+    ] = None,
+    begins: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="When the trial begins in the video. [default: found by its commands]"
+        ),
+    ] = None,
+    second: Annotated[
+        bool, typer.Option("--second", help="Enter it as a second count, for the agreement alone.")
+    ] = False,
+    who: Annotated[str, typer.Option(metavar="NAME", help="Enters it.")] = "camera",
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
+) -> None:
+    """Follow a robot with a tag on it through a video, or under a camera that is plugged in.
+
+    The arena is known by a tag at each of its corners. What was not seen is filled in between, and marked. With --study
+    or --trials and --trial, the trial is found in the video by its commands; its cells and path go to the ledger, and
+    with its poses it goes to a file that `calibrate --from` and `gap` take.
+
+    Example: realitygap track --camera trial-12.mp4 --sheet -o trial-12.csv --overlay seen.mp4
+
+    Example: realitygap track --camera trial-12.mp4 --study results/paper-robot --trial 12 --into tracked.jsonl
+
+    Example: realitygap track --camera 0 --tag aruco4x4:7 --tag-size 0.05 --lens webcam.toml -o live.csv
+
+    In Python: realitygap.vision.track_video(realitygap.vision.VideoFile(path), realitygap.vision.Marks(arena))
+    """
+    from realitygap.vision import open_source
+
+    wanted = _wanted(study, trials, trial, into)
+    if sheet and (corner_size is not None or corner_inset is not None):
+        raise StudyError(
+            "--sheet says where the corner tags are. Leave --corner-size and --corner-inset out."
+        )
+    marks = _marks(arena, wanted, tag_of(tag, tag_size, tag_height, tag_at), lens, corner_size, corner_inset)
+    _refuse_outputs(out, save_lens, overlay, into, camera)
+    source = open_source(camera)
+    found = _tracked(source, marks, seconds)
+    placed = None
+    if wanted is not None:
+        from realitygap.study import place_trial
+
+        placed = place_trial(wanted, found.track, begins, who)
+    _write(found, marks, source, out, save_lens, overlay)
+    if wanted is not None and placed is not None:
+        _enter(
+            wanted,
+            placed,
+            study,
+            trial or 0,
+            into,
+            _told(camera, found, placed),
+            "second" if second else "score",
+        )
+    _print(found, placed, _Written(out, save_lens, overlay, into, study), as_json=as_json)
+
+
+def print_tags(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The PDF to write.")],
+    tag: _Tag = "10",
+    tag_size: _TagSize = 0.07,
+    corner_size: Annotated[
+        float, typer.Option(metavar="M", help="Side of the corner tags' black squares [m].")
+    ] = 0.06,
+    paper: Annotated[str, typer.Option(metavar="PAPER", help="a4, letter or a3.")] = "a4",
+) -> None:
+    """Make a PDF of the robot's tag and four tags for the arena's corners, at true scale.
+
+    Print it at 100 %, and measure the printed ruler. A sheet of `realitygap print-sheet` has the corner tags already.
+
+    Example: realitygap print-tags -o tags.pdf
+
+    Example: realitygap print-tags -o tags.pdf --tag aruco4x4:7 --tag-size 0.05 --paper letter
+
+    In Python: realitygap.vision.print_tags("tags.pdf")
+    """
+    from realitygap.vision import print_tags as write
+
+    if out.suffix != ".pdf":
+        raise StudyError(f"{out} does not end in .pdf. Expected a name such as tags.pdf.")
+    _refuse_folder(out)
+    try:
+        n = write(out, tag_of(tag, tag_size, 0.1, "0,0,0"), corner_size, paper)  # type: ignore[arg-type]
+    except ValueError as error:
+        raise StudyError(str(error)) from None
+    typer.echo(f"Written: {out} ({n} pages)")
+
+
+def lens(
+    camera: Annotated[
+        str, typer.Option(metavar="CAMERA", help="A video of a chessboard, or a camera's number.")
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The lens to write (.toml).")],
+    board: Annotated[
+        str, typer.Option(metavar="COLUMNSxROWS", help="Inner corners of the board, where four squares meet.")
+    ] = "9x6",
+    square: Annotated[float, typer.Option(metavar="M", help="Side of a square [m].")] = 0.025,
+    seconds: Annotated[float, typer.Option(min=1, metavar="S", help="Of a camera: how long.")] = 30.0,
+) -> None:
+    """Fit the lens of a camera to a video in which a chessboard is shown to it from many sides.
+
+    Without a lens, `realitygap track` fits one to the tags that it sees, which does for most cameras.
+
+    Example: realitygap lens --camera board.mp4 --board 9x6 --square 0.025 -o phone.toml
+
+    In Python: realitygap.vision.fit_lens(images, 9, 6, 0.025)
+    """
+    from realitygap.vision import fit_lens, open_source
+    from realitygap.vision import gray_of as gray
+
+    columns, cross, rows = board.partition("x")
+    if not (cross and columns.isdecimal() and rows.isdecimal()):
+        raise StudyError(f"--board is {board!r}, expected inner corners across and down, such as 9x6.")
+    _refuse_toml(out)
+    source = open_source(camera)
+    taken = _for_seconds(source, seconds if camera.isdecimal() else None)
+    few = max(1, round(source.rate / 3))
+    try:
+        images = (gray(image) for k, (_, image) in enumerate(taken) if k % few == 0)
+        made = fit_lens(images, int(columns), int(rows), square)
+    except ValueError as error:
+        raise StudyError(str(error)) from None
+    finally:
+        source.close()
+    _save(out, made.to_toml())
+    typer.echo(f"The board's corners are off by {made.rms:.2f} pixels.\nWritten: {out}")
+
+
+# --- what was asked for -----------------------------------------------------------------------------------------------
+
+
+def _wanted(
+    study: Path | None, trials: Path | None, trial: int | None, into: Path | None
+) -> TrialToTrack | None:
+    """The trial that the video shows; None where none was named."""
+    if study is not None and trials is not None:
+        raise StudyError("--study and --trials exclude each other: the trial is in a ledger or in a file.")
+    if (trial is None) != (study is None and trials is None):
+        raise StudyError(
+            "A trial is named by --study DIR --trial NUMBER, or by --trials FILE --trial NUMBER."
+        )
+    if trial is None:
+        if into is not None:
+            raise StudyError("--into keeps a trial with its commands. Name it: --study DIR --trial NUMBER")
+        return None
+    if trials is not None and into is None:
+        raise StudyError(
+            "Where does the trial with its poses go? Name a file with --into, such as tracked.jsonl."
+        )
+    from realitygap.study import trial_of_file, trial_of_ledger
+
+    if study is not None:
+        return trial_of_ledger(study, trial)
+    return trial_of_file(trials, trial)  # type: ignore[arg-type]
+
+
+def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
+    """The robot's tag by options: number or FAMILY:NUMBER, side [m], height [m], and AHEAD,LEFT,DEGREES.
+
+    Raises:
+        StudyError: One of them cannot be.
+    """
+    from realitygap.errors import did_you_mean
+    from realitygap.vision import FAMILIES, RobotTag
+
+    family, colon, number = text.rpartition(":")
+    if not number.isdecimal() or (colon and family not in FAMILIES):
+        raise StudyError(
+            f"--tag is {text!r}, expected a number such as 10, or FAMILY:NUMBER. {did_you_mean(family, FAMILIES)}"
+        )
+    try:
+        ahead, left, degrees = (float(part) for part in at.split(","))
+    except ValueError:
+        raise StudyError(f"--tag-at is {at!r}, expected three numbers such as 0.02,0,90.") from None
+    try:
+        return RobotTag(int(number), size, height, family, ahead, left, math.radians(degrees))
+    except ValueError as error:
+        raise StudyError(f"The robot's tag: {error}") from None
+
+
+def _marks(
+    arena: str | None,
+    wanted: TrialToTrack | None,
+    tag: RobotTag,
+    lens: Path | None,
+    corner_size: float | None,
+    corner_inset: float | None,
+) -> Marks:
+    from realitygap.world import load_arena
+
+    place = load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
+    if wanted is not None and place.grid != wanted.arena.grid:
+        raise StudyError(
+            f"The trial was in arena {wanted.arena.name!r}, and --arena is another. Leave it out."
+        )
+    return marks_of(place, tag, lens, corner_size, corner_inset)
+
+
+def marks_of(
+    arena: Arena, tag: RobotTag, lens: Path | None, corner_size: float | None, corner_inset: float | None
+) -> Marks:
+    """What is known before a camera looks, by options.
+
+    Raises:
+        VisionError: The lens cannot be read.
+    """
+    from realitygap.vision import CORNER_SIZE_M, Marks, read_lens
+
+    known = None if lens is None else read_lens(lens)
+    return Marks(arena, tag, known, CORNER_SIZE_M if corner_size is None else corner_size, corner_inset)
+
+
+def _refuse_outputs(
+    out: Path | None, save_lens: Path | None, overlay: Path | None, into: Path | None, camera: str
+) -> None:
+    """Refuse what cannot be written before a video is gone through."""
+    for path, ending in ((out, ".csv"), (save_lens, ".toml"), (overlay, ".mp4"), (into, ".jsonl")):
+        if path is None:
+            continue
+        if path.suffix != ending:
+            raise StudyError(f"{path} does not end in {ending}. Expected a name such as track{ending}.")
+        _refuse_folder(path)
+    if overlay is not None and (camera.isdecimal() or overlay.resolve() == Path(camera).resolve()):
+        raise StudyError("--overlay draws into a copy of a video file. Film first, and name another file.")
+
+
+def _refuse_folder(path: Path) -> None:
+    if not path.resolve().parent.is_dir():
+        raise StudyError(f"There is no folder {path.parent} for {path.name}. Make it, or name another file.")
+
+
+def _refuse_toml(path: Path) -> None:
+    if path.suffix != ".toml":
+        raise StudyError(f"{path} does not end in .toml. Expected the name of a lens, such as phone.toml.")
+    _refuse_folder(path)
+
+
+# --- what is done -----------------------------------------------------------------------------------------------------
+
+
+def _tracked(source: Source, marks: Marks, seconds: float | None) -> Tracked:
+    from realitygap.vision import Tracker
+
+    try:
+        tracker = Tracker(marks.tag)
+        try:
+            for time, image in _for_seconds(source, seconds):
+                tracker.take(time, image)
+        except KeyboardInterrupt:
+            if not source.name.startswith("camera "):
+                raise
+        return marks.tracked(tracker.sightings())
+    except ValueError as error:
+        raise StudyError(str(error)) from None
+    finally:
+        source.close()
+
+
+def _for_seconds(source: Source, seconds: float | None) -> Iterator[tuple[float, Any]]:
+    first: float | None = None
+    for time, image in source:
+        first = time if first is None else first
+        if seconds is not None and time - first > seconds:
+            return
+        yield time, image
+
+
+def _write(
+    found: Tracked,
+    marks: Marks,
+    source: Source,
+    out: Path | None,
+    save_lens: Path | None,
+    overlay: Path | None,
+) -> None:
+    if out is not None:
+        _save(out, found.track.to_csv())
+    if save_lens is not None:
+        _save(save_lens, found.camera.lens.to_toml())
+    if overlay is not None:
+        from realitygap.vision import save_overlay
+
+        save_overlay(overlay, source, found, marks.arena, source.rate)
+
+
+def _save(path: Path, text: str) -> None:
+    from realitygap.records import write_whole
+
+    write_whole(path, text.encode())
+
+
+def _told(camera: str, found: Tracked, placed: TrackedTrial) -> str:
+    """The note that goes with what is entered into a ledger."""
+    begun = placed.beginning
+    how = "said" if math.isnan(begun.agreement) else f"agreement {begun.agreement:.2f}"
+    what = f"video {Path(camera).name}"
+    if not camera.isdecimal():
+        with Path(camera).open("rb") as file:
+            what += f", sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
+    return (
+        f"Cells and path by camera: {what}; begins at {begun.time:.2f} s ({how}); robot seen in {placed.seen:.0%} of "
+        f"its pictures; tag {found.tag.family}:{found.tag.number}."
+    )
+
+
+def _enter(
+    wanted: TrialToTrack,
+    placed: TrackedTrial,
+    study: Path | None,
+    trial: int,
+    into: Path | None,
+    told: str,
+    role: ScoreRole,
+) -> None:
+    from realitygap.records import ObservationsFile
+    from realitygap.study import score_tracked
+
+    with contextlib.ExitStack() as stack:  # a file that does not do is refused before the ledger is written
+        file = None if into is None else stack.enter_context(ObservationsFile(into, wanted.head))
+        if study is not None:
+            score_tracked(study, trial, placed, told, role)
+        if file is not None:
+            file.append(placed.trial)
+
+
+@dataclass(frozen=True)
+class _Written:
+    """Where things went."""
+
+    out: Path | None
+    lens: Path | None
+    overlay: Path | None
+    into: Path | None
+    study: Path | None
+
+
+def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as_json: bool) -> None:
+    track, camera = found.track, found.camera
+    n, n_seen = len(found.sightings.times), int(track.seen.sum())
+    x, y, above = camera.place.tolist()
+    if as_json:
+        values: dict[str, Any] = {
+            "pictures": n,
+            "seen": n_seen,
+            "longest_gap_s": track.longest_gap_s,
+            "from_s": float(track.times[0]),
+            "to_s": float(track.times[-1]),
+            "tag": f"{found.tag.family}:{found.tag.number}",
+            "camera_m": [x, y, above],
+            "corner_tags": sorted(found.sightings.corners),
+            "corner_rms_px": camera.rms,
+            "tag_size_error": track.size_error,
+            "warnings": list(found.warnings),
+        }
+        if placed is not None:
+            begun = placed.beginning
+            values |= {
+                "begins_s": begun.time,
+                "agreement": None if math.isnan(begun.agreement) else begun.agreement,
+                "cells": list(placed.score.cells),
+            }
+        typer.echo(json.dumps(values, indent=2))
+        return
+    typer.echo(
+        f"Tag {found.tag.family}:{found.tag.number} seen in {n_seen} of {n} pictures; longest gap "
+        f"{track.longest_gap_s:.2f} s, filled in."
+    )
+    typer.echo(f"The camera stands {above:.2f} m above the floor.")
+    if placed is not None:
+        begun = placed.beginning
+        how = "as said" if math.isnan(begun.agreement) else f"commands and way agree to {begun.agreement:.2f}"
+        typer.echo(
+            f"The trial begins at {begun.time:.2f} s ({how}) and crosses {len(placed.score.cells)} cells."
+        )
+    for said in found.warnings:
+        typer.echo(f"Note: {said}")
+    if written.study is not None:
+        typer.echo(f"Entered into the ledger of {written.study}.")
+    for path in (written.out, written.lens, written.overlay, written.into):
+        if path is not None:
+            typer.echo(f"Written: {path}")

@@ -1,0 +1,213 @@
+"""What a camera saw of trials: into the ledger of a study, and beside what was observed otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import StudyError
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    ObservationsFile,
+    ObservationsHead,
+    ObservedTrial,
+    ResultsFolder,
+    Score,
+    ScoreRole,
+    Step,
+    read_observations,
+)
+from realitygap.robots import DEFAULT_ROBOT
+from realitygap.runs import Condition, genome_of
+from realitygap.trials import PATH_PARTS, cell_at
+from realitygap.vision import Beginning, Track, find_beginning
+from realitygap.world import Arena, Grid
+
+from ._targets import FULL_SCALE
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TrialToTrack:
+    """A trial that was driven, and is to be found in a video.
+
+    Attributes:
+        head: What a file of its observation begins with.
+        trial: As it was observed; without poses.
+        times: (t + 1,) when each command began, and when the last ended, since the trial's beginning [s].
+        arena: Where.
+    """
+
+    head: ObservationsHead
+    trial: ObservedTrial
+    times: Floats
+    arena: Arena
+
+
+@dataclass(frozen=True)
+class TrackedTrial:
+    """A trial with what a camera saw of it.
+
+    Attributes:
+        trial: With poses and cells.
+        score: For a ledger.
+        beginning: When it begins in the video.
+        seen: Share of the pictures in it in which the robot was found.
+    """
+
+    trial: ObservedTrial
+    score: Score
+    beginning: Beginning
+    seen: float
+
+
+def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
+    """A driven trial of a study, with its commands step by step.
+
+    Raises:
+        StudyError: It was not driven, or has no commands.
+        RecordError: There is no such study or trial.
+    """
+    with Ledger.open(Path(folder) / LEDGER_NAME, writable=False) as ledger:
+        trial, steps = ledger.trial(number), ledger.steps(number)
+        individuals = ledger.individuals(trial.condition, trial.replicate, trial.generation)
+        sittings = ledger.sittings()
+        label = ledger.conditions()[trial.condition]["label"]
+    if trial.state not in ("driven", "scored") or not steps:
+        raise StudyError(
+            f"Trial {number} of {folder} is {trial.state}, expected one that was driven. See: realitygap trials list "
+            f"{folder}"
+        )
+    described = next(
+        each
+        for each in ResultsFolder.open(folder).description["conditions"]
+        if each["name"] == trial.condition
+    )
+    condition = Condition.from_settings(trial.condition, described["settings"])
+    arena = condition.arena.arena()
+    times = _times(steps)
+    observed = ObservedTrial(
+        start=(arena.start.x, arena.start.y, arena.start.heading),
+        step_s=float(np.median(np.diff(times))),
+        commands=np.array([(step.move, step.turn) for step in steps], np.float64),
+        readings=np.minimum(np.array([step.raw for step in steps], np.float64) / FULL_SCALE, 1.0),
+        stalled=np.array([step.stalled for step in steps], np.bool_),
+        cells=trial.cells or (),
+        genome=genome_of(condition, individuals[trial.individual]).to_json(),
+        number=number,
+        end=trial.end or "step limit",
+    )
+    port = f"scribbler:{sittings[-1]['port']}" if sittings else "scribbler"
+    head = ObservationsHead(
+        port, label or "REAL", DEFAULT_ROBOT, arena.to_dict(), condition.scribbler.wait_s, "track"
+    )
+    return TrialToTrack(head, observed, times, arena)
+
+
+def _times(steps: list[Step]) -> Floats:
+    """When each command began and the last ended, since the first [s]."""
+    began = np.array([step.time for step in steps], np.float64)
+    usual = float(np.median(np.diff(began))) if len(began) > 1 else 0.5
+    times: Floats = np.append(began, began[-1] + usual) - began[0]
+    return times
+
+
+def trial_of_file(path: str | Path, number: int) -> TrialToTrack:
+    """A trial of a file of observed trials, the last one with its number.
+
+    Raises:
+        StudyError: There is none with this number.
+        RecordError: The file cannot be read.
+    """
+    found = read_observations(path)
+    trials = {trial.number: trial for trial in found.trials if len(trial.commands)}
+    if number not in trials:
+        has = ", ".join(map(str, sorted(trials))) or "none"
+        raise StudyError(f"{path} has no trial {number}; it has {has}.")
+    trial = trials[number]
+    times = np.arange(len(trial.commands) + 1, dtype=np.float64) * trial.step_s
+    head = replace(found.head, observe="track")
+    return TrialToTrack(head, trial, times, Arena.from_dict(dict(found.head.arena)))
+
+
+def place_trial(
+    wanted: TrialToTrack, track: Track, begins_s: float | None = None, who: str = "camera"
+) -> TrackedTrial:
+    """Find a trial in a track, and cut it out.
+
+    Args:
+        wanted: The trial.
+        track: Of a video with all of it.
+        begins_s: When it begins in the video [s]; found by its commands where that is not said.
+        who: Enters it.
+
+    Raises:
+        VisionError: It cannot be found.
+        StudyError: The robot was not seen from its beginning to its end.
+    """
+    if begins_s is None:
+        begun = find_beginning(track, wanted.times, wanted.trial.commands, wanted.trial.stalled)
+    else:
+        begun = Beginning(begins_s, float("nan"))
+    first, last = begun.time, begun.time + wanted.times[-1]
+    if not (track.times[0] <= first and last <= track.times[-1]):
+        raise StudyError(
+            f"The trial goes from {first:.2f} to {last:.2f} s of the video, and the robot is seen from "
+            f"{track.times[0]:.2f} to {track.times[-1]:.2f} s. Film it from before it begins until it stands, or "
+            "correct --begins."
+        )
+    times = first + wanted.times
+    score = score_along(track, times, wanted.arena.grid, who)
+    trial = replace(wanted.trial, poses=track.at(times), cells=tuple(sorted(score.cells)))
+    return TrackedTrial(trial, score, begun, float(track.between(first, last).seen.mean()))
+
+
+def score_along(track: Track, times: Floats, grid: Grid, who: str) -> Score:
+    """What a trial scores by its track.
+
+    Args:
+        track: With all of the trial in it.
+        times: (t + 1,) when each command began, and when the last ended [s].
+        grid: Whose cells are counted.
+        who: Enters it.
+    """
+    rows = np.arange(len(times), dtype=np.float64)
+    fine = np.interp(np.arange((len(rows) - 1) * PATH_PARTS + 1) / PATH_PARTS, rows, times)
+    cells = track.between(float(times[0]), float(times[-1])).cells(grid)
+    ends = {cell_at(grid, x, y) for x, y, _ in track.at(times).tolist()} - {None}
+    return Score(cells, who, n_ends=len(ends), path=np.round(track.at(fine), 6).tolist())
+
+
+def score_tracked(
+    folder: str | Path, number: int, tracked: TrackedTrial, told: str, role: ScoreRole = "score"
+) -> None:
+    """Enter what a camera saw of a trial into the ledger: cells, path, and a note that says of what video.
+
+    Args:
+        folder: Of the study.
+        number: Of the trial.
+        tracked: What was seen.
+        told: The note.
+        role: As in `Ledger.score`.
+
+    Raises:
+        LedgerError: The ledger does not take it.
+    """
+    with Ledger.open(Path(folder) / LEDGER_NAME) as ledger:
+        ledger.score(number, tracked.score, role)
+        ledger.note(told, tracked.score.who, number)
+
+
+def keep_tracked(path: str | Path, wanted: TrialToTrack, tracked: TrackedTrial) -> None:
+    """Add a trial with its poses to a file of observed trials, from which `calibrate_from` fits.
+
+    Raises:
+        RecordError: The file has trials of something else, or cannot be written.
+    """
+    with ObservationsFile(path, wanted.head) as file:
+        file.append(tracked.trial)

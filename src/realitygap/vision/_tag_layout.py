@@ -1,0 +1,121 @@
+"""Where tags are: four at the corners of an arena, flat on its floor, and one on top of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.world import Arena
+
+from ._tag_family import FAMILIES
+
+Floats = NDArray[np.float64]
+
+CORNER_IDS = (0, 1, 2, 3)
+"""Lower left, lower right, upper right, upper left."""
+
+CORNER_SIZE_M = 0.06
+CORNER_INSET_M = 0.01
+"""From the walls; outside of them by as much where the cells leave no room inside."""
+
+
+@dataclass(frozen=True)
+class RobotTag:
+    """A tag on top of a robot, its upper edge towards the robot's front.
+
+    Attributes:
+        number: In its family.
+        size: Side of its black square [m].
+        height: Above the floor [m].
+        family: A key of `FAMILIES`; empty where it is found by looking.
+        ahead: Its middle, seen from the point of the robot that poses tell of [m].
+        left: Likewise.
+        turned: How much it is turned counter-clockwise against the robot [rad].
+    """
+
+    number: int = 10
+    size: float = 0.07
+    height: float = 0.1
+    family: str = ""
+    ahead: float = 0.0
+    left: float = 0.0
+    turned: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no tag.
+
+        Raises:
+            ValueError: A size that is not above 0, a height below the floor, or a family that nobody knows.
+        """
+        if not self.size > 0:
+            raise ValueError(f"size is {self.size}, expected a length above 0 m.")
+        if not self.height >= 0:
+            raise ValueError(f"height is {self.height}, expected at least 0 m.")
+        if self.family and self.family not in FAMILIES:
+            raise ValueError(f"family is {self.family!r}, expected one of {', '.join(FAMILIES)}.")
+
+    def corners(self) -> Floats:
+        """(4, 2) upper left, upper right, lower right and lower left of its square, about its middle [m].
+
+        Its upper edge is towards +x.
+        """
+        half = self.size / 2
+        return np.array([(half, half), (half, -half), (-half, -half), (-half, half)])
+
+
+def bounds(arena: Arena) -> tuple[float, float, float, float]:
+    """Left, lower, right and upper end of an arena's walls [m]."""
+    walls = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
+    (left, lower), (right, upper) = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
+    return float(left), float(lower), float(right), float(upper)
+
+
+def corner_tags(
+    arena: Arena, size: float = CORNER_SIZE_M, inset: float | None = None
+) -> Mapping[int, Floats]:
+    """The corners of the four tags at an arena's corners, upright for who looks with +y up.
+
+    As `realitygap print-sheet` has them, unless something else is said: in the ring around the reachable cells where
+    that is wide enough, else just outside the walls.
+
+    Args:
+        arena: Whose walls span a rectangle.
+        size: Side of a tag's black square [m].
+        inset: From the walls to the nearest edges of the square [m]; below 0 where they lie outside the walls.
+
+    Returns:
+        By number: (4, 3) upper left, upper right, lower right and lower left, on the floor [m].
+
+    Raises:
+        ValueError: They do not fit.
+    """
+    left, lower, right, upper = bounds(arena)
+    if inset is None:
+        inset = CORNER_INSET_M if _ring(arena) >= size + CORNER_INSET_M else -CORNER_INSET_M - size
+    if not size > 0 or 2 * (size + inset) >= min(right - left, upper - lower):
+        raise ValueError(
+            f"Tags of {size:g} m, {inset:g} m from the walls, expected such as fit into the corners of "
+            f"{right - left:.3f} x {upper - lower:.3f} m."
+        )
+    near, far = inset, inset + size
+    return {
+        0: _square(left + near, lower + near, size),
+        1: _square(right - far, lower + near, size),
+        2: _square(right - far, upper - far, size),
+        3: _square(left + near, upper - far, size),
+    }
+
+
+def _ring(arena: Arena) -> float:
+    """The least way from the walls to the reachable cells [m]."""
+    (left, lower, right, upper), grid = bounds(arena), arena.grid
+    far_x, far_y = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
+    return min(grid.x - left, grid.y - lower, right - far_x, upper - far_y)
+
+
+def _square(x: float, y: float, size: float) -> Floats:
+    """(4, 3) of an upright square whose lower left is at x, y."""
+    return np.array([(x, y + size, 0.0), (x + size, y + size, 0.0), (x + size, y, 0.0), (x, y, 0.0)])

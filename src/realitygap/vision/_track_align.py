@@ -1,0 +1,90 @@
+"""When a trial begins in a video: where its commands and what the robot did go together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import VisionError
+
+from ._track import Track
+
+Floats = NDArray[np.float64]
+
+COARSE_S, FINE_S = 0.05, 0.005  # between beginnings that are tried
+LEAST_AGREEMENT = 0.7  # of a beginning that is believed
+LEAST_LEAD = 0.03  # over all that begin half a step or more away
+MOST_TRIED = 200_000
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """When a trial begins.
+
+    Attributes:
+        time: In the track's time [s].
+        agreement: Correlation of commands with what the robot did, mean of ahead and turn; 1 is perfect, nan where a
+            person said when.
+    """
+
+    time: float
+    agreement: float
+
+
+def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArray[np.bool_]) -> Beginning:
+    """When a trial begins in a track.
+
+    Each command should have moved the robot ahead and turned it as it said; steps that began stalled are left out.
+
+    Args:
+        track: Of a robot, with the whole trial in it.
+        times: (t + 1,) when each command began, and when the last ended, since the trial's beginning [s].
+        commands: (t, 2) move and turn.
+        stalled: (t,).
+
+    Raises:
+        VisionError: The track is too short, or nowhere like the commands.
+    """
+    room = track.times[-1] - track.times[0] - times[-1]
+    if room < 0:
+        raise VisionError(
+            f"The trial lasts {times[-1]:.1f} s, and the robot is seen for {track.times[-1] - track.times[0]:.1f} s. "
+            "Film it from before it begins until it stands."
+        )
+    step = max(COARSE_S, room * len(times) / MOST_TRIED)
+    tried = track.times[0] + np.arange(0.0, room + 1e-9, step)
+    found = _agreement(track, tried, times, commands, ~stalled)
+    best = tried[int(np.argmax(found))]
+    away = np.abs(tried - best) >= np.diff(times).mean() / 2
+    near = best + np.arange(-step, step + FINE_S, FINE_S)
+    near = near[(near >= track.times[0]) & (near + times[-1] <= track.times[-1])]
+    finer = _agreement(track, near, times, commands, ~stalled)
+    most = float(finer.max()) if len(finer) else float(found.max())
+    next_best = float(found[away].max(initial=-1.0))
+    if not (most >= LEAST_AGREEMENT and most - next_best >= LEAST_LEAD):
+        raise VisionError(
+            f"Where the trial begins in the video is not clear: its commands and the robot's way agree to {most:.2f} "
+            f"at best (expected {LEAST_AGREEMENT} or more, and {LEAST_LEAD} more than elsewhere, where it is "
+            f"{next_best:.2f}). Say when it begins with --begins SECONDS, or name its video."
+        )
+    return Beginning(float(near[int(np.argmax(finer))]) if len(finer) else float(best), most)
+
+
+def _agreement(
+    track: Track, beginnings: Floats, times: Floats, commands: Floats, which: NDArray[np.bool_]
+) -> Floats:
+    """(b,) for each beginning."""
+    poses = track.at(np.clip((beginnings[:, None] + times).ravel(), track.times[0], track.times[-1]))
+    poses = poses.reshape(len(beginnings), len(times), 3)
+    moved = np.diff(poses, axis=1)
+    heading = poses[:, :-1, 2] + moved[..., 2] / 2
+    ahead = moved[..., 0] * np.cos(heading) + moved[..., 1] * np.sin(heading)
+    found = []
+    for done, told in ((ahead, commands[:, 0]), (moved[..., 2], commands[:, 1])):
+        done, told = done[:, which], told[which]
+        size = np.sqrt((done**2).sum(axis=1) * (told**2).sum())
+        if (told**2).sum() > 0:
+            found.append(np.divide(done @ told, size, out=np.zeros(len(done)), where=size > 1e-9))
+    return np.mean(found, axis=0) if found else np.zeros(len(beginnings))

@@ -1,0 +1,183 @@
+"""A robot followed while it drives: a camera beside driver and emulator, and one that is lost."""
+
+import time
+
+import numpy as np
+import pytest
+
+from realitygap.errors import RobotError, StudyError, VisionError
+from realitygap.records import LEDGER_NAME, Ledger
+from realitygap.robots import ScribblerPlatform
+from realitygap.study import CameraAttendant, CameraOperator, connect_robot, run_study
+from realitygap.testing import Film, FilmedCamera, path_through
+from realitygap.trials import RobotTarget, TrialPlan, WitnessAttendant, WitnessOperator
+from realitygap.vision import LiveTrack, Marks, Track, Tracked
+from realitygap.world import paper_arena
+from tests.study.physical import small_study
+
+ARENA = paper_arena()
+
+
+class _Played:
+    """A film whose pictures come when somebody lets them, and whose clock is theirs."""
+
+    name, rate = "camera 7", 15.0
+
+    def __init__(self, pictures):
+        self._pictures, self.time, self.size = pictures, 0.0, (640, 360)
+        self.is_closed = False
+
+    def __iter__(self):
+        for at, image in self._pictures:
+            self.time = at
+            yield at, image
+            time.sleep(0.002)
+
+    def close(self):
+        self.is_closed = True
+
+
+@pytest.fixture(scope="module")
+def film():
+    poses = np.array([(0.3, 0.3, 0.2), (0.4, 0.32, 0.3), (0.5, 0.35, 0.2)])
+    camera = FilmedCamera(width=960, height=540, noise=2.0)
+    return Film(path_through(np.arange(3) * 0.4, poses), 0.8, rate=15.0, filmed=camera)
+
+
+def test_pictures_are_followed_as_they_come_and_forgotten_when_a_trial_begins(film):
+    source = _Played(list(film))
+    with LiveTrack(source, Marks(ARENA, lens=film.camera.lens), lambda: source.time) as live:
+        track = live.tracked(until_s=0.7).track
+        assert track.times[0] == 0.0
+        assert track.poses[:, :2] == pytest.approx(film.truth(track.times)[:, :2], abs=2e-3)
+        live.begin()
+        with pytest.raises(VisionError, match="camera 7 gives no more pictures"):
+            live.tracked(until_s=2.0)
+    assert source.is_closed
+
+
+def test_what_fails_in_the_camera_is_told_to_who_waits(film):
+    def broken():
+        yield next(iter(film))
+        raise OSError("the cable is out")
+
+    with (
+        LiveTrack(_Played(broken()), Marks(ARENA), lambda: 0.0) as live,
+        pytest.raises(VisionError, match="camera 7 failed: the cable is out"),
+    ):
+        live.tracked(until_s=1.0)
+
+
+class _AboveEmulator:
+    """Sees an emulated robot as a camera would: at 30 pictures a second, with errors of half a millimeter."""
+
+    def __init__(self, beside, late_s=0.0):
+        self._beside, self._late_s, self.now = beside, late_s, None
+
+    def begin(self):
+        witness = self._beside._witness
+        self.now = witness.now
+        self._began = witness.now()
+        self._start = witness.pose()
+
+    def tracked(self, until_s=None):
+        path = self._beside._witness.path()
+        times = np.arange(self._began + self._late_s, until_s + 1 / 30, 1 / 30)
+        start = np.array([[self._began, *self._start]])
+        path = np.concatenate([start, path[path[:, 0] > self._began]])
+        poses = np.column_stack(
+            [np.interp(times, path[:, 0], column) for column in np.unwrap(path[:, 1:4], axis=0).T]
+        )
+        poses += np.random.default_rng(1).normal(0, 5e-4, poses.shape)
+        return Tracked(Track(times, poses, np.ones(len(times), np.bool_)), None, None, None, ())
+
+
+def _drive(late_s=0.0, *, with_camera=True):
+    beside = WitnessAttendant()
+    attendant = CameraAttendant(beside, _AboveEmulator(beside, late_s)) if with_camera else beside
+    opened = connect_robot("emulator://s2?fluke=2&speed=off")
+    plan = TrialPlan(commands=np.array([[1.0, 0.0]] * 4 + [[0.5, 0.5]] * 3), number=5)
+    with RobotTarget(
+        lambda: opened(ScribblerPlatform(reading_max=6400.0)), ARENA, attendant, name="scribbler:emulated"
+    ) as target:
+        assert target.observes == "track"
+        return target.carry_out([plan], "track")[0]
+
+
+def test_a_trial_under_a_camera_has_poses_and_cells_like_those_of_the_witness():
+    seen, true = _drive(), _drive(with_camera=False)
+    assert (seen.end, seen.observe) == ("step limit", "track")
+    assert seen.poses.shape == (8, 3)
+    assert seen.poses[:, :2] == pytest.approx(true.poses[:, :2], abs=3e-3)
+    assert np.cos(seen.poses[:, 2] - true.poses[:, 2]) == pytest.approx(np.ones(8), abs=1e-4)
+    assert seen.cells == true.cells
+    assert seen.wheels == pytest.approx(true.wheels)
+
+
+def test_a_trial_that_the_camera_saw_in_part_is_lost_and_said_to_be():
+    with pytest.raises(RobotError, match=r"saw the robot from 0\.\d to 3\.\d s of a trial of 3\.\d s"):
+        _drive(late_s=1.0)
+
+
+class _Beside:
+    """A person, in place of whom a witness puts the robot down; counts nothing."""
+
+    def __init__(self, witness):
+        self._as = witness
+        self._as.drawn = lambda card, driven: None
+
+    def __getattr__(self, name):
+        return getattr(self._as, name)
+
+
+class _AboveStudy(_AboveEmulator):
+    """The same, where the witness is an operator's."""
+
+    def begin(self):
+        self._beside._witness = self._beside.witness
+        super().begin()
+
+
+def test_a_study_is_scored_by_a_camera_as_by_the_witness_and_says_what_it_did_not_see(tmp_path):
+    study = small_study("coverage", steps="6")
+    witness, said = WitnessOperator(), []
+    operator = CameraOperator(_Beside(witness), _AboveStudy(witness), ARENA.grid, said.append)
+    port = "emulator://s2?fluke=1&speed=off"
+    run_study(study, tmp_path / "seen", port=port, operator=operator)
+    run_study(study, tmp_path / "true", port=port)
+    with (
+        Ledger.open(tmp_path / "seen" / LEDGER_NAME, writable=False) as seen,
+        Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as true,
+    ):
+        pairs = list(zip(seen.scores(), true.scores(), strict=True))[:3]  # later ones are bred from these
+    assert len(pairs) == 3
+    for one, other in pairs:
+        assert one["who"] == "camera"
+        assert len(set(one["cells"]) ^ set(other["cells"])) <= 1
+        off = np.array(one["path"])[:, :2] - np.array(other["path"])[:, :2]
+        assert np.hypot(*off.T).max() < 0.01
+    assert said[0].startswith("The camera counts ")
+    late = WitnessOperator()
+    operator = CameraOperator(_Beside(late), _AboveStudy(late, late_s=1.0), ARENA.grid, said.append)
+    result = run_study(study, tmp_path / "late", port=port, operator=operator)
+    assert result.physical.waiting
+    assert "Count its cells by hand" in said[-1]
+
+
+def test_a_camera_as_an_option_says_what_it_looks_for():
+    from realitygap.cli._camera import parse_camera, under_camera
+
+    number, marks = parse_camera("2?tag=aruco4x4:7&tag-height=0.12&corner-inset=-0.05", ARENA)
+    assert (number, marks.tag.family, marks.tag.number, marks.tag.height) == (2, "aruco4x4", 7, 0.12)
+    assert marks.corner_inset == -0.05
+    for spec, said in (
+        ("x", "expected a camera's number"),
+        ("0?tga=3", "Did you mean 'tag'"),
+        ("0?tag-size=a", "in meters"),
+    ):
+        with pytest.raises(StudyError, match=said):
+            parse_camera(spec, ARENA)
+    with pytest.raises(StudyError, match="tell where they are"), under_camera("0", ARENA, None):
+        pass
+    with under_camera(None, ARENA, None) as nobody:
+        assert nobody is None

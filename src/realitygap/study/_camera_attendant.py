@@ -46,13 +46,16 @@ class CameraAttendant:
 
     def __init__(self, beside: Attendant, camera: Looking) -> None:
         self._beside, self._camera = beside, camera
+        self.identity = beside.identity
         self._times: list[float] = []
         self._track: Track | None = None
 
     def meet(self, robot: Robot, arena: Arena) -> Clock:
         """A robot was opened."""
         self._arena = arena
-        return self._beside.meet(robot, arena)
+        clock = self._beside.meet(robot, arena)
+        self.identity = self._beside.identity
+        return clock
 
     def place(self, plan: TrialPlan, start: Pose) -> None:
         """Put it at a start, and look from then on."""

@@ -55,6 +55,7 @@ class RecordedTarget:
         self._trials = list(whole.values())
         self.name = name or f"recorded:{path}"
         self.label = cast("Label", found.head.label)
+        self.identity = found.head.identity
         self.arena = Arena.from_dict(cast("dict[str, Any]", dict(found.head.arena)))
         self.step_s = float(np.median([trial.step_s for trial in self._trials]))
         self.n_sensors = self._trials[0].readings.shape[1]

@@ -193,7 +193,7 @@ def test_complete_study_has_no_banner(tiny_page):
 
 
 def test_other_version_is_announced_and_not_warned_of(out, monkeypatch, recwarn):
-    for module in ("_folder", "_chunk"):
+    for module in ("_folder", "_published_results", "_chunk"):
         monkeypatch.setattr(f"realitygap.records.{module}.RESULTS_VERSION", 99)
     strange = describe("c", settings=settings(flux=3))
     folder = write_results(out, [strange], {"c": random_runs(2)})

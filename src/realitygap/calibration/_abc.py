@@ -117,8 +117,8 @@ def fit_all(
 
 
 def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter]) -> Posterior:
-    """Draws of two posteriors by turns, as many of each."""
-    n = min(len(one.places), len(other.places))
+    """Draws of two posteriors by turns, as many of each, and together as many as either has."""
+    n = min(len(one.places), len(other.places)) // 2
     places = np.stack([one.places[:n], other.places[:n]], axis=1).reshape(2 * n, -1)
     off = (one.off + other.off) / 2
     return Posterior(places, values_of(prior, places), off, one.n_simulated + other.n_simulated)

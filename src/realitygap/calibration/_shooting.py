@@ -18,13 +18,13 @@ from ._handles import Known, own_values, place_of, values_at
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
 from ._prior import Parameter
 from ._scatter import NoisePrior, Scatter
-from ._simulate import Bools, Floats, Ints, Simulate, plain_numbers
+from ._simulate import Floats, Ints, Simulate, plain_numbers
 from ._wheel_ways import wheel_ways
 from ._windows import Windows, differences, simulate_windows, wrapped
 
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
-LEAST_WAY = 1e-4  # [m] of a wheel in a window in which it stands
+STANDS = 1e-3  # [m/s] of the wheels, below which no noise goes on, as in kernels/_sim_drive.py
 FIRST_NOISE = np.array([0.02, 0.03, 0.1, 0.05, 0.01, 0.001, 0.005, 0.005, 0.001])
 PRIOR_PRECISION = 12.0  # of an even prior over 0..1
 MOST_STEPS, MOST_DAMPING = 15, 1e4  # of least squares
@@ -94,9 +94,8 @@ def scatter_of(problem: Problem, place: Floats) -> Scatter:
     made = simulate_windows(problem.simulate, problem.robot, problem.known, windows, values)
     before, after, wheels = windows.seen
     seen = np.concatenate([np.repeat(np.isfinite(after[:, :1]), 3, axis=1), np.isfinite(wheels)], axis=1)
-    stands = ways.way.max(axis=1) < LEAST_WAY
-    seen[stands & has_moved(windows), :3] = False
     span = (windows.last - windows.first) * windows.step_s
+    stands = ways.way.mean(axis=1) <= STANDS * span
     turn = np.nan_to_num(wrapped(made.after[0, :, 2] - before[:, 2]))
     own = plain_numbers(problem.robot)
     slip, track = (
@@ -120,12 +119,6 @@ def _in_channels(wheels: Floats, slip: float, track: float) -> Floats:
     return np.stack(
         [grip * (left + right) / 2, np.zeros_like(left), grip * (right - left) / track, left, right], axis=1
     )
-
-
-def has_moved(windows: Windows) -> Bools:
-    """(w,) whether a command other than to stand came before the window: while wheels run down, noise goes on."""
-    moves = np.abs(windows.commands).max(axis=2) > 0
-    return np.asarray(np.maximum.accumulate(moves, axis=1)[windows.trial, windows.first])
 
 
 def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats) -> tuple[Floats, float]:

@@ -9,6 +9,7 @@ import pytest
 
 from realitygap.calibration import fit_from_poses, numbers_of, ranges_of, scribbler_prior, values_of
 from realitygap.calibration._rays import rays_of
+from realitygap.calibration._shots import shots_of
 from realitygap.robots import SimPlatform
 from realitygap.study._calibrate_all import all_plans
 from realitygap.trials import SimEnsemble, SimTarget
@@ -37,6 +38,15 @@ def test_rays_meet_walls_boxes_and_discs() -> None:
     assert distances[0, 0] == pytest.approx(0.5 - 0.04 - 0.25, abs=5e-4)
     assert cosines[0, 0] == pytest.approx(0.8, abs=0.06)
     assert rays_of(sensor, np.array([[0.3, 0.3, 0.0]]), ARENA)[1][0, 0] == 1.0
+
+
+def test_a_command_counts_where_the_robot_was_seen_before_and_after_it() -> None:
+    with SimTarget(PLATFORM, ARENA, key=1) as target:
+        (trial,) = target.carry_out(all_plans(ARENA, PLATFORM.robot, 1, 1), "track")
+    poses = trial.poses.copy()
+    poses[5] = np.nan
+    shots = shots_of([replace(trial, poses=poses)], PLATFORM.robot, ARENA)
+    assert np.flatnonzero(~shots.known[0]).tolist() == [4, 5]
 
 
 @pytest.mark.parametrize("seed", [1, 3])

@@ -26,7 +26,7 @@ class Shots:
         play: The trials, with poses as anchors.
         poses: (k, t + 1, 3) x [m], y [m], heading [rad]; not a number where a trial had ended.
         moved: (k, t, 3) ahead [m], aside [m] and turn [rad], in the frame of the robot before the command.
-        known: (k, t) whether there was such a command.
+        known: (k, t) whether there was such a command, and the robot was seen before and after it.
         touching: (k, t) whether the robot was near a wall before or after it.
         stalled: (k, t) whether it knew before it that it stalls.
         readings: (k, t, s) of its range sensors before it.
@@ -69,7 +69,7 @@ def shots_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -
         Play(poses[:, 0], t, commands, anchors=poses),
         poses,
         _in_own_frame(poses[:, 1:], poses[:, :-1]),
-        np.isfinite(poses[:, 1:]).all(axis=2),
+        np.isfinite(poses[:, 1:]).all(axis=2) & np.isfinite(poses[:, :-1]).all(axis=2),
         near[:, :-1] | near[:, 1:],
         stalled,
         readings,

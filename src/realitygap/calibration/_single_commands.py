@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ._prior import Floats, Parameter
 from ._shots import Shooter
 from ._tempering import sample_posterior
+from ._windows import wrapped
 
 NOISE = (
     "drive.delay_jitter",
@@ -29,9 +30,7 @@ NOISE = (
 SLIP = "drive.slip"
 FREEDOM = 4.0  # degrees, of the t distribution
 FINEST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] added to the scale of differences of free robots
-COARSE = np.array(
-    [6e-3, 6e-3, 6e-2]
-)  # likewise of those that touch something: contact is where `sim` errs most
+COARSE = np.array([6e-3, 6e-3, 6e-2])  # likewise where robots touch something: there `sim` errs most
 MAD = 1.4826  # of a median absolute deviation, to a standard deviation of a normal one
 PRIOR = 12.0  # precision of a place that is even in 0..1
 STEP = 0.02  # of slopes, in places
@@ -44,7 +43,7 @@ MOST_OFF = 5.0  # standard deviations beyond which a difference tells of no nois
 SCAN = (0.002, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 0.998)  # places of each parameter that are tried first
 SCANS = 2
 N_SHIFT = 100  # robots that show by how much noise moves the mean
-WIDER = 2.0  # times the spread of draws: what makes 90 % intervals hold 90 % of robots drawn from the prior
+WIDER = 2.0  # times the spread of draws, which hold the truth of robots of `sim` too seldom
 NOISE_FLOOR = np.array([1e-4, 1e-3])  # [m, rad]
 PARTS = {"drive.delay_jitter": 0.05, "drive.heading_noise_per_m": 0.05,
          "drive.heading_noise_per_s": 0.02, "drive.travel_noise_per_m": 0.01}  # fmt: skip
@@ -131,7 +130,7 @@ class MotionOfCommands:
         tried[at, at], tried[p + at, at] = ends
         off = self._off(tried)
         fall = off[:p] - off[p:]
-        fall[..., 2] = np.remainder(fall[..., 2] + np.pi, 2 * np.pi) - np.pi
+        fall[..., 2] = wrapped(fall[..., 2])
         return np.asarray(fall / (ends[1] - ends[0])[:, None, None, None])
 
     def _scales(self, off: Floats) -> Floats:
@@ -209,7 +208,7 @@ class MotionOfCommands:
             only = np.zeros((N_PARTS, q))
             only[:, k] = size
             made = self._off(np.repeat(places[None], N_PARTS, axis=0), only, key=17 + k) - own
-            made[..., 2] = np.remainder(made[..., 2] + np.pi, 2 * np.pi) - np.pi
+            made[..., 2] = wrapped(made[..., 2])
             made_by[k] = (made**2).mean(axis=0) / size**2
             parts[k] = made_by[k][free][:, [0, 2]].reshape(-1)
         squares = (off[free][:, [0, 2]] ** 2).reshape(-1)

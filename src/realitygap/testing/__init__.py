@@ -1,6 +1,21 @@
-"""Helpers for people who add a robot, and films drawn by code; nothing else in the package imports them."""
+"""Helpers for people who add a robot, and films and photographs drawn by code; nothing else here imports them."""
 
 from ._filmed import Film, FilmedCamera, path_through, save_film
 from ._robot import RobotContractError, check_robot
+from ._sheet_drawing import Difficulty
+from ._sheet_photograph import SheetPhotograph, photograph_sheet
+from ._sheet_trials import cells_along_path, driven_paths
 
-__all__ = ["Film", "FilmedCamera", "RobotContractError", "check_robot", "path_through", "save_film"]
+__all__ = [
+    "Difficulty",
+    "Film",
+    "FilmedCamera",
+    "RobotContractError",
+    "SheetPhotograph",
+    "cells_along_path",
+    "check_robot",
+    "driven_paths",
+    "path_through",
+    "photograph_sheet",
+    "save_film",
+]

@@ -1,8 +1,29 @@
-"""What cameras see: arrays and pictures in, values out. OpenCV comes with the extra `vision`."""
+"""Eyes: what cameras see; pictures in, values out. OpenCV comes with the extra `vision`.
 
+Pen traces on a photograph of a sheet: a `SheetLayout` is what is printed for an arena, its grid, four tags, the start,
+and a box to try each pen in; `score_sheet` finds that sheet and says which cells each pen's trace crosses, and how sure
+that is. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_trace` and `visited_cells`.
+
+A robot under a camera: `track_video` follows the tag on a robot in an arena with four corner tags.
+"""
+
+from ._cells import visited_cells
+from ._errors import SheetError
+from ._find import Sheet, find_sheet, rectify
+from ._ink import ink_density
+from ._layout import PEN_NAMES, SheetLayout
+from ._lens import View
+from ._overlay import overlay_png
+from ._path import trace_path
+from ._pens import PenMaps, separate_pens
+from ._photo import photo_bytes, photo_hash, read_photo
+from ._print import PAPERS, sheet_pdf, sheet_tiles
+from ._score import SheetScore, TraceScore, score_sheet
+from ._sheet_trials import SheetTrials, trials_on_sheet
 from ._tag_family import CORNER_FAMILY, FAMILIES, tag_bits
 from ._tag_layout import CORNER_SIZE_M, RobotTag, corner_tags
 from ._tag_print import print_tags
+from ._trace import Trace, follow_trace, follow_traces
 from ._track import Track, cells_along, track_of
 from ._track_align import Beginning, find_beginning
 from ._track_camera import Camera, fit_camera
@@ -17,31 +38,58 @@ __all__ = [
     "CORNER_FAMILY",
     "CORNER_SIZE_M",
     "FAMILIES",
+    "PAPERS",
+    "PEN_NAMES",
     "Beginning",
     "Camera",
     "CameraDevice",
     "Lens",
     "LiveTrack",
     "Marks",
+    "PenMaps",
     "RobotTag",
+    "Sheet",
+    "SheetError",
+    "SheetLayout",
+    "SheetScore",
+    "SheetTrials",
     "Sightings",
     "Source",
+    "Trace",
+    "TraceScore",
     "Track",
     "Tracked",
     "Tracker",
     "VideoFile",
+    "View",
     "cells_along",
     "corner_tags",
     "draw_overlay",
     "find_beginning",
+    "find_sheet",
     "fit_camera",
     "fit_lens",
+    "follow_trace",
+    "follow_traces",
     "gray_of",
+    "ink_density",
     "open_source",
+    "overlay_png",
+    "photo_bytes",
+    "photo_hash",
     "print_tags",
     "read_lens",
+    "read_photo",
+    "rectify",
     "save_overlay",
+    "score_sheet",
+    "separate_pens",
+    "sheet_pdf",
+    "sheet_tiles",
     "tag_bits",
+    "trace_path",
     "track_of",
     "track_video",
+    "trials_on_sheet",
+    "visited_cells",
 ]

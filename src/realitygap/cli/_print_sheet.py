@@ -1,0 +1,97 @@
+"""`realitygap print-sheet`: the sheet that traces are scored on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from realitygap.errors import RealityGapError
+
+if TYPE_CHECKING:
+    from realitygap.vision import SheetLayout
+    from realitygap.world import Arena
+
+
+def print_sheet(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.pdf", help="Where it is written.")],
+    arena: Annotated[str, typer.Option(metavar="NAME", help="An arena by name, or its file.")] = "paper",
+    pens: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST", help="Names beside the boxes, such as black,red. [default: a study's eight]"
+        ),
+    ] = None,
+    study: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Take arena and pens from a folder of results.")
+    ] = None,
+    paper: Annotated[
+        str, typer.Option(metavar="a4|letter|a3|arena", help="Pages to join, or one as large as the sheet.")
+    ] = "a4",
+) -> None:
+    """Write the sheet for an arena as PDF at true scale: grid, start, four tags, and a box to try each pen in.
+
+    Print it at 100 %, cut the pages at their marks and join them edge to edge; lay tracing paper over it, or draw on it
+    at once. Before a photo is taken draw a line with each pen in its box: so its color is known in that light.
+
+    Example: realitygap print-sheet --paper a3 -o sheet.pdf
+
+    In Python: realitygap.vision.sheet_pdf(layout, "a3")
+    """
+    from realitygap.records import write_whole
+    from realitygap.vision import sheet_pdf, sheet_tiles
+
+    layout = sheet_layout(arena, pens, study)
+    data = sheet_pdf(layout, paper)
+    write_whole(out, data)
+    n_pages = len(sheet_tiles(layout, paper))
+    left, lower, right, upper = layout.paper
+    pages = "1 page" if n_pages == 1 else f"{n_pages} pages"
+    typer.echo(
+        f"Written: {out} ({pages}; the sheet is {1000 * (right - left):.0f} x {1000 * (upper - lower):.0f} mm)"
+    )
+
+
+def sheet_layout(arena: str, pens: str | None, study: Path | None) -> SheetLayout:
+    """The sheet of an arena, or of a study's.
+
+    Raises:
+        RealityGapError: There is no such arena or study, a sheet does not fit, or the pens are no list.
+    """
+    from realitygap.vision import PEN_NAMES, SheetLayout
+    from realitygap.world import load_arena
+
+    names = PEN_NAMES if pens is None else tuple(pen.strip() for pen in pens.split(","))
+    if not all(names) or len(set(names)) < len(names):
+        raise RealityGapError(f"--pens is {pens!r}, expected different names such as black,red,blue.")
+    if study is None:
+        where = load_arena(arena)
+    else:
+        where, of_study = study_sheet(study)
+        names = of_study if pens is None else names
+    try:
+        return SheetLayout.of(where, names)
+    except ValueError as error:
+        raise RealityGapError(f"{error}.") from error
+
+
+def study_sheet(folder: Path, condition: str | None = None) -> tuple[Arena, tuple[str, ...]]:
+    """Arena and pens of a study: of one condition, or of its first that a robot drives.
+
+    Raises:
+        RealityGapError: The folder holds no results.
+    """
+    from realitygap.records import ResultsFolder
+    from realitygap.runs import Condition
+    from realitygap.vision import PEN_NAMES
+
+    description = ResultsFolder.open(folder).description
+    pens = tuple((description.get("trials") or {}).get("pens") or PEN_NAMES)
+    conditions = [
+        Condition.from_settings(each["name"], each["settings"])
+        for each in description["conditions"]
+        if condition in (None, each["name"])
+    ]
+    chosen = next((each for each in conditions if each.is_physical), conditions[0])
+    return chosen.arena.arena(), pens

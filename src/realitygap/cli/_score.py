@@ -1,0 +1,262 @@
+"""`realitygap score`: what a photo of a sheet says of the trials that drew on it."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from realitygap.errors import StudyError
+
+if TYPE_CHECKING:
+    from realitygap.records import Ledger, Score, ScoreRole, Trial
+    from realitygap.vision import SheetScore, SheetTrials, TraceScore
+
+
+def score(
+    photo: Annotated[
+        Path, typer.Argument(metavar="PHOTO", help="JPEG, PNG, TIFF or WebP, of the whole sheet.")
+    ],
+    study: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Enter what is confirmed into this folder's ledger.")
+    ] = None,
+    generation: Annotated[
+        int | None, typer.Option(min=0, metavar="G", help="Of the trials on the sheet.")
+    ] = None,
+    condition: Annotated[str | None, typer.Option(metavar="NAME", help="Of the trials on the sheet.")] = None,
+    run: Annotated[int | None, typer.Option(min=0, help="Of the trials on the sheet.")] = None,
+    sheet: Annotated[
+        int | None, typer.Option(min=1, help="Its number, as `realitygap trials list` has it.")
+    ] = None,
+    arena: Annotated[
+        str, typer.Option(metavar="NAME", help="Without a study: an arena by name, or its file.")
+    ] = "paper",
+    pens: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST", help="Without a study: pens as printed on the sheet. [default: a study's eight]"
+        ),
+    ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.png", help="The picture to confirm. [default with a study: DIR/sheet-N.png]"
+        ),
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="You have looked at the picture: enter its cells without asking.")
+    ] = False,
+    who: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Who confirms. [default: your account's name]")
+    ] = None,
+    second: Annotated[
+        bool, typer.Option("--second", help="As a second count, for the agreement alone.")
+    ] = False,
+    correct: Annotated[
+        bool, typer.Option("--correct", help="As a correction after the generation was closed.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print as JSON; enters nothing without --yes.")
+    ] = False,
+) -> None:
+    """Read the crossed cells off a photo of a sheet from print-sheet, to be confirmed by eye.
+
+    The sheet is found by its four tags and its grid; lens, tilt and light are taken out; pens are told apart by how
+    they look in their boxes. Look at the picture that is written: cells less than 90 % sure are framed in it. In a
+    terminal each trial is asked for; elsewhere the same command with --yes enters them. The ledger then has the photo's
+    SHA-256, what was read from it, and who confirmed what.
+
+    Example: realitygap score sheet.jpg --study results/paper-robot --generation 0
+
+    Example: realitygap score sheet.jpg --overlay seen.png
+
+    In Python: realitygap.vision.score_sheet(photo, layout)
+    """
+    if second and correct:
+        raise StudyError("--second and --correct exclude each other: a correction replaces the first count.")
+    if study is None:
+        chosen = {"--generation": generation, "--condition": condition, "--run": run, "--sheet": sheet}
+        alone = [name for name, value in chosen.items() if value is not None]
+        alone += [
+            name for name, value in (("--yes", yes), ("--second", second), ("--correct", correct)) if value
+        ]
+        if alone:
+            raise StudyError(f"{', '.join(alone)}: of which study? Name its folder (--study DIR).")
+        _only_show(photo, arena, pens, overlay, as_json=as_json)
+        return
+    if pens is not None:
+        raise StudyError("--pens goes without --study, whose file names its pens. Leave it out.")
+    from realitygap.records import LEDGER_NAME, Ledger
+    from realitygap.vision import trials_on_sheet
+
+    role: ScoreRole = "second" if second else "correction" if correct else "score"
+    with Ledger.open(study / LEDGER_NAME) as ledger:
+        on_sheet = trials_on_sheet(
+            ledger, generation, condition=condition, replicate=run, sheet=sheet, role=role
+        )
+        _score_trials(
+            ledger, study, photo, on_sheet, role, who or getpass.getuser(), overlay, yes=yes, as_json=as_json
+        )
+
+
+def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, *, as_json: bool) -> None:
+    from realitygap.records import write_whole
+    from realitygap.vision import overlay_png, photo_bytes, photo_hash, read_photo, score_sheet
+
+    from ._print_sheet import sheet_layout
+
+    data = photo_bytes(photo)
+    found = score_sheet(read_photo(data), sheet_layout(arena, pens, None))
+    if overlay is not None:
+        write_whole(overlay, overlay_png(found))
+    if as_json:
+        rows = [_as_json(trace) for trace in found.traces]
+        typer.echo(json.dumps({"photo": photo_hash(data), "traces": rows}, indent=2))
+        return
+    for trace in found.traces:
+        typer.echo(f"{trace.pen + 1} {trace.name}: {_told(trace)}")
+    _say_what_was_guessed(found)
+    if overlay is not None:
+        typer.echo(f"Written: {overlay}")
+
+
+def _as_json(trace: TraceScore) -> dict[str, Any]:
+    return {
+        "pen": trace.name, "cells": list(trace.cells), "doubtful": list(trace.doubtful),
+        "confidence": [round(float(trace.confidence[cell]), 4) for cell in trace.cells],
+    }  # fmt: skip
+
+
+def _told(trace: TraceScore) -> str:
+    cells = " ".join(map(str, trace.cells)) or "none"
+    doubt = f"; to look at: {' '.join(map(str, trace.doubtful))}" if trace.doubtful else ""
+    return f"{len(trace.cells)} cells: {cells}{doubt}"
+
+
+def _say_what_was_guessed(found: SheetScore) -> None:
+    guessed = [trace.name for trace in found.traces if not trace.is_tried]
+    if guessed:
+        typer.echo(
+            f"Not tried in their boxes, so their colors are guessed from their names: {', '.join(guessed)}.",
+            err=True,
+        )
+
+
+def _score_trials(
+    ledger: Ledger,
+    folder: Path,
+    photo: Path,
+    on_sheet: SheetTrials,
+    role: ScoreRole,
+    who: str,
+    overlay: Path | None,
+    *,
+    yes: bool,
+    as_json: bool,
+) -> None:
+    from realitygap.records import write_whole
+    from realitygap.vision import SheetLayout, overlay_png, photo_bytes, read_photo, score_sheet
+
+    from ._print_sheet import study_sheet
+    from ._trials import _Titles
+
+    arena, pens = study_sheet(folder, on_sheet.waiting[0].condition)
+    titles = _Titles(folder)
+    data = photo_bytes(photo)
+    found = score_sheet(read_photo(data), SheetLayout.of(arena, pens), on_sheet.pens)
+    traces = {trace.pen: trace for trace in found.traces}
+    names = {
+        trial.pen: f"{traces[trial.pen].name}, trial {trial.trial}, {trial.code if titles.blind else trial.name}"
+        for trial in on_sheet.waiting
+    }
+    place = overlay or folder / f"sheet-{on_sheet.sheet}.png"
+    write_whole(place, overlay_png(found, names))
+    if as_json:
+        rows = [{"trial": trial.trial, **_as_json(traces[trial.pen])} for trial in on_sheet.waiting]
+        typer.echo(json.dumps({"sheet": on_sheet.sheet, "overlay": str(place), "trials": rows}, indent=2))
+    else:
+        for trial in on_sheet.waiting:
+            typer.echo(f"{names[trial.pen]}: {_told(traces[trial.pen])}")
+        _say_what_was_guessed(found)
+        typer.echo(f"Written: {place}")
+    _say_what_is_spoiled(on_sheet)
+    is_asked = not yes and not as_json and sys.stdin.isatty() and sys.stdout.isatty()
+    entries = (
+        _confirmed(on_sheet, traces, photo, data, who, arena)
+        if is_asked
+        else _all_confirmed(on_sheet, traces, photo, data, who)
+        if yes
+        else iter(())
+    )
+    n_entered = 0
+    for scores in entries:
+        ledger.score_all(scores, role)
+        n_entered += len(scores)
+    if not as_json:
+        typer.echo(
+            f"{n_entered} trials entered."
+            if n_entered
+            else "Nothing was entered. Look at the picture, then run the same command with --yes."
+        )
+
+
+def _say_what_is_spoiled(on_sheet: SheetTrials) -> None:
+    for trial in on_sheet.waiting:
+        if trial.pen in on_sheet.spoiled:
+            void = on_sheet.spoiled[trial.pen].trial
+            typer.echo(
+                f"Trial {trial.trial}: the pen also drew trial {void}, which is void; where that line is still on the "
+                "sheet the two cannot be told apart, and --yes leaves this trial out.",
+                err=True,
+            )
+
+
+def _all_confirmed(
+    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str
+) -> Iterator[dict[int, Score]]:
+    """All trials together, as they were read; but those whose pen drew twice, and those of which nothing was seen."""
+    scores = {
+        trial.trial: _score_of(traces[trial.pen], traces[trial.pen].cells, photo, data, who)
+        for trial in on_sheet.waiting
+        if trial.pen not in on_sheet.spoiled and traces[trial.pen].cells
+    }
+    if scores:
+        yield scores
+
+
+def _confirmed(
+    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str, arena: Any
+) -> Iterator[dict[int, Score]]:
+    """Trial by trial, as somebody at the terminal says."""
+    from ._operator import pick_cells
+
+    for trial in on_sheet.waiting:
+        trace = traces[trial.pen]
+        cells: tuple[int, ...] | None = trace.cells
+        answer = _answer(trial, trace)
+        if answer == "e":
+            picked = pick_cells(arena, trace.cells)
+            cells = None if picked is None else tuple(picked)
+        if answer != "s" and cells:
+            yield {trial.trial: _score_of(trace, cells, photo, data, who)}
+
+
+def _answer(trial: Trial, trace: TraceScore) -> str:
+    while True:
+        prompt = f"Trial {trial.trial}, {trace.name}, {len(trace.cells)} cells: Enter takes them, e edits them, s skips"
+        answer = typer.prompt(prompt, default="", show_default=False).strip().lower()
+        if answer in ("", "e", "s"):
+            return str(answer)
+
+
+def _score_of(trace: TraceScore, cells: tuple[int, ...], photo: Path, data: bytes, who: str) -> Score:
+    from realitygap.records import PhotoCount, Score
+    from realitygap.vision import photo_hash
+
+    count = PhotoCount(photo.name, photo_hash(data), trace.cells, trace.doubtful, is_confirmed=True)
+    return Score(cells, who, photo=count)

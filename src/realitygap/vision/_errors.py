@@ -1,0 +1,9 @@
+"""What goes wrong with photographs."""
+
+from __future__ import annotations
+
+from realitygap.errors import RealityGapError
+
+
+class SheetError(RealityGapError):
+    """A photograph cannot be read, or the sheet is not on it."""

@@ -1,0 +1,209 @@
+"""What is printed on a sheet for pen traces, and where: in the arena's coordinates, at true scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.world import Arena, Grid, Pose
+
+PEN_NAMES = ("black", "red", "blue", "green", "orange", "purple", "brown", "pink")
+"""Those that a study has when its file names none."""
+
+TAG_IDS = (0, 1, 2, 3)
+"""Of the family 36h11: lower left, lower right, upper right, upper left."""
+
+TAG_SIZE = 0.06  # side of a tag's black square [m]
+TAG_INSET = 0.01  # from the walls to it [m]
+GRID_GRAY = 0.62  # seen by people and camera through tracing paper, and no pen
+GRID_WIDTH = 0.0005
+TEXT_GRAY = 0.45
+KEY_WIDTH = 0.088  # of a box in which a pen is tried, at most [m]
+KEY_HEIGHT = 0.026
+KEY_GAP = 0.012
+KEYS_A_STRIP = 8
+MARGIN = 0.012  # of paper around everything [m]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A straight line or a filled rectangle.
+
+    Attributes:
+        x1, y1, x2, y2: Ends of a line, or opposite corners [m].
+        gray: 0 is black, 1 is the paper's white.
+        width: Of a line [m]; 0 fills the rectangle.
+    """
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    gray: float
+    width: float = 0.0
+
+
+@dataclass(frozen=True)
+class Label:
+    """Words, from their lower left end [m]; `size` is the height of capitals [m]."""
+
+    x: float
+    y: float
+    text: str
+    size: float
+    gray: float = TEXT_GRAY
+
+
+Box = tuple[float, float, float, float]
+"""Left, lower, right and upper end [m]."""
+
+
+@dataclass(frozen=True)
+class SheetLayout:
+    """The sheet of an arena: its walls' rectangle with the grid, four tags, the start, and a box to try each pen in.
+
+    Where the outer ring of cells is wide enough tags and boxes lie in it, where no pen comes; else around the walls.
+
+    Attributes:
+        walls: Left, lower, right and upper end of what the walls enclose [m].
+        grid: The reachable cells.
+        start: Where trials begin.
+        pens: What the boxes are named after.
+    """
+
+    walls: Box
+    grid: Grid
+    start: Pose
+    pens: tuple[str, ...] = PEN_NAMES
+
+    @classmethod
+    def of(cls, arena: Arena, pens: Sequence[str] = PEN_NAMES) -> SheetLayout:
+        """The sheet of an arena.
+
+        Raises:
+            ValueError: Its tags would not fit.
+        """
+        ends = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
+        (left, lower), (right, upper) = ends.min(axis=(0, 1)).tolist(), ends.max(axis=(0, 1)).tolist()
+        layout = cls((left, lower, right, upper), arena.grid, arena.start, tuple(pens))
+        if min(right - left, upper - lower) < 3 * TAG_SIZE:
+            raise ValueError(
+                f"arena {arena.name!r} is {right - left:g} m x {upper - lower:g} m, expected at least {3 * TAG_SIZE:g} "
+                "m each way: four tags lie at its corners"
+            )
+        return layout
+
+    @property
+    def is_ring_free(self) -> bool:
+        """Whether tags and boxes lie between the walls and the reachable cells."""
+        grid, (left, lower, right, upper) = self.grid, self.walls
+        nearest = min(
+            grid.x - left,
+            grid.y - lower,
+            right - grid.x - grid.columns * grid.cell,
+            upper - grid.y - grid.rows * grid.cell,
+        )
+        return nearest >= TAG_SIZE + TAG_INSET
+
+    @property
+    def paper(self) -> Box:
+        """The whole sheet."""
+        out = MARGIN if self.is_ring_free else MARGIN + TAG_SIZE + TAG_INSET
+        left, lower, right, upper = self.walls
+        return left - out, lower - out, right + out, upper + out
+
+    def tag_corners(self) -> NDArray[np.float64]:
+        """(4, 4, 2) of each tag its upper left, upper right, lower right and lower left corner [m]."""
+        inset = TAG_INSET if self.is_ring_free else -TAG_INSET - TAG_SIZE
+        left, lower, right, upper = self.walls
+        xs = (left + inset, right - inset - TAG_SIZE)
+        ys = (lower + inset, upper - inset - TAG_SIZE)
+        square = TAG_SIZE * np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float64)
+        lowers = [(xs[0], ys[0]), (xs[1], ys[0]), (xs[1], ys[1]), (xs[0], ys[1])]
+        return np.array([square + lower_left for lower_left in lowers])
+
+    def key_boxes(self) -> list[Box]:
+        """The box of each pen, in their order: eight below the cells, eight above; of further pens there is none."""
+        tags = self.tag_corners()
+        left, right = tags[0, 1, 0] + 2 * KEY_GAP, tags[1, 0, 0] - 2 * KEY_GAP
+        n = min(len(self.pens), KEYS_A_STRIP)
+        width = min(KEY_WIDTH, (right - left) / max(n, 1) - KEY_GAP)
+        first = (left + right - n * width - (n - 1) * KEY_GAP) / 2
+        middles = (tags[0, :, 1].mean(), tags[3, :, 1].mean())
+        boxes = []
+        for k in range(min(len(self.pens), 2 * KEYS_A_STRIP)):
+            strip, place = divmod(k, KEYS_A_STRIP)
+            x, y = first + place * (width + KEY_GAP), middles[strip]
+            boxes.append((x, y - KEY_HEIGHT / 2, x + width, y + KEY_HEIGHT / 2))
+        return boxes
+
+    def grid_lines(self) -> list[tuple[Literal["x", "y"], float, float, float]]:
+        """Lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
+        grid = self.grid
+        right, upper = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
+        upright = [("x", grid.x + k * grid.cell, grid.y, upper) for k in range(grid.columns + 1)]
+        level = [("y", grid.y + k * grid.cell, grid.x, right) for k in range(grid.rows + 1)]
+        return [*upright, *level]  # type: ignore[list-item]  # the first is a literal
+
+    def thin_marks(self) -> list[Mark]:
+        """What is printed in gray where pens may draw: the grid, and an arrow at the start."""
+        marks = []
+        for which, at, low, high in self.grid_lines():
+            ends = (at, low, at, high) if which == "x" else (low, at, high, at)
+            marks.append(Mark(*ends, GRID_GRAY, GRID_WIDTH))
+        return marks + self._start_marks()
+
+    def outer_marks(self) -> list[Mark]:
+        """What is printed where no pen comes: the walls, the tags, the boxes."""
+        left, lower, right, upper = self.walls
+        marks = [*_outline((left, lower, right, upper), 0.3, 0.0008)]
+        for box in self.key_boxes():
+            marks += _outline(box, GRID_GRAY, GRID_WIDTH)
+        for number, corners in zip(TAG_IDS, self.tag_corners(), strict=True):
+            marks += _tag_marks(number, *corners[3].tolist())
+        return marks
+
+    def labels(self) -> list[Label]:
+        """Which box is which pen's."""
+        return [
+            Label(box[0], box[3] + 0.003, f"{k + 1} {self.pens[k]}", 0.004)
+            for k, box in enumerate(self.key_boxes())
+        ]
+
+    def _start_marks(self) -> list[Mark]:
+        x, y, heading = self.start
+        length, head = 0.3 * self.grid.cell, 0.1 * self.grid.cell
+        tip = x + length * math.cos(heading), y + length * math.sin(heading)
+        marks = [Mark(x, y, *tip, GRID_GRAY, GRID_WIDTH)]
+        for turn in (0.8 * math.pi, -0.8 * math.pi):
+            end = tip[0] + head * math.cos(heading + turn), tip[1] + head * math.sin(heading + turn)
+            marks.append(Mark(*tip, *end, GRID_GRAY, GRID_WIDTH))
+        across = head * math.cos(heading + math.pi / 2), head * math.sin(heading + math.pi / 2)
+        marks.append(Mark(x - across[0], y - across[1], x + across[0], y + across[1], GRID_GRAY, GRID_WIDTH))
+        return marks
+
+
+def _outline(box: Box, gray: float, width: float) -> list[Mark]:
+    left, lower, right, upper = box
+    corners = [(left, lower), (right, lower), (right, upper), (left, upper)]
+    return [Mark(*corners[k], *corners[(k + 1) % 4], gray, width) for k in range(4)]
+
+
+def _tag_marks(number: int, left: float, lower: float) -> list[Mark]:
+    """The black parts of a tag, row by row."""
+    from ._tags import tag_bits
+
+    is_black = ~tag_bits(number)
+    size = TAG_SIZE / len(is_black)
+    marks = []
+    for row, bits in enumerate(is_black[::-1]):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], bits.astype(int), [0]])))
+        for first, end in edges.reshape(-1, 2).tolist():
+            y = lower + row * size
+            marks.append(Mark(left + first * size, y, left + end * size, y + size, 0.0))
+    return marks

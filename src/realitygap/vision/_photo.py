@@ -1,0 +1,147 @@
+"""Reading a photograph or a scan."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._errors import SheetError
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+MOST_BYTES = 64 << 20
+MOST_PIXELS = 120_000_000
+ENOUGH_PIXELS = 30_000_000  # what has more is halved, which takes less memory and time
+LEAST_SIDE, MOST_SIDE = 400, 20_000  # below, neither tags nor lines can be told; above, OpenCV gives up [px]
+KINDS = ("JPEG", "PNG", "TIFF", "WEBP")
+DEEP_MODES = ("I", "I;16", "I;16B", "I;16L", "I;16N")
+
+
+def read_photo(photo: str | Path | bytes) -> NDArray[np.uint8]:
+    """(h, w, 3) RGB of a photograph or a scan, turned as the camera was held; a very large one at half its size.
+
+    Args:
+        photo: Its file, or what is in it: JPEG, PNG, TIFF or WebP.
+
+    Raises:
+        SheetError: It cannot be read, or is no such picture, or is too large or too small.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    name = "The file" if isinstance(photo, bytes) else str(photo)
+    data = photo_bytes(photo)
+    if not data:
+        raise SheetError(f"{name} is empty, expected a photograph of a sheet. Was it copied to the end?")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of size, which is checked here, and of odd entries
+            with Image.open(io.BytesIO(data), formats=KINDS) as picture:
+                _check_size(name, *picture.size)
+                return _upright(picture)
+    except SheetError:
+        raise
+    except UnidentifiedImageError as error:
+        raise SheetError(
+            f"{name} is no picture that can be read: expected JPEG, PNG, TIFF or WebP.{_hint(data)}"
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise SheetError(
+            f"{name} has too many pixels, expected at most {MOST_PIXELS // 1_000_000} million."
+        ) from error
+    except Exception as error:  # a torn file makes decoders raise all kinds
+        raise SheetError(f"{name} cannot be read as a picture: {error}. Is the file whole?") from error
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    is_fit = min(width, height) >= LEAST_SIDE and max(width, height) <= MOST_SIDE
+    if not is_fit or width * height > MOST_PIXELS:
+        raise SheetError(
+            f"{name} has {width} x {height} pixels, expected {LEAST_SIDE} to {MOST_SIDE} each way and at most "
+            f"{MOST_PIXELS // 1_000_000} million in all."
+        )
+
+
+def _upright(picture: Image.Image) -> NDArray[np.uint8]:
+    """(h, w, 3) of any kind of picture: gray, 16 bits deep, for print, with a palette or see-through."""
+    from PIL import Image, ImageOps
+
+    turn = picture.getexif().get(ORIENTATION, 1)
+    if _is_large(picture):
+        picture.draft(None, (picture.width // 2, picture.height // 2))  # a JPEG file is read at half its size
+    whole: Image.Image = picture
+    if whole.mode in DEEP_MODES:
+        whole = Image.fromarray((np.asarray(whole).clip(0, 65535) // 257).astype(np.uint8))
+    if _is_large(whole):
+        whole = (whole.convert("RGB") if whole.mode in ("P", "1") else whole).reduce(2)
+    if whole.has_transparency_data:  # on white, as it is shown
+        clear = whole.convert("RGBA")
+        whole = Image.alpha_composite(Image.new("RGBA", clear.size, "white"), clear)
+    whole = whole.convert("RGB")
+    whole.getexif()[ORIENTATION] = turn
+    return np.array(ImageOps.exif_transpose(whole))
+
+
+ORIENTATION = 0x0112
+"""The number of the Exif entry that says how the camera was held."""
+
+
+def _is_large(picture: Image.Image) -> bool:
+    return picture.width * picture.height > ENOUGH_PIXELS
+
+
+def _hint(data: bytes) -> str:
+    """What to do about a kind of file that phones make, and others."""
+    if data[4:8] == b"ftyp":
+        return (
+            " It looks like HEIC: export it as JPEG, or set the phone's camera to the most compatible format."
+        )
+    if data.startswith(b"%PDF"):
+        return " It is a PDF: scan to JPEG or PNG."
+    return ""
+
+
+def is_gray(image: NDArray[np.uint8]) -> bool:
+    """Whether a picture (h, w, 3) has no colors."""
+    some = image[::7, ::7].astype(np.int16)
+    return bool((some.max(axis=2) - some.min(axis=2)).max() <= GRAY_SPREAD)
+
+
+GRAY_SPREAD = 3
+"""Channels of a gray picture differ by no more than this."""
+
+
+def photo_bytes(photo: str | Path | bytes) -> bytes:
+    """What is in the file of a photograph.
+
+    Raises:
+        SheetError: It cannot be read, or is too large.
+    """
+    if isinstance(photo, bytes):
+        data, name = photo, "The picture"
+    else:
+        name = str(photo)
+        try:
+            if Path(photo).stat().st_size > MOST_BYTES:
+                raise SheetError(
+                    f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet."
+                )
+            data = Path(photo).read_bytes()
+        except OSError as error:
+            raise SheetError(
+                f"{name} cannot be read: {error.strerror or error}. Name a photograph."
+            ) from error
+    if len(data) > MOST_BYTES:
+        raise SheetError(f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet.")
+    return data
+
+
+def photo_hash(data: bytes) -> str:
+    """The SHA-256 of a photograph's file, by which a ledger knows it."""
+    return hashlib.sha256(data).hexdigest()

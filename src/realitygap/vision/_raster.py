@@ -1,0 +1,66 @@
+"""The marks of a sheet as pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import from_extra
+
+from ._layout import Box, Mark
+
+SUB = 4  # fractional bits of OpenCV's drawing coordinates
+
+
+def shape_of(box: Box, px_per_m: float) -> tuple[int, int]:
+    """Rows and columns of a picture of this box."""
+    return round((box[3] - box[1]) * px_per_m), round((box[2] - box[0]) * px_per_m)
+
+
+def to_pixels(points: NDArray[np.float64], box: Box, px_per_m: float) -> NDArray[np.float64]:
+    """(n, 2) column and row of points [m] in a picture of this box, whose pixel 0 has its middle at 0."""
+    column = (points[..., 0] - box[0]) * px_per_m - 0.5
+    row = (box[3] - points[..., 1]) * px_per_m - 0.5
+    return np.stack([column, row], axis=-1)
+
+
+def to_meters(pixels: NDArray[np.float64], box: Box, px_per_m: float) -> NDArray[np.float64]:
+    """(n, 2) points [m] of columns and rows in a picture of this box."""
+    x = (pixels[..., 0] + 0.5) / px_per_m + box[0]
+    y = box[3] - (pixels[..., 1] + 0.5) / px_per_m
+    return np.stack([x, y], axis=-1)
+
+
+def raster(marks: Iterable[Mark], box: Box, px_per_m: float) -> NDArray[np.float32]:
+    """(h, w) how dark marks are, 0 for white paper to 1 for black; row 0 is the upper edge of the box."""
+    cv2 = from_extra("cv2", "vision")
+    picture = np.zeros(shape_of(box, px_per_m), np.float32)
+    fine = np.zeros(picture.shape, np.uint8)
+    for mark in marks:
+        ends = np.array([(mark.x1, mark.y1), (mark.x2, mark.y2)])
+        if mark.width:
+            corners = _stroke(ends, mark.width)
+        else:
+            corners = np.array(
+                [(mark.x1, mark.y1), (mark.x2, mark.y1), (mark.x2, mark.y2), (mark.x1, mark.y2)]
+            )
+        pixels = to_pixels(corners, box, px_per_m)
+        low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - 2, 0)
+        high = np.ceil(pixels.max(axis=0)).astype(int) + 3
+        part = fine[low[1] : high[1], low[0] : high[0]]
+        part[:] = 0
+        moved = np.round((pixels - low) * (1 << SUB)).astype(np.int32)
+        cv2.fillConvexPoly(part, moved, 255, cv2.LINE_AA, SUB)
+        place = picture[low[1] : high[1], low[0] : high[0]]
+        np.maximum(place, part.astype(np.float32) * np.float32((1 - mark.gray) / 255), out=place)
+    return picture
+
+
+def _stroke(ends: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """(4, 2) corners of a line as wide as this."""
+    along = ends[1] - ends[0]
+    length = float(np.hypot(*along))
+    across = np.array([-along[1], along[0]]) * (width / 2 / length)
+    return np.array([ends[0] + across, ends[1] + across, ends[1] - across, ends[0] - across])

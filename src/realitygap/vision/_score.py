@@ -1,0 +1,110 @@
+"""A photograph of a sheet, scored: of each pen the cells that its trace crosses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._cells import cell_features, probabilities
+from ._errors import SheetError
+from ._find import Sheet, find_sheet, rectify
+from ._ink import ink_density
+from ._layout import SheetLayout
+from ._path import trace_path
+from ._pens import separate_pens
+from ._photo import is_gray
+from ._trace import follow_traces
+
+PX_PER_M = 2000.0
+"""Of the rectified sheet: a pen's line is three pixels wide."""
+
+SURE = 0.9
+"""Cells less sure than this are for somebody to look at."""
+
+
+@dataclass(frozen=True)
+class TraceScore:
+    """What a pen drew.
+
+    Attributes:
+        pen: Its number among the layout's pens.
+        name: The pen's.
+        is_tried: Whether its color was seen in its box, and is not a guess from its name.
+        probability: (c,) of each cell of the grid, that the trace crosses it.
+        features: (c, f) what told so, as `realitygap.vision._cells.FEATURES` names it.
+        path: (k, 2) a line through the trace from the start on, in an order in which it may have been drawn [m].
+    """
+
+    pen: int
+    name: str
+    is_tried: bool
+    probability: NDArray[np.float64]
+    features: NDArray[np.float64]
+    path: NDArray[np.float64]
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Cells that it crosses as far as can be said, ascending, columns * row + column."""
+        return tuple(np.flatnonzero(self.probability >= 0.5).tolist())
+
+    @property
+    def confidence(self) -> NDArray[np.float64]:
+        """(c,) how sure it is of each cell that it was told right, 0.5 to 1."""
+        return np.maximum(self.probability, 1 - self.probability)
+
+    @property
+    def doubtful(self) -> tuple[int, ...]:
+        """Cells of which it is less than 90 % sure, crossed or not."""
+        return tuple(np.flatnonzero(self.confidence < SURE).tolist())
+
+
+@dataclass(frozen=True)
+class SheetScore:
+    """A photograph of a sheet, scored.
+
+    Attributes:
+        sheet: Where it is on the photograph.
+        picture: (h, w, 3) uint8 the sheet from straight above, `PX_PER_M` pixels a meter.
+        traces: Of each pen.
+    """
+
+    sheet: Sheet
+    picture: NDArray[np.uint8]
+    traces: tuple[TraceScore, ...]
+
+
+def score_sheet(
+    image: NDArray[np.uint8], layout: SheetLayout, drawn: Sequence[int] | None = None
+) -> SheetScore:
+    """Find a sheet on a photograph, tell its pens apart, follow their traces and say which cells they cross.
+
+    Args:
+        image: (h, w, 3) RGB.
+        layout: What was printed.
+        drawn: Which of the layout's pens drew; all when None.
+
+    Raises:
+        SheetError: The sheet is not found, the picture is gray and of several pens, or a pen's color is not known.
+    """
+    numbers = list(range(len(layout.pens))) if drawn is None else list(drawn)
+    sheet = find_sheet(image, layout)
+    if len(numbers) > 1 and is_gray(image):
+        raise SheetError(
+            f"The picture is gray, and its {len(numbers)} pens are told apart by color. Take a photo in color."
+        )
+    picture = rectify(image, sheet, PX_PER_M)
+    maps = separate_pens(ink_density(picture, layout, PX_PER_M), layout, PX_PER_M, numbers)
+    start = layout.start.x, layout.start.y
+    traces = []
+    for k, (number, trace) in enumerate(zip(numbers, follow_traces(maps, start), strict=True)):
+        features = cell_features(trace, layout.grid)
+        traces.append(
+            TraceScore(
+                number, layout.pens[number], bool(maps.is_tried[k]),
+                probabilities(features), features, trace_path(trace, start),
+            )
+        )  # fmt: skip
+    return SheetScore(sheet, picture, tuple(traces))

@@ -1,0 +1,216 @@
+"""A sheet is printed, its photo read, and what is confirmed stands in the ledger."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from realitygap.cli import main
+from realitygap.records import LEDGER_NAME, Ledger
+from realitygap.testing import cells_along_path, photograph_sheet
+from realitygap.vision import SheetLayout
+from realitygap.world import paper_arena
+
+from .fake_port import STUDY, open_fake
+
+
+@dataclass
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """Commands in this process, with nobody at a terminal."""
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setattr("realitygap.study._run.connect_robot", open_fake)
+
+    def run(*arguments: object) -> Done:
+        monkeypatch.setattr(sys, "argv", ["realitygap", *map(str, arguments)])
+        try:
+            main()
+            code = 0
+        except SystemExit as ended:
+            code = int(ended.code or 0)
+        return Done(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def driven(tmp_path, command):
+    study, out = tmp_path / "small.toml", tmp_path / "out"
+    study.write_text(STUDY)
+    assert command("run", study, "--port", "real", "--out", out, "--no-wait").returncode == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def lines():
+    x, y, _ = paper_arena().start
+    there = np.linspace(0, 1, 200)
+    return [
+        np.column_stack([x + 0.6 * there, y + 0.25 * np.sin(3 * there)]),
+        np.column_stack([x + 0.1 * np.sin(9 * there), y + 0.3 * there]),
+    ]
+
+
+@pytest.fixture(scope="module")
+def photo(tmp_path_factory, lines):
+    path = tmp_path_factory.mktemp("photo") / "sheet.jpg"
+    path.write_bytes(photograph_sheet(SheetLayout.of(paper_arena(), ("red", "blue")), lines, 1).jpeg)
+    return path
+
+
+def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, command):
+    shown = command("score", photo, "--study", driven, "--generation", "0", "--who", "anna")
+    assert shown.returncode == 0, shown.stderr
+    assert "Nothing was entered" in shown.stdout
+    assert (driven / "sheet-1.png").read_bytes().startswith(b"\x89PNG")
+    with Ledger.open(driven / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
+    entered = command("score", photo, "--study", driven, "--generation", "0", "--who", "anna", "--yes")
+    assert "2 trials entered." in entered.stdout
+    with Ledger.open(driven / LEDGER_NAME) as ledger:
+        for trial, line in zip(ledger.trials(), lines, strict=True):
+            assert trial.state == "scored"
+            known = set(cells_along_path(line, paper_arena().grid))
+            assert len(known & set(trial.cells)) / len(known | set(trial.cells)) > 0.9
+        events = [event for event in ledger.events() if event["what"] == "scored"]
+    digest = hashlib.sha256(photo.read_bytes()).hexdigest()
+    for event in events:
+        assert event["details"]["who"] == "anna"
+        assert event["details"]["photo"]["sha256"] == digest
+        assert event["details"]["photo"]["file"] == "sheet.jpg"
+        assert event["details"]["photo"]["is_confirmed"] is True
+
+
+def test_the_counts_of_a_photo_go_on_as_any_others(driven, photo, command, tmp_path):
+    command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
+    second = command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--second", "--who", "ben")
+    assert second.returncode == 0, second.stderr
+    assert "100.0 % judged alike" in command("trials", "agreement", driven).stdout
+    again = command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
+    assert again.returncode == 1
+    assert "none of these trials waits for its cells; they are 2 scored" in again.stderr
+    run = command("run", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    assert run.returncode == 0, run.stderr
+    corrected = command(
+        "score", photo, "--study", driven, "--sheet", "1", "--yes", "--correct", "--who", "anna"
+    )
+    assert "2 trials entered." in corrected.stdout
+
+
+def test_a_pen_that_drew_a_void_trial_too_is_left_out(driven, photo, command, tmp_path):
+    command("trials", "void", driven, "1", "--text", "it was pushed")
+    command("run", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    done = command("score", photo, "--study", driven, "--sheet", "1", "--yes")
+    assert "the pen also drew trial 1, which is void" in done.stderr
+    assert "1 trials entered." in done.stdout
+    with Ledger.open(driven / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["void", "driven", "scored"]
+
+
+def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
+    done = command("score", photo, "--pens", "red,blue", "--json", "--overlay", tmp_path / "seen.png")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert [trace["pen"] for trace in told["traces"]] == ["red", "blue"]
+    for trace, line in zip(told["traces"], lines, strict=True):
+        known = set(cells_along_path(line, paper_arena().grid))
+        assert len(known & set(trace["cells"])) / len(known | set(trace["cells"])) > 0.9
+        assert len(trace["confidence"]) == len(trace["cells"])
+    assert (tmp_path / "seen.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--generation", "0"), "--generation: of which study?"),
+        (("--yes",), "--yes: of which study?"),
+        (("--pens", "red,red"), "expected different names such as black,red,blue"),
+        (("--arena", "papr"), "Did you mean 'paper'?"),
+        (("--study", "none"), "There is no ledger at"),
+        (("--study", "none", "--second", "--correct"), "exclude each other"),
+        (("--study", "none", "--pens", "red"), "--pens goes without --study"),
+    ],
+)
+def test_wrong_options_get_one_clear_message(photo, options, said, command):
+    done = command("score", photo, *options)
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_photo_of_something_else_enters_nothing(driven, tmp_path, command):
+    from PIL import Image
+
+    other = tmp_path / "other.jpg"
+    Image.new("RGB", (800, 600), (200, 180, 160)).save(other)
+    done = command("score", other, "--study", driven, "--generation", "0", "--yes")
+    assert done.returncode == 1
+    assert "Of the sheet's four tags 0 were found" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def _bytes_of(kind: str, photo) -> bytes:
+    if kind == "torn":
+        return photo.read_bytes()[:200_000]
+    if kind == "gray":
+        from PIL import Image
+
+        file = io.BytesIO()
+        with Image.open(photo) as picture:
+            picture.convert("L").save(file, "JPEG")
+        return file.getvalue()
+    fixed = {"empty": b"", "text": b"cells: 1 2 3\n" * 50, "heic": b"\x00\x00\x00\x18ftypheic" + bytes(99)}
+    return fixed[kind]
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("torn", "Is the file whole?"),
+        ("gray", "The picture is gray, and its 2 pens are told apart by color. Take a photo in color."),
+        ("empty", "is empty"),
+        ("text", "no picture that can be read"),
+        ("heic", "It looks like HEIC"),
+    ],
+)
+def test_an_upload_that_is_no_color_photo_gets_one_message_and_enters_nothing(
+    driven, photo, tmp_path, command, kind, said
+):
+    other = tmp_path / "other.jpg"
+    other.write_bytes(_bytes_of(kind, photo))
+    done = command("score", other, "--study", driven, "--generation", "0", "--yes")
+    assert done.returncode == 1
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (driven / "sheet-1.png").exists()
+    with Ledger.open(driven / LEDGER_NAME) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
+
+
+def test_generations_that_are_not_there_are_said(driven, photo, command):
+    done = command("score", photo, "--study", driven, "--generation", "7")
+    assert done.returncode == 1
+    assert "has no such trials" in done.stderr
+
+
+def test_a_sheet_is_printed(tmp_path, command, driven):
+    out = tmp_path / "sheet.pdf"
+    done = command("print-sheet", "-o", out, "--paper", "arena")
+    assert done.stdout == f"Written: {out} (1 page; the sheet is 1091 x 634 mm)\n"
+    assert out.read_bytes().startswith(b"%PDF")
+    assert command("print-sheet", "-o", out, "--study", driven).returncode == 0
+    wrong = command("print-sheet", "-o", out, "--paper", "a44")
+    assert wrong.returncode == 1
+    assert "Did you mean 'a4'" in wrong.stderr

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -67,6 +67,9 @@ def test_no_difference_at_all_is_no_evidence():
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(COVERAGES, min_size=1, max_size=5), st.lists(COVERAGES, min_size=1, max_size=5))
+@example(
+    [10 / 72, 14 / 72, 31 / 72, 56 / 72, 59 / 72], [0.0, 68 / 72]
+)  # equal means: neither side is the observed
 def test_relabelings_are_those_counted_one_by_one(one, other):
     both = np.array(one + other)
     sums = np.array([both[list(which)].sum() for which in itertools.combinations(range(len(both)), len(one))])

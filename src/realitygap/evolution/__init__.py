@@ -1,6 +1,7 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
 from ._archive import NoveltyArchive
+from ._archive_members import Member, archive_members
 from ._distances import DISTANCES, BehaviorDistance, behavior_distance, distance_kind
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
@@ -24,6 +25,7 @@ __all__ = [
     "BehaviorDistance",
     "ConnectionGene",
     "Genome",
+    "Member",
     "NearestArchive",
     "NeatSettings",
     "Network",
@@ -32,6 +34,7 @@ __all__ = [
     "NoveltySettings",
     "PaperArchive",
     "Population",
+    "archive_members",
     "behavior_distance",
     "decode_all",
     "distance_kind",

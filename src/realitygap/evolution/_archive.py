@@ -40,6 +40,11 @@ class NoveltyArchive:
     def __len__(self) -> int:
         return int(self._state[0]) if self._paper is None else len(self._paper)
 
+    @property
+    def packed(self) -> _distances.Behaviors:
+        """The behaviors as kernels read them; the first `len(self)` of them count."""
+        return self._archived if self._paper is None else self._paper._archive.behaviors
+
     def update(self, behaviors: Sequence[Cells] | ArrayLike) -> NDArray[np.float64]:
         """Novelty of one generation, which the archive then takes in.
 

@@ -6,6 +6,7 @@ SVG with the caption that says what was drawn.
 """
 
 from realitygap.report._agreement import Agreement, measure_agreement
+from realitygap.report._archive_figure import draw_archive
 from realitygap.report._arena_figure import draw_arena_and_robot
 from realitygap.report._audit import (
     Audit,
@@ -82,8 +83,9 @@ from realitygap.report._statistics import (
     quartiles,
 )
 from realitygap.report._summary import SUMMARY_SCHEMA, summarize
+from realitygap.report._tally import Tally, read_tally
 from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
-from realitygap.report._trial_figure import draw_trial
+from realitygap.report._trial_figure import ChosenTrial, choose_trial, draw_trial
 
 __all__ = [
     "FAMILY_HEAD",
@@ -103,6 +105,7 @@ __all__ = [
     "AuditedPair",
     "Champions",
     "Choice",
+    "ChosenTrial",
     "Comparison",
     "Confound",
     "DistanceAudit",
@@ -116,6 +119,7 @@ __all__ = [
     "MedianInterval",
     "Quartiles",
     "Side",
+    "Tally",
     "Variety",
     "a12",
     "audit_distance",
@@ -125,11 +129,13 @@ __all__ = [
     "bca_interval",
     "chance_of_best",
     "choose_moving",
+    "choose_trial",
     "compare_choices",
     "compare_conditions",
     "compare_trials",
     "detectable_effect",
     "distance_notes",
+    "draw_archive",
     "draw_arena_and_robot",
     "draw_better_individuals",
     "draw_choices",
@@ -162,6 +168,7 @@ __all__ = [
     "not_counted",
     "permutation_p",
     "quartiles",
+    "read_tally",
     "refuse_gap_page",
     "retry_champions",
     "runs_for_a_claim",

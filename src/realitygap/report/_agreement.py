@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from realitygap.errors import LedgerError
 from realitygap.records import LEDGER_NAME, Ledger
@@ -110,6 +109,8 @@ def _kappa(both: Any, one: Any, other: Any, neither: Any, axis: int = -1) -> npt
 
 
 def _interval(tables: npt.NDArray[np.float64]) -> tuple[float | None, float | None]:
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
     if len(tables) < BCA_SMALLEST_N:
         return None, None
     with warnings.catch_warnings():

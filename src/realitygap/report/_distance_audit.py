@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
-from scipy import special, stats
+from scipy import special
 
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, behavior_distance
@@ -295,6 +295,8 @@ def _front_over_back(means: Values) -> Values:
 
 def _trend(means: Values) -> Values:
     """(b,) Spearman's correlation of (b, c) means with their place; NaN where all are equal."""
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
     # equal but for the rounding of sums is equal
     ranks = stats.rankdata(means.round(9), axis=1)
     ranks -= ranks.mean(axis=1, keepdims=True)
@@ -344,6 +346,8 @@ def spearman(one: Values, other: Values) -> Estimate:
 
     Source: Bonett & Wright (2000), Psychometrika 65(1), 23-28: Fisher's z with variance (1 + r^2 / 2) / (n - 3).
     """
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
     if len(one) < _LEAST_PAIRS or np.ptp(one) == 0 or np.ptp(other) == 0:
         return Estimate(math.nan, math.nan, math.nan)
     # two sums of one distance in another order are one distance

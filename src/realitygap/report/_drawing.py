@@ -136,6 +136,23 @@ def draw_line(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, **style: Any) ->
     axes.add_artist(Line2D(xs, ys, **style))
 
 
+def head_axes(axes: Axes, title: str, label: str) -> None:
+    """Above axes: what they show on the left, of what it is on the right."""
+    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
+        axes.annotate(
+            text,
+            (x, 1.0),
+            (0, 6),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha=align,
+            va="bottom",
+            fontsize=8.0,
+            weight="bold" if x == 0.0 else "normal",
+            color=color,
+        )
+
+
 def shorten(text: str, n_letters: int) -> str:
     """Text of a user's file on one line, printable, at most so long."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text)

@@ -19,6 +19,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    head_axes,
     house_style,
     new_figure,
     place_axes,
@@ -224,7 +225,10 @@ def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], wid
     row = trial.row
     numbers = (row["generation"], row["individual"])
     which = "generation {}, individual {}" if is_wide else "{}/{}"
-    _head(axes, f"{shorten(row['condition'], 24)}, run {row['replicate']}: {which.format(*numbers)}", trial)
+    label = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
+    head_axes(
+        axes, f"{shorten(row['condition'], 24)}, run {row['replicate']}: {which.format(*numbers)}", label
+    )
     return figure
 
 
@@ -378,23 +382,6 @@ def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors
     axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel("coverage")
-
-
-def _head(axes: Axes, title: str, trial: ChosenTrial) -> None:
-    label = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
-    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
-        axes.annotate(
-            text,
-            (x, 1.0),
-            (0, 6),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            ha=align,
-            va="bottom",
-            fontsize=8.0,
-            weight="bold" if x == 0.0 else "normal",
-            color=color,
-        )
 
 
 def content(

@@ -17,6 +17,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    head_axes,
     house_style,
     new_figure,
     place_axes,
@@ -304,16 +305,4 @@ def _label(axes: Axes, n: int, unit: str, title: str, label: str) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel(unit)
-    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
-        axes.annotate(
-            text,
-            (x, 1.0),
-            (0, 6),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            ha=align,
-            va="bottom",
-            fontsize=8.0,
-            weight="bold" if x == 0.0 else "normal",
-            color=color,
-        )
+    head_axes(axes, title, label)

@@ -21,6 +21,7 @@ from realitygap.records import Delivery, ResultsFolder
 from realitygap.runs import Condition
 
 from ._executors import ChunkTask, Listener
+from ._interrupts import held_interrupts
 from ._job_queue import JobQueue
 from ._order import CARRY_OUT, make_order
 
@@ -173,11 +174,12 @@ class _Sitting:
         while True:
             if self._cluster.client.status != "running":
                 self._lost()
-            self._count_workers()
-            self._send()
-            if not self._under_way:
-                return
-            self._accept(self._some_ended())
+            with held_interrupts():
+                self._count_workers()
+                self._send()
+                if not self._under_way:
+                    return
+                self._accept(self._some_ended())
 
     def recall(self) -> None:
         """Ask for nothing more; what workers still compute finds no inbox."""
@@ -219,7 +221,7 @@ class _Sitting:
         each.future.add_done_callback(lambda _: self._ended.put(key))
 
     def _some_ended(self) -> list[_UnderWay]:
-        """What has ended, with or without a result; waits for it a moment, which lets Ctrl-C through."""
+        """What has ended, with or without a result; waits for it a moment."""
         ended: list[_UnderWay] = []
         with contextlib.suppress(queue.Empty):
             key = self._ended.get(timeout=0.2)

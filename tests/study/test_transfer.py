@@ -1,9 +1,10 @@
 import json
+import re
 
 import numpy as np
 import pytest
 
-from realitygap.errors import RecordError, StudyError
+from realitygap.errors import DescriptionError, RecordError, StudyError
 from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.study import STRATEGIES, transfer
 from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
@@ -99,6 +100,22 @@ def test_a_folder_of_another_transfer_is_left_alone(result, calibration):
     before = target.n
     with pytest.raises(RecordError, match="seed was 1, is 2"):
         transfer("sim-paper", target, ["plain"], [8], out=folder, calibration=calibration, seed=2, **SMALL)
+    assert target.n == before
+
+
+def test_a_calibration_may_lie_elsewhere_and_not_say_something_else(result, calibration, tmp_path):
+    """A folder that had been moved with its calibration was taken for another transfer's."""
+    _, target, folder = result
+    arguments, before = ("sim-paper", target, ["plain"], [8]), target.n
+    moved = tmp_path / "moved.toml"
+    text = calibration.read_text()
+    moved.write_text(re.sub("^date = .*$", 'date = "2026-01-01T00:00:00+00:00"', text, flags=re.MULTILINE))
+    transfer(*arguments, out=folder, calibration=moved, **SMALL)
+    moved.write_text(re.sub("^trials = .*$", "trials = 7", text, flags=re.MULTILINE))
+    with pytest.raises(RecordError, match="fit was"):
+        transfer(*arguments, out=folder, calibration=moved, **SMALL)
+    with pytest.raises(DescriptionError, match="There is no calibration"):
+        transfer(*arguments, out=folder, calibration=tmp_path / "none.toml", **SMALL)
     assert target.n == before
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -14,6 +15,7 @@ from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
 from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target
+from realitygap.world import load_calibration
 
 from ._file import load_study
 from ._study import Study
@@ -65,6 +67,7 @@ class TransferPlan:
         repeats: Trials of each individual in simulation.
         observe: How much calibrating sees of a trial.
         calibration: File of one that was made before; empty to calibrate on the budget.
+        fit: SHA-256 of what that file says: it may lie elsewhere the next time.
         seed: Of all random numbers.
     """
 
@@ -80,6 +83,7 @@ class TransferPlan:
     repeats: int = 8
     observe: Observe = "cells"
     calibration: str = ""
+    fit: str = ""
     seed: int = 1
 
 
@@ -124,6 +128,7 @@ def transfer(
 
     Raises:
         StudyError: No such study, condition or strategy, or a task whose worth nobody sees from outside.
+        DescriptionError: The calibration is none.
         RecordError: The folder belongs to another transfer.
         RobotError: The target failed; what was tried is safe.
         TypeError, ValueError: A number that is none, or out of its range.
@@ -142,6 +147,7 @@ def transfer(
         repeats=whole_number("repeats", repeats, 1),
         observe=_known_observation(observe),
         calibration="" if calibration is None else str(calibration),
+        fit="" if calibration is None else _fit_of(calibration),
         seed=whole_number("seed", seed, 0, 2**63 - 1),
     )
     chosen = _at_the_pace_of(target, choose_condition(study, condition, plan.seed))
@@ -277,7 +283,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
     if path.exists():
         there = json.loads(path.read_text("utf-8"))
         now = json.loads(json.dumps(asdict(plan)))
-        extends = ("replicates", "budgets", "fresh_trials", not_compared(there, now))
+        extends = ("replicates", "budgets", "fresh_trials", "calibration", not_compared(there, now))
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
         if different:
             shown = "; ".join(
@@ -290,6 +296,12 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
     for part in ("trials", "fresh", "champions", "calibrations"):
         (folder / part).mkdir(parents=True, exist_ok=True)
     write_whole(path, json.dumps(asdict(plan), indent=2).encode())
+
+
+def _fit_of(calibration: str | Path) -> str:
+    """SHA-256 of what the file of a calibration says, but when it was made."""
+    said = load_calibration(calibration).model_dump(mode="json", exclude={"date"})
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 
 def _budgets(budget: int | Sequence[int]) -> tuple[int, ...]:

@@ -1,10 +1,19 @@
-"""How good fits of all parameters are, as JSON: intervals on `sim` itself, and prediction on twins.
+"""How good fits of all parameters are, as lines of JSON.
 
-`python benchmarks/calibration.py sim --robots 12` draws robots from the prior, carries out 20 trials of each in `sim`,
-and says what share of the 90 % intervals hold the truth (simulation-based calibration);
-`python benchmarks/calibration.py twins close worn --seeds 1 2 --observe track cells` calibrates against twins of these
-families, 20 trials each, and says the root mean square over held-out random controllers of how far the coverage that
-`sim` predicts is off, noise taken out, before (the robot as its file has it) and after (draws of the posterior).
+`python benchmarks/calibration.py sim --n 12 --observe track cells` draws robots from the prior, carries out 20 trials
+of each in `sim`, and says which of the 90 % intervals hold the truth (simulation-based calibration) and how far
+identified parameters are off.
+
+`python benchmarks/calibration.py flags --families alien` says which twins are flagged as what `sim` cannot make.
+
+`python benchmarks/calibration.py same --n 30` measures the gap to twins that have none, and says which intervals
+exclude no gap.
+
+`python benchmarks/calibration.py twins --families close worn --n 2 --observe track cells` calibrates against twins, 20
+trials each, and says the root mean square over held-out random controllers of how far the coverage that `sim` predicts
+is off, noise taken out, before (the robot as its file has it) and after (draws of the posterior).
+
+With --out lines go to a file, too, and what is in it is not measured again; docs/make_calibration.py reads it.
 """
 
 from __future__ import annotations
@@ -13,6 +22,9 @@ import argparse
 import json
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,63 +33,86 @@ import numpy as np
 from realitygap.calibration import numbers_of, random_controllers, scribbler_prior, values_of
 from realitygap.robots import SimPlatform
 from realitygap.robots.twin import sample_twin
-from realitygap.study import calibrate_all
+from realitygap.study import calibrate_all, gap_between
 from realitygap.trials import SimEnsemble, SimTarget, TrialPlan, TwinTarget
-from realitygap.world import paper_arena
+from realitygap.world import Calibration, paper_arena
 
 ARENA = paper_arena()
 PLATFORM = SimPlatform()
 BUDGET = 20  # trials of a calibration
 HELD_OUT = 99  # seed of the controllers that are predicted
+N_HELD_OUT, N_TRIALS = 40, 6  # of these, and of each of them
+N_SAME, N_TRIALS_SAME = 30, 10  # likewise of gaps that are none
 N_ROBOTS = 120  # of the posterior that predict
 FIRST = 10_000  # number of the first held-out trial: none of the calibration's
+NEAR, NEAR_PRIOR = 0.05, 0.1  # how far an identified parameter may be off, of itself or of its prior's width
 
 
-def on_sim(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """What each way to observe gives on robots drawn from the prior."""
+def on_sim(_: str, seed: int, observe: str) -> dict[str, Any]:
+    """Whether intervals hold the truth of a robot drawn from the prior, and whether estimates are near it."""
     prior = scribbler_prior(PLATFORM.robot)
-    for observe in options.observe:
-        inside = []
-        for k in range(options.robots):
-            places = np.clip(np.random.default_rng(k).normal(size=(1, len(prior))), -3, 3)
-            values = values_of(prior, places)
-            numbers = {name: float(v[0]) for name, v in numbers_of(prior, values, PLATFORM.robot).items()}
-            with SimTarget(SimPlatform(set=numbers), ARENA, key=k) as target:
-                found = calibrate_all(target, observe=observe, budget=BUDGET, seed=k, effort=options.effort)
-            inside.append([fit.low <= values[fit.name][0] <= fit.high for fit in found.fitted])
-        shares = np.mean(inside, axis=0)
-        each = {
-            parameter.name: round(float(share), 3) for parameter, share in zip(prior, shares, strict=True)
-        }
-        yield {"observe": observe, "robots": options.robots, "covered": float(np.mean(inside)), "each": each}
+    places = np.clip(np.random.default_rng(seed).normal(size=(1, len(prior))), -3, 3)
+    values = values_of(prior, places)
+    numbers = {name: float(v[0]) for name, v in numbers_of(prior, values, PLATFORM.robot).items()}
+    with SimTarget(SimPlatform(set=numbers), ARENA, key=seed) as target:
+        found = calibrate_all(target, observe=observe, budget=BUDGET, seed=seed, threads=1, effort="small")  # type: ignore[arg-type]
+    held, near = {}, {}
+    for parameter, fit in zip(prior, found.fitted, strict=True):
+        truth = float(values[parameter.name][0])
+        held[parameter.name] = bool(fit.low <= truth <= fit.high)
+        off = abs(float(parameter.scale(fit.estimate)) - float(parameter.scale(truth))) / parameter.width
+        if fit.identified:
+            near[parameter.name] = bool(off <= NEAR_PRIOR or abs(fit.estimate - truth) <= NEAR * abs(truth))
+    return {"held": held, "near": near, "misspecified": found.misspecified}
 
 
-def on_twins(options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """What each way to observe gives on each twin."""
-    controllers = random_controllers(options.controllers, HELD_OUT)
+def flags(family: str, seed: int, observe: str) -> dict[str, Any]:
+    """Whether a twin is flagged."""
+    with _twin(family, seed) as target:
+        found = _calibrated(target, observe, seed)
+    return {"misspecified": found.misspecified, "notes": list(found.notes)}
+
+
+def same(family: str, seed: int, _: str) -> dict[str, Any]:
+    """Whether the interval of the gap to a twin excludes that there is none."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "twin.toml")
+        file.write_text(sample_twin(family, seed).to_toml())
+        result = gap_between(
+            "sim", f"twin:{file}", n_controllers=N_SAME, trials=N_TRIALS_SAME, processes=1, seed=seed
+        ).study.result
+    return {"rms": [result.rms.low, result.rms.high], "excludes_no_gap": result.excludes_no_gap}
+
+
+def on_twins(family: str, seed: int, observe: str) -> dict[str, Any]:
+    """How far predictions of held-out controllers are off, before and after calibrating."""
+    controllers = random_controllers(N_HELD_OUT, HELD_OUT)
     plans = [
-        TrialPlan(genome=genome, number=FIRST + options.trials * j + r)
+        TrialPlan(genome=genome, number=FIRST + N_TRIALS * j + r)
         for j, genome in enumerate(controllers)
-        for r in range(options.trials)
+        for r in range(N_TRIALS)
     ]
-    for family in options.families:
-        for seed in options.seeds:
-            with tempfile.TemporaryDirectory() as folder:
-                file = Path(folder, "twin.toml")
-                file.write_text(sample_twin(family, seed).to_toml())
-                with TwinTarget(str(file), ARENA, options.processes) as target:
-                    seen = [len(t.cells) / ARENA.grid.n_cells for t in target.carry_out(plans, "cells")]
-                    truth = np.array(seen).reshape(len(controllers), options.trials)
-                    before = _rms_gap(_coverage({}, controllers), truth)
-                    for observe in options.observe:
-                        found = calibrate_all(
-                            target, observe=observe, budget=BUDGET, seed=seed, effort=options.effort
-                        )
-                        after = _rms_gap(_coverage(found.draws, controllers), truth)
-                        yield {
-                            "twin": f"{family}-{seed}", "observe": observe, "before": before, "after": after,
-                            "fall": 1 - after / before if before else None, "misspecified": found.misspecified,
-                        }  # fmt: skip
+    with _twin(family, seed) as target:
+        seen = [len(t.cells) / ARENA.grid.n_cells for t in target.carry_out(plans, "cells")]
+        truth = np.array(seen).reshape(len(controllers), N_TRIALS)
+        found = _calibrated(target, observe, seed)
+    before = _rms_gap(_coverage({}, controllers), truth)
+    after = _rms_gap(_coverage(found.draws, controllers), truth)
+    fall = 1 - after / before if before else None
+    return {"before": before, "after": after, "fall": fall, "misspecified": found.misspecified}
+
+
+@contextmanager
+def _twin(family: str, seed: int) -> Iterator[TwinTarget]:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "twin.toml")
+        file.write_text(sample_twin(family, seed).to_toml())
+        with TwinTarget(str(file), ARENA, 1) as target:
+            yield target
+
+
+def _calibrated(target: TwinTarget, observe: str, seed: int) -> Calibration:
+    return calibrate_all(target, observe=observe, budget=BUDGET, seed=seed, threads=1, effort="small")  # type: ignore[arg-type]
 
 
 def _coverage(draws: dict[str, Any], controllers: list[Any]) -> np.ndarray[Any, Any]:
@@ -96,23 +131,51 @@ def _rms_gap(predicted: np.ndarray[Any, Any], truth: np.ndarray[Any, Any]) -> fl
     return float(np.sqrt(max(np.mean(off**2 - noise), 0.0)))
 
 
+MEASURES = {"sim": on_sim, "flags": flags, "same": same, "twins": on_twins}
+FAMILIES = {
+    "sim": ["sim"], "flags": ["alien"], "same": ["same"], "twins": ["close", "worn", "delayed", "slippery"]
+}  # fmt: skip
+
+
+def one(key: tuple[str, str, int, str]) -> dict[str, Any]:
+    """A line: what was measured, of what, and what was found."""
+    what, family, seed, observe = key
+    found = MEASURES[what](family, seed, observe)
+    return {"what": what, "family": family, "seed": seed, "observe": observe} | found
+
+
+def key_of(line: str) -> tuple[str, str, int, str]:
+    """What a line is about."""
+    row = json.loads(line)
+    return row["what"], row["family"], row["seed"], row["observe"]
+
+
 def main() -> None:
-    """Measure and print a line of JSON for each result."""
+    """Measure, and print each result as it comes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("what", choices=["sim", "twins"])
-    parser.add_argument(
-        "families", nargs="*", default=["close", "worn", "delayed", "slippery"], metavar="FAMILY"
-    )
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--observe", nargs="+", default=["track", "cells"])
-    parser.add_argument("--robots", type=int, default=12)
-    parser.add_argument("--controllers", type=int, default=40)
-    parser.add_argument("--trials", type=int, default=6)
-    parser.add_argument("--effort", choices=["small", "full"], default="small")
-    parser.add_argument("--processes", type=int)
+    parser.add_argument("what", choices=list(MEASURES))
+    parser.add_argument("--families", nargs="+", metavar="FAMILY", help="of twins")
+    parser.add_argument("--n", type=int, default=12, help="robots or twins of each family")
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--observe", nargs="+", default=["track"], choices=["track", "cells"])
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="a file that lines are added to")
     options = parser.parse_args()
-    for result in on_sim(options) if options.what == "sim" else on_twins(options):
-        print(json.dumps(result), flush=True)
+    there = options.out.read_text("utf-8").splitlines() if options.out and options.out.exists() else []
+    done = {key_of(line) for line in there}
+    keys = [
+        (options.what, family, seed, observe)
+        for seed in range(options.first_seed, options.first_seed + options.n)
+        for family in options.families or FAMILIES[options.what]
+        for observe in options.observe
+    ]
+    with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:
+        for row in pool.map(one, [key for key in keys if key not in done]):
+            line = json.dumps(row)
+            print(line, flush=True)
+            if options.out:
+                with options.out.open("a", encoding="utf-8") as file:
+                    file.write(line + "\n")
 
 
 if __name__ == "__main__":

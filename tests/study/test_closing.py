@@ -1,6 +1,10 @@
 import json
 import shutil
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -113,6 +117,39 @@ def test_an_interrupted_study_goes_on_and_ends_the_same(right, tmp_path):
         for twin in each["twins"]:
             twin.pop("seconds", None)
     assert again == summary
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="reads /proc for who is whose child")
+def test_a_killed_study_leaves_no_process_behind(tmp_path):
+    def children(pid):
+        try:
+            return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        except OSError:  # gone
+            return []
+
+    def is_there(pid):
+        try:
+            return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return False
+
+    pytest.importorskip("mujoco", reason="twins need the extra twin")
+    command = [sys.executable, "-m", "realitygap", "run", "closing-the-gap", "--small", "--threads", "2"]
+    study = subprocess.Popen([*command, "--out", str(tmp_path / "results")], stdout=subprocess.DEVNULL)
+    began = time.monotonic()
+    below = []
+    while time.monotonic() - began < 120 and not any(
+        children(pid) for pid in below
+    ):  # until twins are at work
+        below = children(study.pid)
+        time.sleep(0.1)
+    below += [pid for each in below for pid in children(each)]
+    study.kill()
+    study.wait()
+    assert len(below) > 2
+    while time.monotonic() - began < 180 and any(is_there(pid) for pid in below):
+        time.sleep(0.1)
+    assert not [pid for pid in below if is_there(pid)]
 
 
 def test_each_calibration_sees_only_its_budget(right):

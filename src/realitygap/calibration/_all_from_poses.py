@@ -22,7 +22,7 @@ from ._ir_readings import Placement
 from ._prior import Floats, Parameter, standard_of
 from ._rays import rays_of
 from ._shots import Shooter, Shots, shots_of
-from ._single_commands import BLOCK, SLIP, WIDER, MotionOfCommands, is_motion, place_of, values_at
+from ._single_commands import BLOCK, SLIP, MotionOfCommands, is_motion, place_of, values_at
 from ._tempering import sample_posterior
 
 N_DRAWS = 500
@@ -139,9 +139,8 @@ def _sensors(
         lambda at: model.log_likelihood(values_of_model(at), STRAY), len(free), rng, N_PARTICLES
     )
     which = rng.integers(len(places), size=N_DRAWS)
-    wider = places.mean(axis=0) + WIDER * (places[which] - places.mean(axis=0))
-    wider += FINEST_PLACE * rng.standard_normal(wider.shape)
-    found = values_at(free, np.clip(wider, 0.0, 1.0))
+    drawn = places[which] + FINEST_PLACE * rng.standard_normal((N_DRAWS, len(free)))
+    found = values_at(free, np.clip(drawn, 0.0, 1.0))
     for parameter in parameters:
         if parameter.name not in found:
             found[parameter.name] = np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from realitygap.records import ObservedTrial
 from realitygap.trials import TrialPlan
@@ -196,7 +195,7 @@ def _mean(values: Sequence[float], step: float, n_draws: int, rng: np.random.Gen
     """
     n = len(values)
     variance = max(float(np.var(values, ddof=1)) if n > 1 else 0.0, step**2 / 12)
-    spread = student.rvs(max(n - 1, 1), size=n_draws, random_state=rng) * np.sqrt(variance / n)
+    spread = rng.standard_t(max(n - 1, 1), size=n_draws) * np.sqrt(variance / n)
     mean: Array = np.mean(values) + np.concatenate([[0.0], spread])
     return mean
 

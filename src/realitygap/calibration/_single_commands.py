@@ -43,7 +43,6 @@ MOST_OFF = 5.0  # standard deviations beyond which a difference tells of no nois
 SCAN = (0.002, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 0.998)  # places of each parameter that are tried first
 SCANS = 2
 N_SHIFT = 100  # robots that show by how much noise moves the mean
-WIDER = 2.0  # times the spread of draws, which hold the truth of robots of `sim` too seldom
 NOISE_FLOOR = np.array([1e-4, 1e-3])  # [m, rad]
 PARTS = {"drive.delay_jitter": 0.05, "drive.heading_noise_per_m": 0.05,
          "drive.heading_noise_per_s": 0.02, "drive.travel_noise_per_m": 0.01}  # fmt: skip
@@ -82,8 +81,7 @@ class MotionOfCommands:
             noise = self._noise(places, off)
             self._note_shift(places, noise)
             places, off = self._best(places)
-        draws = self._draws(places, off, n)
-        values = values_at(self.mean, np.clip(places + WIDER * (draws - places), 0.0, 1.0))
+        values = values_at(self.mean, self._draws(places, off, n))
         if self.noise:
             which = self.rng.integers(len(noise), size=n)
             values |= {p.name: noise[which, k] for k, p in enumerate(self.noise)}

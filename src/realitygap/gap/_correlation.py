@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import stats
 
 from ._side import Values
 
@@ -20,6 +19,8 @@ def spearman(one: Values, other: Values) -> Values:
         one: (b, c) and
         other: (b, c); ties get their mean rank.
     """
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
     ranks = [stats.rankdata(each, axis=1) for each in (one, other)]
     a, b = (each - each.mean(axis=1, keepdims=True) for each in ranks)
     with np.errstate(invalid="ignore", divide="ignore"):

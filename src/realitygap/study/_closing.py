@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -153,12 +155,21 @@ def _carry_out_apart(
 
 def _report(pipe: Connection, plan: ClosingPlan, name: TwinName, folder: Path) -> None:
     """One twin in a process of its own, which sends what went wrong, or None."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     problem: BaseException | None = None
     try:
         _carry_out(plan, name, folder)
     except BaseException as error:
         problem = error
     pipe.send(problem)
+
+
+def _end_with_parent() -> None:
+    """A study that was killed leaves nobody behind who writes to its folder beside the next one."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
 
 
 def _end(process: Any, pipe: Connection) -> None:

@@ -65,7 +65,7 @@ class ClosingPlan:
     fresh_trials: int = 20
     runs: int = 100
     repeats: int = 8
-    effort: Literal["small", "full"] = "full"
+    effort: Literal["small", "full"] = "small"
     seed: int = 1
 
     @property
@@ -108,7 +108,6 @@ SMALL = ClosingPlan(
     fresh_trials=4,
     runs=20,
     repeats=4,
-    effort="small",
 )
 """Minutes in place of hours; too little to say anything but that all of it works."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from realitygap._version import __version__
 
@@ -353,6 +353,8 @@ def median_interval(values: Sequence[float]) -> Row:
 
     Source: Conover (1999), Practical Nonparametric Statistics, section 3.2.
     """
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
     n = len(values)
     if not n:
         return {"estimate": None, "low": None, "high": None}

@@ -141,10 +141,24 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
     assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
 
 
+def test_tables_of_calibrations_are_of_what_was_measured():
+    make_calibration = _load("make_calibration")
+    page = make_calibration.PAGE.read_text("utf-8")
+    assert make_calibration.rewrite(page) == page
+    rows = [json.loads(line) for line in make_calibration.MEASURED.read_text("utf-8").splitlines()]
+    assert make_calibration.each(rows) == make_calibration.EACH.read_text("utf-8")
+
+
 def test_the_picture_of_several_robots_is_drawn_by_its_page():
     make_several_robots = _load("make_several_robots")
     for name, text in make_several_robots.make().items():
         assert (make_several_robots.IMAGES / name).read_text("utf-8") == text
+
+
+def test_the_table_on_the_page_of_sheets_is_what_its_benchmark_found():
+    make_score = _load("make_score")
+    page = make_score.PAGE.read_text("utf-8")
+    assert make_score.with_table(page) == page
 
 
 def test_figures_on_the_page_of_a_billion_runs_are_those_that_its_command_measures(tmp_path):

@@ -74,6 +74,7 @@ _PACKAGES = {
     "evolution",
     "gap",
     "gym",
+    "lab",
     "playback",
     "records",
     "report",

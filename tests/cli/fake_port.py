@@ -6,6 +6,27 @@ from realitygap.cli import main
 from realitygap.study import _run as run
 from tests.trials.fake_robot import FakeRobot
 
+STUDY = """
+[study]
+name = "small"
+replicates = 1
+
+[neat]
+population = 2
+generations = 1
+
+[trials]
+pens = ["red", "blue"]
+
+[platform.scribbler]
+steps = 3
+
+[[condition]]
+name = "robot"
+platform = "scribbler"
+"""
+"""Of two trials of three steps."""
+
 
 def open_fake(port):
     def open_robot(platform):

@@ -9,9 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 from realitygap.cli import _calibrate, _calibrate_guide, app
-from realitygap.cli._calibrate_guide import parse_length
 from realitygap.errors import RealityGapError
 from realitygap.records import read_observations
+from realitygap.study import parse_length
 from realitygap.world import load_calibration, load_robot
 
 PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"

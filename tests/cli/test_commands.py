@@ -49,13 +49,16 @@ def test_all_commands_are_known():
         "emulate",
         "export",
         "gap",
+        "lab",
         "lens",
         "new-study",
         "plan",
+        "print-sheet",
         "print-tags",
         "report",
         "robot",
         "run",
+        "score",
         "show",
         "simulate",
         "track",
@@ -265,13 +268,6 @@ def test_new_study_never_overwrites(tmp_path):
     assert (tmp_path / "mine.toml").read_text() == "precious"
 
 
-def test_report_writes_a_page(tmp_path):
-    realitygap("run", "paper", "--replicates", "6", "--out", "r", cwd=tmp_path)
-    done = realitygap("report", "r", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "r" / "report.html").stat().st_size > 10_000
-
-
 def _browser_that_notes(folder: Path) -> dict[str, str]:
     """An environment whose browser writes the address it is given into the file `opened`."""
     browser = folder / "browser"
@@ -280,25 +276,35 @@ def _browser_that_notes(folder: Path) -> dict[str, str]:
     return os.environ | {"BROWSER": f"{browser} %s"}
 
 
+def _small_study(folder: Path) -> str:
+    """The file of a study whose report is drawn soon."""
+    (folder / "small.toml").write_text(
+        '[study]\nname = "small"\nreplicates = 6\n[[condition]]\nname = "coverage"\n'
+    )
+    return "small.toml"
+
+
 def test_open_shows_the_report_in_the_browser(tmp_path):
     options = {"cwd": tmp_path, "env": _browser_that_notes(tmp_path)}
-    done = realitygap("run", "paper", "--replicates", "6", "--out", "r", "--open", **options)
+    small = _small_study(tmp_path)
+    done = realitygap("run", small, "--out", "r", "--open", **options)
     assert done.returncode == 0, done.stderr
     page = tmp_path / "r" / "report.html"
+    assert page.stat().st_size > 10_000
     assert re.search(r"^Written: r/report\.html \(\d+\.\d s\)$", done.stdout, re.MULTILINE)
     assert (tmp_path / "opened").read_text() == f"{page.as_uri()}\n"
     done = realitygap("report", "r", "--out", "other.html", "--open", **options)
     assert done.returncode == 0, done.stderr
     other = (tmp_path / "other.html").as_uri()
     assert (tmp_path / "opened").read_text() == f"{page.as_uri()}\n{other}\n"
-    done = realitygap("run", "paper", "--replicates", "6", "--out", "r", "--open", "--json", **options)
+    done = realitygap("run", small, "--out", "r", "--open", "--json", **options)
     assert json.loads(done.stdout)["computed"] == 0, "what is printed stays JSON"
     assert (tmp_path / "opened").read_text().count("\n") == 3
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the system opens a browser by itself")
 def test_open_says_where_the_page_is_when_there_is_no_browser(tmp_path):
-    realitygap("run", "paper", "--replicates", "6", "--out", "r", cwd=tmp_path)
+    realitygap("run", _small_study(tmp_path), "--out", "r", cwd=tmp_path)
     unwanted = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
     alone = {key: value for key, value in os.environ.items() if key not in unwanted} | {"PATH": str(tmp_path)}
     done = realitygap("report", "r", "--open", cwd=tmp_path, env=alone)

@@ -21,31 +21,11 @@ from realitygap.cli._grid_editor import GridEdit, edit_cells
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.world import paper_arena
 
-from .fake_port import open_fake
+from .fake_port import STUDY, open_fake
 
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "tests.cli.fake_port"]
 PATIENCE_S = 60
-
-STUDY = """
-[study]
-name = "small"
-replicates = 1
-
-[neat]
-population = 2
-generations = 1
-
-[trials]
-pens = ["red", "blue"]
-
-[platform.scribbler]
-steps = 3
-
-[[condition]]
-name = "robot"
-platform = "scribbler"
-"""
 
 
 @pytest.fixture

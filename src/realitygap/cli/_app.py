@@ -15,8 +15,11 @@ from ._calibrate import calibrate
 from ._emulate import emulate
 from ._export import export
 from ._gap import gap, plan
+from ._lab import lab
+from ._print_sheet import print_sheet
 from ._results import digest, report
 from ._robot import robot
+from ._score import score
 from ._show import show
 from ._simulate import simulate
 from ._study import new_study, run
@@ -59,6 +62,7 @@ app.command("new-study")(new_study)
 app.command("report")(report)
 app.command("show")(show)
 app.command("export")(export)
+app.command("lab")(lab)
 app.command("digest")(digest)
 app.command("audit-results")(audit_results)
 app.command("audit-distance")(audit_distance)
@@ -72,6 +76,8 @@ app.command("trials")(trials)
 app.command("track")(track)
 app.command("print-tags")(print_tags)
 app.command("lens")(lens)
+app.command("print-sheet")(print_sheet)
+app.command("score")(score)
 app.command("gap")(gap)
 app.command("plan")(plan)
 app.command("transfer")(transfer)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl
 
 import typer
 
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.errors import StudyError
 
 if TYPE_CHECKING:
     from realitygap.study import Study
@@ -21,7 +19,6 @@ if TYPE_CHECKING:
 CAMERA_HELP = (
     'Above the robot: its number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml".'
 )
-_KEYS = ("tag", "tag-size", "tag-height", "tag-at", "corner-size", "corner-inset", "lens")
 
 
 @contextlib.contextmanager
@@ -90,33 +87,11 @@ def parse_camera(spec: str, arena: Arena) -> tuple[int, Marks]:
     Raises:
         StudyError: Something in it cannot be.
     """
-    from ._track import marks_of, tag_of
+    from realitygap.study import read_camera
 
-    number, _, query = spec.partition("?")
-    options = dict(parse_qsl(query, keep_blank_values=True))
-    unknown = [key for key in options if key not in _KEYS]
-    if unknown:
-        raise StudyError(f"--camera: unknown option {unknown[0]!r}. {did_you_mean(unknown[0], _KEYS)}")
+    number, marks = read_camera(spec, arena)
     if not number.isdecimal():
         raise StudyError(
             f"--camera is {spec!r}, expected a camera's number such as 0, or 0?tag=10&tag-height=0.1."
         )
-
-    def length(name: str) -> float | None:
-        text = options.get(name)
-        try:
-            return None if text is None else float(text)
-        except ValueError:
-            raise StudyError(f"--camera: {name} is {text!r}, expected a length in meters.") from None
-
-    size, height = length("tag-size"), length("tag-height")
-    tag = tag_of(
-        options.get("tag", "10"),
-        0.07 if size is None else size,
-        0.1 if height is None else height,
-        options.get("tag-at", "0,0,0"),
-    )
-    lens = options.get("lens")
-    return int(number), marks_of(
-        arena, tag, None if lens is None else Path(lens), length("corner-size"), length("corner-inset")
-    )
+    return int(number), marks

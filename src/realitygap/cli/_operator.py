@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 _ABORTING = ("space", "escape", "q")
 
-_WORDS = ("right", "up and right", "up", "up and left", "left", "down and left", "down", "down and right")
 _ARROWS = ">/^\\</v\\"
 
 
@@ -264,6 +263,8 @@ def pick_cells(
 
 def sketch(arena: Arena) -> str:
     """The arena from above as text: walls, reachable cells, and the start as an arrow."""
+    from realitygap.trials import start_words
+
     grid, start = arena.grid, arena.start
     left, bottom = min(wall[0] for wall in arena.walls), min(wall[1] for wall in arena.walls)
     n_columns = round((max(wall[2] for wall in arena.walls) - left) / grid.cell)
@@ -282,9 +283,5 @@ def sketch(arena: Arena) -> str:
             text += f" {_ARROWS[way]} " if holds_start else " . " if is_reachable else "   "
         lines.append(f"|{text}|")
     lines.append(lines[0])
-    inch = 0.0254
-    lines.append(
-        f"Start ({_ARROWS[way]}): {(start.x - left) / inch:.1f} in from the left wall, {(start.y - bottom) / inch:.1f} "
-        f"in from the lower one, facing {_WORDS[way]}."
-    )
+    lines.append(f"Start ({_ARROWS[way]}): {start_words(arena)}")
     return "\n".join(lines)

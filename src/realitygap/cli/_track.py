@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import math
 from collections.abc import Iterator
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from realitygap.records import ScoreRole
     from realitygap.study import TrackedTrial, TrialToTrack
     from realitygap.vision import Marks, RobotTag, Source, Tracked
-    from realitygap.world import Arena
 
 _Tag = Annotated[
     str,
@@ -123,6 +121,7 @@ def track(
 
     In Python: realitygap.vision.track_video(realitygap.vision.VideoFile(path), realitygap.vision.Marks(arena))
     """
+    from realitygap.study import note_of_track, tag_of
     from realitygap.vision import open_source
 
     wanted = _wanted(study, trials, trial, into)
@@ -147,7 +146,7 @@ def track(
             study,
             trial or 0,
             into,
-            _told(camera, found, placed),
+            note_of_track(camera, found, placed),
             "second" if second else "score",
         )
     _print(found, placed, _Written(out, save_lens, overlay, into, study), as_json=as_json)
@@ -172,6 +171,7 @@ def print_tags(
 
     In Python: realitygap.vision.print_tags("tags.pdf")
     """
+    from realitygap.study import tag_of
     from realitygap.vision import print_tags as write
 
     if out.suffix != ".pdf":
@@ -252,30 +252,6 @@ def _wanted(
     return trial_of_file(trials, trial)  # type: ignore[arg-type]
 
 
-def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
-    """The robot's tag by options: number or FAMILY:NUMBER, side [m], height [m], and AHEAD,LEFT,DEGREES.
-
-    Raises:
-        StudyError: One of them cannot be.
-    """
-    from realitygap.errors import did_you_mean
-    from realitygap.vision import FAMILIES, RobotTag
-
-    family, colon, number = text.rpartition(":")
-    if not number.isdecimal() or (colon and family not in FAMILIES):
-        raise StudyError(
-            f"--tag is {text!r}, expected a number such as 10, or FAMILY:NUMBER. {did_you_mean(family, FAMILIES)}"
-        )
-    try:
-        ahead, left, degrees = (float(part) for part in at.split(","))
-    except ValueError:
-        raise StudyError(f"--tag-at is {at!r}, expected three numbers such as 0.02,0,90.") from None
-    try:
-        return RobotTag(int(number), size, height, family, ahead, left, math.radians(degrees))
-    except ValueError as error:
-        raise StudyError(f"The robot's tag: {error}") from None
-
-
 def _marks(
     arena: str | None,
     wanted: TrialToTrack | None,
@@ -284,6 +260,7 @@ def _marks(
     corner_size: float | None,
     corner_inset: float | None,
 ) -> Marks:
+    from realitygap.study import marks_of
     from realitygap.world import load_arena
 
     place = load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
@@ -292,20 +269,6 @@ def _marks(
             f"The trial was in arena {wanted.arena.name!r}, and --arena is another. Leave it out."
         )
     return marks_of(place, tag, lens, corner_size, corner_inset)
-
-
-def marks_of(
-    arena: Arena, tag: RobotTag, lens: Path | None, corner_size: float | None, corner_inset: float | None
-) -> Marks:
-    """What is known before a camera looks, by options.
-
-    Raises:
-        VisionError: The lens cannot be read.
-    """
-    from realitygap.vision import CORNER_SIZE_M, Marks, read_lens
-
-    known = None if lens is None else read_lens(lens)
-    return Marks(arena, tag, known, CORNER_SIZE_M if corner_size is None else corner_size, corner_inset)
 
 
 def _refuse_outputs(
@@ -385,20 +348,6 @@ def _save(path: Path, text: str) -> None:
     from realitygap.records import write_whole
 
     write_whole(path, text.encode())
-
-
-def _told(camera: str, found: Tracked, placed: TrackedTrial) -> str:
-    """The note that goes with what is entered into a ledger."""
-    begun = placed.beginning
-    how = "said" if math.isnan(begun.agreement) else f"agreement {begun.agreement:.2f}"
-    what = f"video {Path(camera).name}"
-    if not camera.isdecimal():
-        with Path(camera).open("rb") as file:
-            what += f", sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
-    return (
-        f"Cells and path by camera: {what}; begins at {begun.time:.2f} s ({how}); robot seen in {placed.seen:.0%} of "
-        f"its pictures; tag {found.tag.family}:{found.tag.number}."
-    )
 
 
 def _enter(

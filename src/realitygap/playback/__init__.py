@@ -4,16 +4,17 @@ A `MovingTrial` is what a trial looks like whatever platform it was on; `in_moti
 """
 
 from ._divergence import Divergence, measure_divergence, own_divergence
-from ._live import WatchedRobot
+from ._live import Page, WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion
-from ._player import play
+from ._player import pack_scene, pack_trials, play
 from ._twin import TwinDrive, save_twin_trial, wander
 
 __all__ = [
     "WIDTH",
     "Divergence",
     "MovingTrial",
+    "Page",
     "RobotShape",
     "TwinDrive",
     "WatchedRobot",
@@ -21,6 +22,8 @@ __all__ = [
     "in_motion",
     "measure_divergence",
     "own_divergence",
+    "pack_scene",
+    "pack_trials",
     "play",
     "save_movie",
     "save_twin_trial",

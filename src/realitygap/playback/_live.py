@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,28 @@ _FAN = 1.0
 """Between the outermost of sensors whose mounts nobody told [rad]."""
 
 
+class Page(Protocol):
+    """What shows a robot.
+
+    Attributes:
+        scene: What stands still.
+        trials: The trial, as far as it can be played.
+        live: Whether it goes on.
+    """
+
+    scene: dict[str, Any]
+    trials: list[dict[str, Any]]
+    live: bool
+
+    def send(self, content: dict[str, Any]) -> None:
+        """Tell it where the robot is."""
+        ...
+
+    def on_msg(self, handler: Callable[[Any, dict[str, Any], Any], None]) -> None:
+        """Have it ask for everything."""
+        ...
+
+
 class WatchedRobot:
     """A robot, and below the notebook's cell what it does: where it is, what it sees, the cells that it visits.
 
@@ -42,9 +64,10 @@ class WatchedRobot:
         shape: what is drawn; found from the robot's platform where not given.
         pose: says where the robot is; may be called from another thread.
         speed: 2 is twice as fast as it is; None does not hold a simulated robot back.
+        page: what shows it; a widget below a notebook's cell when not given.
 
     Raises:
-        RealityGapError: anywidget is not there.
+        RealityGapError: anywidget is not there, and no page is given.
     """
 
     def __init__(
@@ -55,6 +78,7 @@ class WatchedRobot:
         shape: RobotShape | None = None,
         pose: Callable[[], Pose] | None = None,
         speed: float | None = 1.0,
+        page: Page | None = None,
     ) -> None:
         self.robot = robot
         self.label: Label = robot.label
@@ -73,15 +97,15 @@ class WatchedRobot:
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
         self._begin(self._now())
-        widget: Any = player_class()(
-            scene=pack_scene(self._arena, f"{type(robot).__name__}, live"),
-            trials=self._packed(),
-            live=True,
-            was_live=True,
-            speed=self._speed or 1.0,
-        )
-        self.widget = widget
-        widget.on_msg(self._asked)
+        scene = pack_scene(self._arena, f"{type(robot).__name__}, live")
+        if page is None:
+            self.widget: Any = player_class()(
+                scene=scene, trials=self._packed(), live=True, was_live=True, speed=self._speed or 1.0
+            )
+        else:
+            self.widget = page
+            page.scene, page.trials, page.live = scene, self._packed(), True
+        self.widget.on_msg(self._asked)
 
     # --- the contract -------------------------------------------------------------------------------------
 

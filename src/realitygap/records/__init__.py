@@ -27,6 +27,7 @@ from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
 from realitygap.records._ledger_kinds import (
     Generation,
     Individual,
+    PhotoCount,
     Score,
     ScoreRole,
     Step,
@@ -84,6 +85,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Trial",
     "TrialState",
     "Step",
+    "PhotoCount",
     "Score",
     "ScoreRole",
     "complete_runs",

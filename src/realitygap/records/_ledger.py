@@ -7,6 +7,7 @@ import datetime
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -357,9 +358,10 @@ class Ledger(LedgerReader):
             *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
             *(role, score.who, _now()),
         )
-        self._note_event(
-            number, {"score": "scored"}.get(role, role), {"who": score.who, "n_cells": len(cells)}
-        )
+        details: dict[str, Any] = {"who": score.who, "n_cells": len(cells)}
+        if score.photo is not None:
+            details["photo"] = asdict(score.photo)
+        self._note_event(number, {"score": "scored"}.get(role, role), details)
 
     def _refuse_mixing(self, condition: str, label: str | None) -> None:
         known = self._one("SELECT label FROM conditions WHERE name = ?", condition)

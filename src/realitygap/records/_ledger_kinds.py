@@ -113,6 +113,25 @@ class Step:
 
 
 @dataclass(frozen=True)
+class PhotoCount:
+    """The photograph that cells were read from, for somebody to confirm.
+
+    Attributes:
+        file: its name.
+        sha256: of the file, as hexadecimal digits.
+        proposed: cells as they were read from it; those of the score are what was confirmed.
+        doubtful: cells less than 90 % sure, crossed or not.
+        is_confirmed: whether somebody said that they looked.
+    """
+
+    file: str
+    sha256: str
+    proposed: tuple[int, ...]
+    doubtful: tuple[int, ...]
+    is_confirmed: bool
+
+
+@dataclass(frozen=True)
 class Score:
     """Cells as somebody entered them, or as an emulator's witness saw them.
 
@@ -121,9 +140,12 @@ class Score:
         who: entered them.
         n_ends: cells in which steps end; None where nobody saw it.
         path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.
+        photo: the photograph that they were read from; None where somebody counted on paper. The ledger has it in the
+            event of the score.
     """
 
     cells: Sequence[int]
     who: str
     n_ends: int | None = None
     path: Sequence[Sequence[float]] | None = None
+    photo: PhotoCount | None = None

@@ -3,8 +3,9 @@
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._calibrate_all import calibrate_all
-from ._camera_attendant import CameraAttendant
+from ._camera_attendant import CameraAttendant, Looking
 from ._camera_operator import CameraOperator
+from ._camera_spec import marks_of, read_camera, tag_of
 from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
@@ -17,6 +18,7 @@ from ._gap_between import GapBetween, gap_between
 from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
+from ._placing import parse_length, placing_words, with_ruled_end
 from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
@@ -28,6 +30,7 @@ from ._tracked import (
     TrackedTrial,
     TrialToTrack,
     keep_tracked,
+    note_of_track,
     place_trial,
     score_tracked,
     trial_of_file,
@@ -60,6 +63,7 @@ __all__ = [
     "GapStudy",
     "Guide",
     "KeptTarget",
+    "Looking",
     "PhysicalResult",
     "PhysicalStudy",
     "Progress",
@@ -88,19 +92,24 @@ __all__ = [
     "keep_tracked",
     "load_study",
     "machine_facts",
+    "marks_of",
     "measure_maze",
     "measure_realism",
     "measure_speed",
     "measure_task",
     "named_studies",
+    "note_of_track",
     "observations_head",
     "open_target",
+    "parse_length",
     "parse_study",
     "part_of",
     "physical_conditions",
     "pilot_spreads",
     "place_trial",
+    "placing_words",
     "plan_gap",
+    "read_camera",
     "recorded_spreads",
     "refuse_port_without_robot",
     "run_gap",
@@ -112,6 +121,7 @@ __all__ = [
     "study_gap",
     "study_template",
     "summarize_closing",
+    "tag_of",
     "task_settings",
     "transfer",
     "trial_of_file",
@@ -119,4 +129,5 @@ __all__ = [
     "try_on",
     "usable_processors",
     "why_gap",
+    "with_ruled_end",
 ]

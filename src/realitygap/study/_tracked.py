@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,7 +26,7 @@ from realitygap.records import (
 from realitygap.robots import DEFAULT_ROBOT
 from realitygap.runs import Condition, genome_of
 from realitygap.trials import PATH_PARTS, cell_at
-from realitygap.vision import Beginning, Track, find_beginning
+from realitygap.vision import Beginning, Track, Tracked, find_beginning
 from realitygap.world import Arena, Grid
 
 from ._targets import FULL_SCALE
@@ -211,3 +213,23 @@ def keep_tracked(path: str | Path, wanted: TrialToTrack, tracked: TrackedTrial) 
     """
     with ObservationsFile(path, wanted.head) as file:
         file.append(tracked.trial)
+
+
+def note_of_track(camera: str, found: Tracked, placed: TrackedTrial) -> str:
+    """The note that goes into a ledger with what a camera saw of a trial.
+
+    Args:
+        camera: Its number, or the video's file.
+        found: In its pictures.
+        placed: The trial in them.
+    """
+    begun = placed.beginning
+    how = "said" if math.isnan(begun.agreement) else f"agreement {begun.agreement:.2f}"
+    what = f"video {Path(camera).name}"
+    if not camera.isdecimal():
+        with Path(camera).open("rb") as file:
+            what += f", sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
+    return (
+        f"Cells and path by camera: {what}; begins at {begun.time:.2f} s ({how}); robot seen in {placed.seen:.0%} of "
+        f"its pictures; tag {found.tag.family}:{found.tag.number}."
+    )

@@ -18,7 +18,7 @@ from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
 from ._open_twin import SimTwin, open_twin
-from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, trial_seed
+from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, start_words, trial_seed
 from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
 from ._preflight import Preflight, preflight
 from ._processors import usable_processors
@@ -97,6 +97,7 @@ __all__ = [
     "sim_scene",
     "simulate_case",
     "simulate_file",
+    "start_words",
     "trace_genome",
     "trace_genomes",
     "trajectories_of",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
@@ -204,6 +205,21 @@ def trial_seed(card: Card) -> int:
     trial = card.trial
     text = f"{card.key}:{trial.replicate}:{trial.generation}:{trial.individual}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")
+
+
+_WORDS = ("right", "up and right", "up", "up and left", "left", "down and left", "down", "down and right")
+_INCH = 0.0254
+
+
+def start_words(arena: Arena) -> str:
+    """Where a trial begins, for somebody with a ruler: from the left wall and the lower one, and facing where."""
+    start = arena.start
+    left, bottom = min(wall[0] for wall in arena.walls), min(wall[1] for wall in arena.walls)
+    way = round(start.heading / (math.pi / 4)) % 8
+    return (
+        f"{(start.x - left) / _INCH:.1f} in from the left wall, {(start.y - bottom) / _INCH:.1f} in from the lower "
+        f"one, facing {_WORDS[way]}."
+    )
 
 
 def cell_at(grid: Grid, x: float, y: float) -> int | None:

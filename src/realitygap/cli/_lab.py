@@ -1,0 +1,49 @@
+"""`realitygap lab`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def lab(
+    folder: Annotated[
+        Path, typer.Argument(metavar="[DIR]", help="The folder that the studies are in, or will be.")
+    ] = Path("results"),
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="N", help="To answer at; 0 takes one that is free.")
+    ] = 8321,
+    host: Annotated[
+        str,
+        typer.Option(
+            metavar="H",
+            help="Address to answer at; 0.0.0.0 is for phones in the same network, which need the token that is "
+            "printed, also as a QR code.",
+        ),
+    ] = "127.0.0.1",
+    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in the browser.")] = False,
+) -> None:
+    """Serve a web page on which studies are started and watched, and trials on a robot are led through and scored.
+
+    It needs the extra 'lab', and no network beyond this machine. What is entered is in the study's folder and its
+    ledger at once: a page that is loaded anew, or a lab that is started anew, goes on where it was. Ctrl-C ends the
+    lab, and stops its robot first.
+
+    Example: realitygap lab
+
+    Example: realitygap lab results --host 0.0.0.0
+
+    In Python: realitygap.lab.open_lab("results")
+    """
+    from realitygap.lab import open_lab
+
+    open_lab(folder, port=port, host=host, show=not no_open, tell=_say)
+
+
+def _say(line: str) -> None:
+    typer.echo(line)
+    import sys
+
+    sys.stdout.flush()

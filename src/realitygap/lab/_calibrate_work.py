@@ -1,0 +1,182 @@
+"""A calibration, in a process of its own: unattended, or led through at a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.records import Observe, ObservedTrial, read_observations
+from realitygap.report import save_sensor_figure
+from realitygap.robots import Clock, Robot
+from realitygap.robots.scribbler import is_in_this_program
+from realitygap.study import (
+    StoppedByPerson,
+    calibrate,
+    open_target,
+    parse_length,
+    placing_words,
+    save_calibration,
+    with_ruled_end,
+)
+from realitygap.trials import RobotsOwnSenses, TrialPlan
+from realitygap.world import INCH, Arena, Calibration, Pose, RobotModel, load_arena, load_robot
+
+from ._channel import Channel, Message
+
+ROBOT = "scribbler:"
+_NO_LINE = ("path", "sensors")
+"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
+_QUESTIONS = {
+    "ahead": "How far ahead of its start does it stand [in]?",
+    "left": "How far to the left of it [in]?",
+    "turned": "How far did it turn to the left, with all full turns [degrees]?",
+}
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Carry out what is missing of a calibration's trials, fit, and write the calibration.
+
+    Args:
+        channel: To the server.
+        order: `kind`, `platform`, `out`, `observe`, `base`, `seed`, and if any `budget` and `witness`.
+    """
+    out = Path(order["out"])
+    kept = out.with_suffix(".trials.jsonl")
+    arena, robot = load_arena("paper"), load_robot(order["base"])
+    platform, witness = str(order["platform"]), order.get("witness") or None
+    is_led = (
+        platform.startswith(ROBOT)
+        and witness is None
+        and not is_in_this_program(platform.removeprefix(ROBOT))
+    )
+    growing = _Growing(channel, kept, arena, robot)
+    attendant = _Attendant(channel, arena) if is_led else None
+    guide = _Guide(channel, arena, robot, growing) if is_led else None
+    seed = int(order.get("seed") or 0)
+    try:
+        with open_target(platform, arena, key=seed, witness=witness, attendant=attendant) as target:
+            made = calibrate(
+                order["kind"],
+                target,
+                robot=order["base"],
+                observe=order["observe"],
+                budget=order.get("budget"),
+                seed=seed,
+                trials_file=kept,
+                guide=guide,
+                tell=growing.tell,
+            )
+    except StoppedByPerson:
+        channel.say("paused")
+        return
+    save_calibration(out, made)
+    _tell_made(channel, made, out)
+
+
+def _tell_made(channel: Channel, made: Calibration, out: Path) -> None:
+    figure = ""
+    if made.kind == "sensors":
+        figure = save_sensor_figure(made, out.with_suffix(".svg")).read_text("utf-8")
+    fitted = [each.model_dump() for each in made.fitted]
+    channel.say(
+        "made", fitted=fitted, notes=list(made.notes), misspecified=bool(made.misspecified), figure=figure
+    )
+
+
+class _Growing:
+    """Tells how many trials there are, and what they read, as they come."""
+
+    def __init__(self, channel: Channel, kept: Path, arena: Arena, robot: RobotModel) -> None:
+        self._channel, self._kept, self._arena, self._robot = channel, kept, arena, robot
+
+    def tell(self, done: int, n: int) -> None:
+        """So many of so many trials are there."""
+        trials = list(read_observations(self._kept).trials) if self._kept.exists() else []
+        self._channel.say(
+            "trials", done=done, n=n, readings=[self._point(k, each) for k, each in enumerate(trials)]
+        )
+
+    def _point(self, number: int, trial: ObservedTrial) -> dict[str, Any]:
+        """Where a trial stands in the plot, and the mean of what each sensor read, 0..1."""
+        at = float(number + 1)
+        if trial.purpose == "sensors":
+            right = max(x for wall in self._arena.walls for x in wall[::2])
+            at = round((right - trial.start[0] - max(sensor.x for sensor in self._robot.range)) / INCH, 2)
+        means = trial.readings.mean(axis=0) if len(trial.readings) else np.zeros(0)
+        return {"at": at, "purpose": trial.purpose, "means": [round(float(mean), 4) for mean in means]}
+
+
+class _Guide:
+    """Asks at a page for the robot at its place, and what a ruler says."""
+
+    def __init__(self, channel: Channel, arena: Arena, robot: RobotModel, growing: _Growing) -> None:
+        self._channel, self._arena, self._robot, self._growing = channel, arena, robot, growing
+
+    def place(self, plan: TrialPlan, number: int, n: int) -> Literal["go", "redo", "stop"]:
+        """Say where the robot has to stand, and wait."""
+        self._growing.tell(number, n)
+        words = placing_words(plan, self._arena, self._robot)
+        answer = self._channel.ask("place", text=words, trial=number, n=n).get("answer")
+        if answer == "stop":
+            return "stop"
+        return "redo" if answer == "redo" and number else "go"
+
+    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+        """Ask where a path ended; None where it is to be driven again."""
+        if plan.purpose != "path" or len(trial.poses):
+            return trial
+        is_straight = plan.commands[0, 0] != 0
+        wanted = ["ahead", "left", "turned"] if is_straight else ["turned"]
+        said = ""
+        while True:
+            questions = {name: _QUESTIONS[name] for name in wanted}
+            answer = self._channel.ask("measure", questions=questions, said=said)
+            if answer.get("redo"):
+                return None
+            given = {name: parse_length(str(answer.get(name, ""))) for name in wanted}
+            if None not in given.values():
+                ahead, left, turned = (float(given.get(name) or 0.0) for name in _QUESTIONS)
+                return with_ruled_end(trial, ahead, left, turned)
+            said = "Expected numbers such as 13.75, 13 3/4 or -2."
+
+
+class _Attendant(RobotsOwnSenses):
+    """Somebody at a page, who counts the cells of trials that are drawn."""
+
+    observes: Observe = "cells"
+
+    def __init__(self, channel: Channel, arena: Arena) -> None:
+        super().__init__()
+        self._channel, self._n_cells = channel, arena.grid.n_cells
+        self._purpose = ""
+
+    def meet(self, robot: Robot, arena: Arena) -> Clock:
+        """A robot was opened; an S2 tells what its encoders count."""
+        self._met(robot)
+        self.observes = "encoders" if self.has_encoders else "cells"
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
+        return clock
+
+    def place(self, plan: TrialPlan, start: Pose) -> None:
+        """It stands there: the guide has asked."""
+        self.begin()
+        self._purpose = plan.purpose
+
+    def look(self) -> None:
+        """Nobody sees where it is."""
+
+    def poses(self) -> NDArray[np.float64]:
+        """None."""
+        return np.empty((0, 3))
+
+    def cells(self) -> tuple[int, ...]:
+        """Those that its line crosses, as they are tapped."""
+        while self._purpose not in _NO_LINE:
+            given = self._channel.ask("cells").get("cells") or []
+            cells = sorted({each for each in given if type(each) is int and 0 <= each < self._n_cells})
+            if cells:
+                return tuple(cells)
+        return ()

@@ -1,0 +1,127 @@
+"""What a process of the lab says to the server that began it, and is told: a line of JSON each."""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import json
+import queue
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, TextIO
+
+from realitygap.errors import RealityGapError
+
+Message = dict[str, Any]
+MOST_EARLY = 100
+"""Messages that are kept until somebody says what to do with them."""
+LOOK_S = 0.2
+"""How often who waits looks up [s]: a library lets waits outlast signals; between two an interrupt is seen."""
+
+
+class Channel:
+    """The end of the process that works.
+
+    What must not wait, such as a stop, is taken by the thread that reads; answers wait for who asked. When the server
+    says `quit`, or is gone, whatever is going on is interrupted as by Ctrl-C: motors stop, and what was scored is safe.
+
+    Args:
+        source: Of lines.
+        sink: Of lines.
+    """
+
+    def __init__(self, source: TextIO, sink: TextIO) -> None:
+        self._source, self._sink = source, sink
+        self._lock = threading.Lock()
+        self._answers: queue.Queue[Message] = queue.Queue()
+        self._at_once: dict[str, Callable[[Message], None]] = {}
+        self._hearing = threading.Lock()
+        self._early: list[Message] = []
+        self._n_asked = 0
+
+    def begin(self) -> Message:
+        """The order, with which a server begins."""
+        line = self._source.readline()
+        if not line:
+            raise SystemExit(0)
+        threading.Thread(target=self._listen, daemon=True).start()
+        order: Message = json.loads(line)
+        return order
+
+    def at_once(self, what: str, do: Callable[[Message], None]) -> None:
+        """Have the thread that reads do this, when it comes; what came before is done now."""
+        with self._hearing:
+            self._at_once[what] = do
+            early = [message for message in self._early if message.get("do") == what]
+            self._early = [message for message in self._early if message.get("do") != what]
+        for message in early:
+            do(message)
+
+    def say(self, kind: str, **values: Any) -> None:
+        """Tell the server; nothing where it is gone."""
+        line = json.dumps({"kind": kind, **values}, separators=(",", ":"))
+        with self._lock, contextlib.suppress(OSError, ValueError):
+            self._sink.write(line + "\n")
+            self._sink.flush()
+
+    def ask(self, question: str, *, until: Callable[[], bool] | None = None, **values: Any) -> Message:
+        """Ask somebody at a page, and wait for the answer.
+
+        Args:
+            question: What is asked.
+            until: Looked at now and then; True ends the waiting without an answer.
+            values: What belongs to it.
+        """
+        self._n_asked += 1
+        number = self._n_asked
+        self.say("ask", question=question, number=number, **values)
+        try:
+            while until is None or not until():
+                with contextlib.suppress(queue.Empty):
+                    answer = self._answers.get(timeout=LOOK_S)
+                    if answer.get("number") in (number, None):
+                        return answer
+            return {}
+        finally:
+            self.say("answered", number=number)
+
+    def _listen(self) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            for line in self._source:
+                message = _read(line)
+                what = message.get("do")
+                if what == "quit":
+                    break
+                if what == "answer":
+                    self._answers.put(message)
+                else:
+                    self._do(str(what), message)
+        _interrupt()
+
+    def _do(self, what: str, message: Message) -> None:
+        with self._hearing:
+            do = self._at_once.get(what)
+            if do is None:
+                self._early = [*self._early[-MOST_EARLY:], message]
+        if do is not None:
+            with contextlib.suppress(
+                RealityGapError
+            ):  # a robot that fails is met by the loop, which tells of it
+                do(message)
+
+
+def _read(line: str) -> Message:
+    with contextlib.suppress(ValueError):
+        message = json.loads(line)
+        if isinstance(message, Mapping):
+            return dict(message)
+    return {}
+
+
+def _interrupt() -> None:
+    """Ctrl-C for the main thread, also where it waits."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        _thread.interrupt_main()

@@ -1,0 +1,78 @@
+"""A process of the lab, seen from the server: begun, told, listened to, ended."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+PATIENCE_S = 10.0
+"""Until a process that was told to end is killed [s]: it stops its robot first."""
+
+
+class Child:
+    """A process that works.
+
+    Args:
+        order: What it is to do.
+        folder: In which it works.
+        hear: Called with each thing that it says, in a thread of its own; at last with `{"kind": "ended"}`.
+    """
+
+    def __init__(
+        self, order: Mapping[str, Any], folder: Path, hear: Callable[[dict[str, Any]], None]
+    ) -> None:
+        self._hear = hear
+        self._lock = threading.Lock()
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "realitygap.lab._work"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=folder,
+            text=True,
+            encoding="utf-8",
+            start_new_session=True,  # Ctrl-C reaches it through the server, after which it stops its robot
+        )
+        self.tell(order)
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it works still."""
+        return self._process.poll() is None
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Say something to it; nothing where it has ended."""
+        line = json.dumps(message, separators=(",", ":"))
+        pipe = self._process.stdin
+        with self._lock, contextlib.suppress(OSError, ValueError):
+            if pipe is not None:
+                pipe.write(line + "\n")
+                pipe.flush()
+
+    def ask_to_end(self) -> None:
+        """Have it stop what it does, its robot first."""
+        self.tell({"do": "quit"})
+
+    def end(self) -> None:
+        """Have it end, and wait until it has."""
+        self.ask_to_end()
+        try:
+            self._process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _listen(self) -> None:
+        pipe = self._process.stdout
+        with contextlib.suppress(OSError, ValueError):
+            for line in pipe or ():
+                with contextlib.suppress(ValueError):
+                    self._hear(json.loads(line))
+        status = self._process.wait()
+        self._hear({"kind": "ended", "status": status})

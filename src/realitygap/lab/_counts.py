@@ -1,0 +1,217 @@
+"""The trials of a ledger as people who count cells see them, and what they say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import LedgerError
+from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial
+from realitygap.runs import Condition
+from realitygap.world import Arena
+
+from ._drawn import Draft, forget_draft, keep_draft, read_draft
+from ._proposals import Proposal, read_proposals
+
+LONGEST_NOTE = 2000
+
+
+@dataclass(frozen=True)
+class CountedTrial:
+    """A trial, and who has counted it.
+
+    Attributes:
+        trial: As the ledger has it.
+        title: What to call it; its code where counting is blind.
+        pen: The color that it was drawn with.
+        first, second: Who counted it; empty where nobody has.
+        is_corrected: Whether a correction was entered after its generation was closed.
+        notes: What was noted of it.
+    """
+
+    trial: Trial
+    title: str
+    pen: str
+    first: str
+    second: str
+    is_corrected: bool
+    notes: tuple[str, ...]
+
+    @property
+    def number(self) -> int:
+        """Of the trial."""
+        return self.trial.trial
+
+    def role_of(self, who: str) -> ScoreRole | None:
+        """In which role this person may count it now; None where they cannot."""
+        if self.trial.state == "driven":
+            return "score"
+        if self.trial.state != "scored" or who in (self.first, self.second):
+            return None
+        return None if self.second else "second"
+
+
+class Counts:
+    """The trials of a study in the order of their turns.
+
+    Args:
+        folder: Of the study.
+        description: What it says of itself.
+    """
+
+    def __init__(self, folder: Path, description: dict[str, Any]) -> None:
+        self._folder = folder
+        self.name = folder.name
+        self.description = description
+        self._settings = {each["name"]: each["settings"] for each in description["conditions"]}
+        trials = description.get("trials") or {}
+        self.is_blind = bool(trials.get("blind"))
+        self._pens = list(trials.get("pens") or ["black"])
+        self._arenas: dict[str, Arena] = {}
+        self._stamp: tuple[Any, ...] = ()
+        self._found: list[CountedTrial] = []
+
+    def trials(self) -> list[CountedTrial]:
+        """All trials; read anew only when the ledger has changed."""
+        path = self._folder / LEDGER_NAME
+        stamp = _stamp(path)
+        if stamp and stamp != self._stamp:
+            with Ledger.open(path, writable=False) as ledger:
+                self._found = self._read(ledger)
+            self._stamp = stamp
+        return self._found
+
+    def trial(self, number: int) -> CountedTrial:
+        """A trial by its number.
+
+        Raises:
+            LedgerError: There is none.
+        """
+        for each in self.trials():
+            if each.number == number:
+                return each
+        raise LedgerError(f"There is no trial {number} in {self._folder.name}.")
+
+    def arena(self, condition: str) -> Arena:
+        """Where the trials of a condition are driven."""
+        if condition not in self._arenas:
+            resolved = Condition.from_settings(condition, self._settings[condition])
+            self._arenas[condition] = resolved.arena.arena()
+        return self._arenas[condition]
+
+    def first_arena(self) -> Arena:
+        """Where the trials of the first condition on a robot are driven."""
+        name = next(name for name, settings in self._settings.items() if settings["platform"] == "scribbler")
+        return self.arena(name)
+
+    def _read(self, ledger: Ledger) -> list[CountedTrial]:
+        scores = [row for row in ledger.scores() if row["undone"] is None]
+        who = {(row["trial"], row["role"]): row["who"] for row in scores}
+        notes: dict[int, list[str]] = {}
+        for note in ledger.notes():
+            notes.setdefault(note["trial"], []).append(f"{note['who']}: {note['text']}")
+        return [
+            CountedTrial(
+                trial=trial,
+                title=trial.code if self.is_blind and not trial.is_closed else trial.name,
+                pen=self._pens[trial.pen % len(self._pens)],
+                first=who.get((trial.trial, "score"), ""),
+                second=who.get((trial.trial, "second"), ""),
+                is_corrected=(trial.trial, "correction") in who,
+                notes=tuple(notes.get(trial.trial, ())),
+            )
+            for trial in ledger.trials()
+        ]
+
+    # what people say; each is in the ledger when it returns
+
+    def score(self, number: int, draft: Draft, who: str, role: ScoreRole) -> None:
+        """Enter the cells of a trial, and what they were confirmed from.
+
+        Raises:
+            LedgerError: The ledger does not allow it: the text says why.
+        """
+        self.score_all({number: draft}, who, role)
+
+    def score_all(self, drafts: Mapping[int, Draft], who: str, role: ScoreRole = "score") -> None:
+        """Enter the cells of several trials by their numbers: all of them, or none where one is refused.
+
+        Raises:
+            LedgerError: The ledger does not allow it: the text says why.
+        """
+        who = _named(who)
+        seen = {number: self._proposal(number, draft.proposal) for number, draft in drafts.items()}
+        scores = {
+            number: Score(sorted(draft.cells), who)
+            if (found := seen[number]) is None
+            else found.score(sorted(draft.cells), who)
+            for number, draft in drafts.items()
+        }
+        with self._ledger() as ledger:
+            ledger.score_all(scores, role)
+            for number, found in seen.items():
+                if found is not None and found.told:
+                    ledger.note(found.told, who, number)
+        for number in drafts:
+            forget_draft(self._folder, number, who, role)
+
+    def draft(self, number: int, who: str, role: ScoreRole) -> Draft:
+        """What somebody has tapped of a trial so far; before that, what was last seen of it, for a first count."""
+        draft = read_draft(self._folder, number, who, role)
+        if draft is not None:
+            return draft
+        if role == "correction":
+            return Draft(list(self.trial(number).trial.cells or ()))
+        found = self.proposals(number)
+        if role == "score" and found and found[0].is_usable:
+            return Draft(found[0].cells, found[0].mark)
+        return Draft([])
+
+    def keep(self, number: int, who: str, role: ScoreRole, draft: Draft) -> None:
+        """Keep what somebody has tapped so far."""
+        keep_draft(self._folder, number, who, role, draft)
+
+    def proposals(self, number: int) -> list[Proposal]:
+        """What a photograph or a camera saw of a trial, the last one first."""
+        return read_proposals(self._folder, number)
+
+    def _proposal(self, number: int, mark: str) -> Proposal | None:
+        return next((each for each in self.proposals(number) if mark and each.mark == mark), None)
+
+    def undo(self, number: int) -> None:
+        """Take a score back, as far as its generation is not closed."""
+        with self._ledger() as ledger:
+            ledger.undo(number)
+
+    def void(self, number: int, reason: str) -> None:
+        """Declare a trial void; it is driven again."""
+        with self._ledger() as ledger:
+            ledger.void(number, reason[:LONGEST_NOTE])
+
+    def note(self, number: int | None, text: str, who: str) -> None:
+        """Keep a note."""
+        with self._ledger() as ledger:
+            ledger.note(text[:LONGEST_NOTE], _named(who), number)
+
+    def _ledger(self) -> Ledger:
+        return Ledger.open(self._folder / LEDGER_NAME)
+
+
+def _named(who: str) -> str:
+    if not who.strip():
+        raise LedgerError("Who are you? Give a name first: the ledger keeps it with what you enter.")
+    return who.strip()
+
+
+def _stamp(path: Path) -> tuple[Any, ...]:
+    """Changes whenever the ledger does; empty while there is none."""
+    found: list[Any] = []
+    for each in (path, path.with_name(path.name + "-wal")):
+        try:
+            status = each.stat()
+        except OSError:
+            continue
+        found.append((each.name, status.st_mtime_ns, status.st_size))
+    return tuple(found)

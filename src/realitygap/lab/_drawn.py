@@ -1,0 +1,85 @@
+"""What lies beside a ledger: the lines that emulated robots drew, and cells tapped so far of trials not yet scored."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+FOLDER = "lab"
+"""Within a study's folder. What it holds can be lost without harm once its trials are scored."""
+
+
+def keep_drawn(folder: Path, trial: int, path: Sequence[Sequence[float]]) -> None:
+    """Keep the line of a trial: (t, 2 or more) x, y [m] and so on."""
+    write_json(
+        folder / FOLDER / f"line-{trial}.json", [[round(each[0], 5), round(each[1], 5)] for each in path]
+    )
+
+
+def read_drawn(folder: Path, trial: int) -> list[tuple[float, float]]:
+    """The line of a trial [m]; empty where none was kept."""
+    found = read_json(folder / FOLDER / f"line-{trial}.json")
+    with contextlib.suppress(TypeError, ValueError, IndexError):
+        return [(float(each[0]), float(each[1])) for each in found or ()]
+    return []
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What somebody has tapped so far.
+
+    Attributes:
+        cells: Marked ones.
+        proposal: From which they began, as `Proposal.mark` names it; empty where from none.
+    """
+
+    cells: list[int]
+    proposal: str = ""
+
+
+def keep_draft(folder: Path, trial: int, who: str, role: str, draft: Draft) -> None:
+    """Keep what somebody has tapped so far."""
+    values = {"cells": sorted(draft.cells), "proposal": draft.proposal}
+    write_json(_draft(folder, trial, who, role), values)
+
+
+def read_draft(folder: Path, trial: int, who: str, role: str) -> Draft | None:
+    """What somebody has tapped so far; None where they have not begun."""
+    found = read_json(_draft(folder, trial, who, role))
+    cells = found.get("cells") if isinstance(found, dict) else None
+    if isinstance(cells, list) and all(type(each) is int for each in cells):
+        return Draft(cells, str(found.get("proposal") or ""))
+    return None
+
+
+def forget_draft(folder: Path, trial: int, who: str, role: str) -> None:
+    """It was entered."""
+    with contextlib.suppress(OSError):
+        _draft(folder, trial, who, role).unlink(missing_ok=True)
+
+
+def _draft(folder: Path, trial: int, who: str, role: str) -> Path:
+    mark = hashlib.blake2b(f"{role}:{who}".encode(), digest_size=6).hexdigest()
+    return folder / FOLDER / f"draft-{trial}-{mark}.json"
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a file as a whole, beside its place first."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f"{path.name}.{secrets.token_hex(4)}.tmp")
+    temporary.write_text(json.dumps(value), "utf-8")
+    temporary.replace(path)
+
+
+def read_json(path: Path) -> Any:
+    """What is in a file; None where it is not there, or no JSON."""
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None

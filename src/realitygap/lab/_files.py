@@ -1,0 +1,124 @@
+"""No file outside the lab's folder is named by a study that is begun at a page."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+from realitygap.errors import StudyError
+from realitygap.settings import shown
+
+LONGEST_TEXT = 200_000
+"""Of a study file [letters]."""
+
+_SOCKETS = ("socket", "rfc2217")
+_EMULATORS_FILES = ("arena", "state", "twin")
+"""Settings of an emulated robot's port that name files."""
+_PROSE = ("title", "note", "published_source", "change")
+
+
+def refuse_files_outside(root: Path, text: str) -> None:
+    """Refuse the text of a study file that names a file outside a folder, or is far too long.
+
+    Raises:
+        StudyError: It does, it is, or it is not TOML.
+    """
+    if len(text) > LONGEST_TEXT:
+        raise StudyError(
+            f"The file has {len(text):,} letters, expected at most {LONGEST_TEXT:,}: a study file in TOML."
+        )
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise StudyError(f"This is not TOML: {error}. Expected a study file.") from error
+    for value in _texts(data):
+        refuse_outside(root, value)
+
+
+def refuse_outside(root: Path, text: str) -> None:
+    """Refuse a name, such as sim:FILE, that would be a file outside a folder.
+
+    Raises:
+        StudyError: It would.
+    """
+    for part in (text, *text.split(":")):
+        if not _is_within(root, part):
+            raise StudyError(
+                f"{shown(text)} would be a file outside {root}, and the lab reads none there. Put the file into that "
+                "folder, and name it without one."
+            )
+
+
+def refuse_port(root: Path, port: str) -> None:
+    """Refuse a robot's port by which another file than a device could be opened, or one outside a folder.
+
+    A library for serial ports knows names that write what is said into any file.
+
+    Raises:
+        StudyError: It is no device, socket or emulator, or an emulator with a file outside the folder.
+    """
+    name = port.removeprefix("scribbler:")
+    scheme, colon, rest = name.partition("://")
+    if not colon:
+        is_below_dev = name.startswith("/") and name != "/dev" and _is_within(Path("/dev"), name)
+        if is_below_dev or re.fullmatch(r"COM\d+", name, re.IGNORECASE):
+            return
+    elif scheme in _SOCKETS:
+        if re.fullmatch(r"[^/?#@]+:\d+/?", rest):
+            return
+    elif scheme == "emulator":
+        for key, value in parse_qsl(rest.partition("?")[2]):
+            if key in _EMULATORS_FILES:
+                refuse_outside(root, value)
+        return
+    raise StudyError(
+        f"{shown(port)} is no port that the lab opens. Expected a device such as /dev/rfcomm0 or COM3, "
+        "socket://HOST:PORT, or emulator://s2?fluke=2."
+    )
+
+
+def refuse_camera(root: Path, spec: str) -> None:
+    """Refuse a camera or a video whose file, or whose lens, would be outside a folder.
+
+    Raises:
+        StudyError: It would.
+    """
+    name, _, query = spec.partition("?")
+    refuse_outside(root, name)
+    for _, value in parse_qsl(query):
+        refuse_outside(root, value)
+
+
+def refuse_platform(root: Path, platform: str) -> None:
+    """Refuse a platform whose port or file would be outside a folder.
+
+    Raises:
+        StudyError: It would.
+    """
+    if platform.startswith("scribbler:"):
+        refuse_port(root, platform)
+    else:
+        refuse_outside(root, platform)
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            if key not in _PROSE:
+                yield from _texts(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from _texts(each)
+    elif isinstance(value, str):
+        yield value
+
+
+def _is_within(root: Path, part: str) -> bool:
+    try:
+        return (root / part).resolve().is_relative_to(root.resolve())
+    except (OSError, ValueError, RuntimeError):
+        return False

@@ -1,0 +1,105 @@
+"""What a page may say over its websocket: messages of the page's own library and shape, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Awaitable, Callable, MutableMapping
+from typing import Any
+
+Message = MutableMapping[str, Any]
+
+LONGEST_LOG = 2000
+"""Of what a page reports to the server's log [letters]."""
+REFUSED = "This is no message of a page of the lab."
+_VIOLATION = 1008
+_TEXTS = ("client_id", "listener_id", "request_id", "tab_id", "document_id", "old_tab_id", "level", "message")
+_NUMBERS = ("id", "next_message_id")
+_NEEDED = {
+    "event": ("client_id", "id", "listener_id", "args"),
+    "ack": ("client_id", "next_message_id"),
+    "javascript_response": ("client_id", "request_id"),
+    "log": ("client_id", "level", "message"),
+    "handshake": ("client_id", "tab_id", "document_id"),
+}
+
+
+def checked(
+    receive: Callable[[], Awaitable[Message]], send: Callable[[Message], Awaitable[None]]
+) -> Callable[[], Awaitable[Message]]:
+    """What a page says, up to the first message that no page says: at that the connection ends.
+
+    Args:
+        receive, send: Of a websocket, as ASGI has them.
+    """
+
+    async def heard() -> Message:
+        message = await receive()
+        if message["type"] == "websocket.receive" and not is_of_page(message.get("text")):
+            await send({"type": "websocket.close", "code": _VIOLATION, "reason": REFUSED})
+            return {"type": "websocket.disconnect", "code": _VIOLATION}
+        return message
+
+    return heard
+
+
+def is_of_page(frame: str | None) -> bool:
+    """Whether a frame is one of Engine.IO's own, or an event in the shape that the pages' library expects."""
+    if not isinstance(frame, str):
+        return False
+    if not frame.startswith("42"):
+        return frame in ("1", "2", "2probe", "3", "5", "40", "40{}", "41")
+    text = frame[2:].lstrip("0123456789") if frame[2:3].isdigit() else frame[2:]
+    try:
+        match _value(text):
+            case [str(what), dict(said)]:
+                return _fits(what, said)
+    except (ValueError, RecursionError):
+        pass
+    return False
+
+
+def _fits(what: str, said: dict[str, Any]) -> bool:
+    needed = _NEEDED.get(what)
+    if needed is None or any(key not in said for key in needed):
+        return False
+    return all(_is_right(key, value) for key, value in said.items())
+
+
+def _is_right(key: str, value: Any) -> bool:
+    if key in _TEXTS:
+        return isinstance(value, str) and len(value) <= LONGEST_LOG
+    if key in _NUMBERS:
+        return type(value) is int and abs(value) < 2**53
+    if key == "args":
+        return isinstance(value, list) and all(each is None or _is_json(each) for each in value)
+    return True
+
+
+def _is_json(text: Any) -> bool:
+    if isinstance(text, str):
+        _value(text)
+        return True
+    return False
+
+
+def _value(text: str) -> Any:
+    """What a JSON text holds: numbers that are finite, and letters that there are.
+
+    Raises:
+        ValueError: It is none, or holds others.
+        RecursionError: It is nested too deeply.
+    """
+    value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
+    text.encode()
+    json.dumps(value, ensure_ascii=False).encode()
+    return value
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    return value if math.isfinite(value) else _refuse(text)
+
+
+def _refuse(text: str) -> float:
+    raise ValueError(f"{text} is no number")

@@ -1,0 +1,68 @@
+"""A gap measured, or planned, in a process of its own; its report grows as trials come in."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from realitygap.report import write_gap_report
+from realitygap.study import gap_between, plan_gap
+
+from ._channel import Channel, Message
+
+_TOLD_S = 0.2
+"""Between two messages on how far it is [s]."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Measure, or plan.
+
+    Args:
+        channel: To the server.
+        order: `plan`, the arguments of `plan_gap`; or `measure`, those of `gap_between`, with `page`, the file of the
+            report, and `kept`, that of the target's trials.
+    """
+    if order.get("plan"):
+        _plan(channel, dict(order["plan"]))
+    else:
+        _measure(channel, dict(order["measure"]), Path(order["page"]), Path(order["kept"]))
+    channel.say("done")
+
+
+def _plan(channel: Channel, values: dict[str, Any]) -> None:
+    found = plan_gap(**values)
+    rows = [{**vars(row), "on_target": row.on_target} for row in found.needed]
+    channel.say(
+        "plan", rows=rows, origin=found.spreads.origin, spread=found.spread, noise=found.spreads.noise
+    )
+
+
+def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
+    """Again and again with more trials of each controller: those of the target are kept and not driven again."""
+    told = _Telling(channel)
+    for trials in rounds(int(values.pop("trials"))):
+        found = gap_between(**values, trials=trials, results=kept, tell=told.show)
+        write_gap_report(found, page)
+        channel.say("measured", trials=trials, verdict=found.study.result.verdict)
+
+
+def rounds(trials: int) -> list[int]:
+    """Trials of each controller after which there is a report: 2, 4, 8 and so on, and all."""
+    steps = [2**k for k in range(1, 13) if 2**k < trials]
+    return [*steps, trials]
+
+
+class _Telling:
+    """Tells how many trials are done, not too often."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._last = 0.0
+
+    def show(self, name: str, done: int, total: int) -> None:
+        """So many trials are done on a platform."""
+        now = time.monotonic()
+        if now - self._last > _TOLD_S or done == total:
+            self._last = now
+            self._channel.say("trials", name=name, done=done, total=total)

@@ -1,0 +1,100 @@
+"""A robot that is driven by hand, as the pages see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from realitygap.world import Arena, Grid, Pose
+
+from ._job import MOST_POINTS, Job
+
+
+class Hand(Job):
+    """A robot at its port.
+
+    Attributes:
+        port: Its name.
+        label: REAL or EMULATED; empty before it answers.
+        about: What it says of itself.
+        senses: The last ones; None before.
+        battery_v: [V]; None before it was told.
+        preflight: What the last one found; None before.
+        picture: PNG in base64; empty before.
+        arena: Where an emulated robot drives; None where nobody sees it.
+        line: (x, y) [m] where it has been.
+        said: What it refused last; empty where nothing.
+
+    Args:
+        order: What the process is told first.
+        root: Where it works.
+        changed: Called after each change but that of the senses, from another thread.
+    """
+
+    QUIET = frozenset({"senses"})
+    STOPPED = "The robot was stopped and let go."
+    LOST = "The robot's process ended (status {status})."
+
+    def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
+        self.port = str(order["port"])
+        self.label = ""
+        self.about: dict[str, str] = {}
+        self.senses: dict[str, Any] | None = None
+        self.battery_v: float | None = None
+        self.preflight: dict[str, Any] | None = None
+        self.picture = ""
+        self.arena: Arena | None = None
+        self.line: list[list[float]] = []
+        self.said = ""
+        self.n_live = 0
+        super().__init__({"work": "robot", **order}, root, changed)
+
+    def drive(self, move: float, turn: float) -> None:
+        """Drive so for the next moment; said again and again, or it stops."""
+        self._child.tell({"do": "drive", "move": move, "turn": turn})
+
+    def release(self) -> None:
+        """The handle was let go: stop, until it is pulled again."""
+        self._child.tell({"do": "release"})
+
+    def stop(self) -> None:
+        """Stop the motors; a handle that is held has to be let go before it drives again."""
+        self._child.tell({"do": "stop"})
+
+    def want(self, what: str) -> None:
+        """Ask for preflight, picture, or place."""
+        self.said = ""
+        self._child.tell({"do": "want", "what": what})
+
+    def _on_met(self, message: dict[str, Any]) -> None:
+        self.label = message["label"]
+        self.about = {
+            "name": str(message["name"]),
+            **{key: str(value) for key, value in message["info"].items()},
+        }
+        if "grid" in message:
+            walls = tuple(tuple(wall) for wall in message["walls"])
+            self.arena = Arena("emulated", walls, Grid(**message["grid"]), Pose(*message["start"]))
+
+    def _on_senses(self, message: dict[str, Any]) -> None:
+        self.senses = message
+        self.n_live += 1
+        pose = message.get("pose")
+        if pose is not None and (not self.line or self.line[-1] != pose[:2]):
+            self.line = [*self.line[-MOST_POINTS:], pose[:2]]
+
+    def _on_battery(self, message: dict[str, Any]) -> None:
+        self.battery_v = message["volts"]
+
+    def _on_preflight(self, message: dict[str, Any]) -> None:
+        self.preflight = message
+
+    def _on_picture(self, message: dict[str, Any]) -> None:
+        self.picture = message["png"]
+
+    def _on_placed(self, message: dict[str, Any]) -> None:
+        self.line = []
+
+    def _on_refused(self, message: dict[str, Any]) -> None:
+        self.said = message["text"]

@@ -1,0 +1,93 @@
+"""Work that goes on in a process of its own, as the pages see it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+from ._child import Child
+
+MOST_POINTS = 4000
+"""Of the line of a robot that pages are shown: 200 s of it."""
+
+
+class Job:
+    """Something at work.
+
+    Each thing that its process says changes it, by the method that is named for it, such as `_on_done`. The process
+    speaks from the beginning on: attributes are there before this class is initialized.
+
+    Attributes:
+        ask: What somebody has to answer before it goes on; None where nothing waits.
+        outcome: What it ended with: a message; None while it goes on.
+        is_failed: Whether that was a failure.
+
+    Args:
+        order: What the process is told first.
+        root: Where it works.
+        changed: Called after each change, but those of which too many come, from another thread.
+    """
+
+    QUIET: ClassVar[frozenset[str]] = frozenset()
+    """What is said so often that pages look for it by themselves."""
+
+    STOPPED: ClassVar = "Stopped."
+    LOST: ClassVar = "Its process ended (status {status})."
+
+    def __init__(self, order: Mapping[str, Any], root: Path, changed: Callable[[], None]) -> None:
+        self.ask: dict[str, Any] | None = None
+        self.outcome: str | None = None
+        self.is_failed = False
+        self._changed = changed
+        self._child = Child(order, root, self._hear)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has ended."""
+        return self.outcome is not None
+
+    def answer(self, **values: Any) -> bool:
+        """Answer what is asked; False where somebody else has done so already."""
+        ask, self.ask = self.ask, None
+        if ask is None:
+            return False
+        self._child.tell({"do": "answer", "number": ask["number"], **values})
+        self._changed()
+        return True
+
+    def ask_to_end(self) -> None:
+        """Have it end, motors first; what was recorded is kept."""
+        self._child.ask_to_end()
+
+    def end(self) -> None:
+        """Have it end, and wait for that."""
+        self._child.end()
+
+    def _hear(self, message: dict[str, Any]) -> None:
+        kind = message.get("kind")
+        handler = getattr(self, f"_on_{kind}", None)
+        if handler is not None:
+            with contextlib.suppress(KeyError, TypeError):
+                handler(message)
+        if kind not in self.QUIET:
+            self._changed()
+
+    def _on_ask(self, message: dict[str, Any]) -> None:
+        self.ask = message
+
+    def _on_answered(self, message: dict[str, Any]) -> None:
+        if self.ask is not None and self.ask["number"] == message["number"]:
+            self.ask = None
+
+    def _on_error(self, message: dict[str, Any]) -> None:
+        self.outcome, self.is_failed = message["text"], True
+
+    def _on_interrupted(self, message: dict[str, Any]) -> None:
+        self.outcome = self.STOPPED
+
+    def _on_ended(self, message: dict[str, Any]) -> None:
+        self.ask = None
+        if self.outcome is None:
+            self.outcome, self.is_failed = self.LOST.format(status=message["status"]), True

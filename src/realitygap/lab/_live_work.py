@@ -1,0 +1,59 @@
+"""A network of a study that drives a robot in a process of its own, while somebody looks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from realitygap.playback import WatchedRobot
+from realitygap.report import choose_trial, read_tally
+from realitygap.runs import genome_of
+from realitygap.trials import drive_trial
+
+from ._channel import Channel, Message
+from ._live_robot import open_robot, own_platform
+
+NUMBERS = ("condition", "replicate", "generation", "individual")
+
+_NAMES = {"replicate": "run", "generation": "generation", "individual": "individual"}
+
+
+class _FarPage:
+    """A page at the other end of the channel."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self.scene: dict[str, Any] = {}
+        self.trials: list[dict[str, Any]] = []
+        self.live = True
+
+    def send(self, content: dict[str, Any]) -> None:
+        """Tell it where the robot is."""
+        self._channel.say("told", content=content)
+
+    def on_msg(self, handler: Callable[[Any, dict[str, Any], Any], None]) -> None:
+        """Nothing: the server remembers everything for pages that come later."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Drive one trial, as fast as it goes in truth.
+
+    Args:
+        channel: To the server.
+        order: `folder` of the study, `platform` as `open_robot` takes it, or empty for the study's own, and of which
+            trial: `condition`, `replicate`, `generation` and `individual`, where they are named.
+    """
+    numbers = {key: order[key] for key in NUMBERS if key in order}
+    chosen = choose_trial(read_tally(Path(order["folder"])), **numbers)
+    row, condition = chosen.row, chosen.condition
+    robot, n_steps = open_robot(condition, order.get("platform") or own_platform(condition))
+    page, problem = _FarPage(channel), "Stopped."
+    which = ", ".join(f"{name} {row[key]}" for key, name in _NAMES.items())
+    try:
+        with WatchedRobot(robot, arena=condition.placed_arena, page=page) as watched:
+            scene = {**page.scene, "title": f"{condition.name}, {which}"}
+            channel.say("begun", scene=scene, trials=page.trials)
+            problem = drive_trial(watched, genome_of(condition, row).network(), n_steps).problem
+    finally:
+        channel.say("played", trials=page.trials, problem=problem)

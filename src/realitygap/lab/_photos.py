@@ -1,0 +1,223 @@
+"""The photographs of a study's sheets: kept beside its ledger, and read one after the other."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from realitygap.errors import StudyError
+from realitygap.vision import photo_hash
+
+from ._access import LARGEST_BODY
+from ._child import Child
+from ._drawn import FOLDER, read_json, write_json
+
+MOST_WAITING = 8
+"""Photographs that may wait to be read."""
+LONGEST_NAME = 80
+_MARK = re.compile(r"[0-9a-f]{64}")
+
+PhotoState = Literal["waiting", "reading", "read", "refused"]
+
+
+@dataclass(frozen=True)
+class SheetPhoto:
+    """A photograph of a sheet.
+
+    Attributes:
+        mark: The SHA-256 of its file.
+        name: Of the file, as it was sent.
+        sheet: Which sheet it shows, as the ledger numbers them.
+        time: When it came [s since 1970].
+        state: How far it is.
+        said: What is done with it, or why it cannot be read.
+        box: Left, lower, right, upper end of what `picture` shows [m].
+        trials: On the sheet.
+    """
+
+    mark: str
+    name: str
+    sheet: int
+    time: float
+    state: PhotoState = "waiting"
+    said: str = ""
+    box: list[float] = field(default_factory=list)
+    trials: list[int] = field(default_factory=list)
+
+
+class Photos:
+    """The photographs of a study's sheets. What waits when the lab is killed is read when it is there again.
+
+    Args:
+        folder: Of the study.
+        root: Where the process that reads them works.
+        changed: Called after each change, from another thread.
+    """
+
+    def __init__(self, folder: Path, root: Path, changed: Callable[[], None]) -> None:
+        self._folder, self._root, self._changed = folder, root, changed
+        self._place = folder / FOLDER / "photos"
+        self._lock = threading.RLock()
+        self._child: Child | None = None
+        self._reading = ""
+        self._photos = {each.mark: each for each in _kept(self._place)}
+        self._go_on()
+
+    def photos(self) -> list[SheetPhoto]:
+        """All of them, the last one first."""
+        with self._lock:
+            return sorted(self._photos.values(), key=lambda each: each.time, reverse=True)
+
+    def of_sheet(self, sheet: int) -> SheetPhoto | None:
+        """The last one of a sheet that has been read; None where there is none."""
+        return next((each for each in self.photos() if each.sheet == sheet and each.state == "read"), None)
+
+    def photo(self, mark: str) -> SheetPhoto | None:
+        """A photograph by its mark."""
+        return self._photos.get(mark)
+
+    def picture(self, mark: str) -> Path | None:
+        """The picture of a sheet from straight above; None before it is read."""
+        known = self._photos.get(mark)
+        return self._place / f"{mark}.jpg" if known is not None and known.state == "read" else None
+
+    def add(self, data: bytes, name: str, sheet: int) -> SheetPhoto:
+        """Take a photograph, to be read when its turn comes.
+
+        Args:
+            data: Its file.
+            name: Of the file.
+            sheet: Which sheet it shows.
+
+        Raises:
+            StudyError: It is empty or too large, or too many wait.
+        """
+        if not data:
+            raise StudyError("The file is empty. Expected a photograph of the sheet.")
+        if len(data) > LARGEST_BODY:
+            raise StudyError(f"The file is too large. Expected at most {LARGEST_BODY >> 20} MB.")
+        mark = photo_hash(data)
+        with self._lock:
+            known = self._photos.get(mark)
+            if known is not None and known.state in ("waiting", "reading") and known.sheet == sheet:
+                return known
+            if mark == self._reading:
+                raise StudyError(f"This photo is being read, for sheet {known.sheet if known else sheet}.")
+            if sum(each.state in ("waiting", "reading") for each in self._photos.values()) >= MOST_WAITING:
+                raise StudyError(f"{MOST_WAITING} photographs wait to be read. Wait until one is done.")
+            photo = SheetPhoto(mark, _plain(name), sheet, time.time(), said="Waits to be read")
+            self._place.mkdir(parents=True, exist_ok=True)
+            self._file(mark).write_bytes(data)
+            self._put(photo)
+            self._go_on()
+        return photo
+
+    def forget(self, mark: str) -> None:
+        """Leave out one that could not be read."""
+        with self._lock:
+            if mark in self._photos and self._photos[mark].state == "refused":
+                del self._photos[mark]
+        self._changed()
+
+    def end(self) -> None:
+        """End the process that reads."""
+        with self._lock:
+            child, self._child = self._child, None
+        if child is not None:
+            child.end()
+
+    # inside
+
+    def _file(self, mark: str) -> Path:
+        return self._place / f"{mark}.photo"
+
+    def _put(self, photo: SheetPhoto) -> None:
+        """Remember it; on disk as what it is after a restart."""
+        self._photos[photo.mark] = photo
+        place = self._place / f"{photo.mark}.json"
+        if photo.state == "refused":
+            for path in (place, self._file(photo.mark)):
+                with contextlib.suppress(OSError):
+                    path.unlink(missing_ok=True)
+        else:
+            write_json(place, asdict(photo))
+        self._changed()
+
+    def _go_on(self) -> None:
+        """Read the next one."""
+        with self._lock:
+            waiting = [each for each in reversed(self.photos()) if each.state == "waiting"]
+            if self._reading or not waiting:
+                return
+            photo = waiting[0]
+            self._reading = photo.mark
+            self._photos[photo.mark] = replace(photo, state="reading", said="Opening it")
+            order = {
+                "work": "photo",
+                "folder": str(self._folder),
+                "photo": str(self._file(photo.mark)),
+                "picture": str(self._place / f"{photo.mark}.jpg"),
+                "name": photo.name,
+                "sha256": photo.mark,
+                "sheet": photo.sheet,
+            }
+            self._child = Child(order, self._root, self._hear)
+
+    def _hear(self, message: dict[str, Any]) -> None:
+        with self._lock:
+            photo = self._photos.get(self._reading)
+            if photo is None:
+                return
+            kind = message.get("kind")
+            if kind == "stage":
+                self._photos[photo.mark] = replace(photo, said=message["text"])
+                self._changed()
+            elif kind == "read":
+                self._put(_read(photo, message))
+            elif kind == "error":
+                self._put(replace(photo, state="refused", said=message["text"]))
+            elif kind == "ended":
+                self._ended(photo)
+
+    def _ended(self, photo: SheetPhoto) -> None:
+        self._reading = ""
+        if self._child is None:  # the lab is being closed: it is read when the lab is there again
+            return
+        if photo.state == "reading":
+            self._put(replace(photo, state="refused", said="The process that read it ended. Send it again."))
+        self._go_on()
+
+
+def _read(photo: SheetPhoto, message: dict[str, Any]) -> SheetPhoto:
+    untried = ", ".join(message["untried"])
+    said = (
+        f"Not tried in their boxes, so their colors are guessed from their names: {untried}."
+        if untried
+        else ""
+    )
+    return replace(photo, state="read", said=said, box=message["box"], trials=message["trials"])
+
+
+def _kept(place: Path) -> list[SheetPhoto]:
+    """Those on disk; what was being read is read anew."""
+    found = []
+    for path in sorted(place.glob("*.json")):
+        values = read_json(path)
+        with contextlib.suppress(TypeError, KeyError):
+            photo = SheetPhoto(**values)
+            if _MARK.fullmatch(photo.mark) and (place / f"{photo.mark}.photo").is_file():
+                is_read = photo.state == "read" and (place / f"{photo.mark}.jpg").is_file()
+                found.append(photo if is_read else replace(photo, state="waiting", said="Waits to be read"))
+    return found
+
+
+def _plain(name: str) -> str:
+    """A file's name without a folder or anything that cannot be printed."""
+    last = re.split(r"[/\\]", name)[-1]
+    return "".join(letter for letter in last if letter.isprintable())[-LONGEST_NAME:].strip() or "photo"

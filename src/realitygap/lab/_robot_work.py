@@ -1,0 +1,184 @@
+"""A robot at its port, driven by hand from a page: in a process of its own, with a dead man's handle."""
+
+from __future__ import annotations
+
+import base64
+import io
+import queue
+import threading
+import time
+from dataclasses import asdict
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from realitygap.errors import RobotError
+from realitygap.robots.scribbler import Scribbler, is_in_this_program
+from realitygap.trials import preflight
+from realitygap.world import Pose
+
+from ._channel import Channel, Message
+
+if TYPE_CHECKING:
+    from realitygap.emulator import Witness
+
+DEAD_MAN_S = 0.4
+"""After so long without a word from whoever drives the motors are stopped [s]."""
+PERIOD_S = 0.05
+"""Of the loop: what the robot is asked in it takes longer over Bluetooth."""
+WATCHDOG_S = 1.0
+"""After so long a silence of the loop itself the driver stops the motors [s]."""
+BATTERY_S = 5.0
+"""Between two looks at the battery [s]."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Connect, then sense and drive until told to quit.
+
+    Args:
+        channel: To the server.
+        order: `port`, and `witness` of an emulator in another program, if any.
+    """
+    port = str(order["port"])
+    if is_in_this_program(port):
+        import_module("realitygap.emulator")  # which tells pyserial of such ports
+    with Scribbler(port, watchdog_s=WATCHDOG_S) as robot:
+        _Hand(channel, robot, _witness(robot, order.get("witness") or None)).carry_on()
+
+
+def _witness(robot: Scribbler, address: str | None) -> Witness | None:
+    own: Witness | None = getattr(robot.link.port, "witness", None)
+    if own is not None or address is None:
+        return own
+    from realitygap.emulator import connect_witness
+
+    return connect_witness(address)
+
+
+class _Hand:
+    """Drives as it is told, and stops when it is not."""
+
+    def __init__(self, channel: Channel, robot: Scribbler, witness: Witness | None) -> None:
+        self._channel, self._robot, self._witness = channel, robot, witness
+        self._wheels = (0.0, 0.0)
+        self._told_s = 0.0
+        self._heard_s = 0.0
+        self._is_stopped = False
+        self._moves = False
+        self._lock = threading.Lock()
+        self._wanted: queue.Queue[Message] = queue.Queue()
+        self._battery_s = -BATTERY_S
+        channel.at_once("drive", self._drive)
+        channel.at_once("release", self._release)
+        channel.at_once("stop", self._stop)
+        channel.at_once("want", self._wanted.put)
+
+    def carry_on(self) -> None:
+        """Until the process is interrupted, or the robot fails."""
+        robot = self._robot
+        self._channel.say("met", label=robot.label, info=asdict(robot.info), name=robot.name, **self._place())
+        while True:
+            began = time.monotonic()
+            self._keep_moving()
+            self._say_senses()
+            while not self._wanted.empty():
+                self._do(self._wanted.get())
+            time.sleep(max(0.0, PERIOD_S - (time.monotonic() - began)))
+
+    # driving
+
+    def _drive(self, message: Message) -> None:
+        """From the thread that listens."""
+        move, turn = (_share(message.get(name)) for name in ("move", "turn"))
+        with self._lock:
+            now, before = time.monotonic(), self._heard_s
+            self._heard_s = now
+            if self._is_stopped and now - before < DEAD_MAN_S:
+                return  # the handle that was held when somebody pressed stop is held still
+            self._is_stopped = False
+            self._wheels = (_share(move - turn), _share(move + turn))
+            self._told_s = now
+
+    def _release(self, message: Message) -> None:
+        """The handle was let go."""
+        self._stop(message)
+        self._is_stopped = False
+
+    def _stop(self, message: Message) -> None:
+        """From the thread that listens, whatever the loop is at; nothing moves until the handle was let go."""
+        with self._lock:
+            self._is_stopped = True
+            self._told_s = 0.0
+            self._moves = False
+            self._robot.stop()
+
+    def _keep_moving(self) -> None:
+        with self._lock:
+            if time.monotonic() - self._told_s < DEAD_MAN_S:
+                self._robot.motors(*self._wheels)
+                self._moves = self._wheels != (0.0, 0.0)
+            elif self._moves:
+                self._robot.stop()
+                self._moves = False
+                self._channel.say("stood")
+
+    # telling
+
+    def _place(self) -> dict[str, Any]:
+        """Where an emulated robot is, and what is around it."""
+        if self._witness is None:
+            return {}
+        arena = self._witness.arena()
+        return {
+            "walls": [list(wall) for wall in arena.walls],
+            "grid": asdict(arena.grid),
+            "start": list(arena.start),
+        }
+
+    def _say_senses(self) -> None:
+        robot = self._robot
+        seen = robot.observe()
+        values: dict[str, Any] = {
+            "raw": list(seen.raw),
+            "readings": list(seen.readings),
+            "stalled": seen.stalled,
+            "light": list(robot.light()),
+            "line": list(robot.line()),
+            "moves": self._moves,
+        }
+        if self._witness is not None:
+            values["pose"] = list(self._witness.pose())
+        if robot.info.fluke != "none" and time.monotonic() - self._battery_s > BATTERY_S:
+            self._battery_s = time.monotonic()
+            self._channel.say("battery", volts=round(float(robot.battery()), 2))
+        self._channel.say("senses", **values)
+
+    def _do(self, message: Message) -> None:
+        what = message.get("what")
+        try:
+            if what == "preflight":
+                found = preflight(self._robot)
+                self._channel.say("preflight", facts=found.facts, problems=list(found.problems))
+            elif what == "picture":
+                self._channel.say("picture", png=_png(self._robot))
+            elif what == "place" and self._witness is not None:
+                self._witness.place(Pose(*self._witness.arena().start), 0)
+                self._channel.say("placed")
+        except RobotError as error:
+            if not self._robot.link.is_open:
+                raise
+            self._channel.say("refused", text=str(error))
+
+
+def _png(robot: Scribbler) -> str:
+    from PIL import Image
+
+    data = io.BytesIO()
+    Image.fromarray(robot.picture()).save(data, "PNG")
+    return base64.b64encode(data.getvalue()).decode()
+
+
+def _share(value: Any) -> float:
+    """A number within -1..1; 0 where it is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+        return 0.0
+    return min(1.0, max(-1.0, float(value)))

@@ -1,0 +1,199 @@
+"""Serving the lab."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import logging
+import secrets
+import socket
+import threading
+import traceback
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RealityGapError, StudyError, from_extra, whole_number
+from realitygap.settings import shown
+
+from ._access import LOOPBACK, Access
+
+DEFAULT_PORT = 8321
+SCHEME = "http"
+LOST_S = 20.0
+"""How long a page may be out of reach, as a phone behind a wall is, before it has to be loaded anew [s]."""
+
+
+def open_lab(
+    folder: str | Path = "results",
+    *,
+    port: int = DEFAULT_PORT,
+    host: str = "127.0.0.1",
+    show: bool = True,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Serve the page of the studies in a folder until Ctrl-C.
+
+    Args:
+        folder: Of the studies' folders; made where it is not there. Nothing outside it is read or written.
+        port: 0 to 65535; 0 takes one that is free.
+        host: Address to answer at. Any but this machine's loopback needs a token, which is told with the address.
+        show: Whether to open the page in the browser.
+        tell: Takes the lines for whoever started it.
+
+    Raises:
+        StudyError: The folder cannot be made, or is the folder of one study.
+        RealityGapError: The address cannot be had, or the extra `lab` is not installed.
+        ValueError: A port that there is not.
+    """
+    from_extra("nicegui", "lab")
+    port = whole_number("port", port, 0, 65535)
+    root = _root(Path(folder))
+    listener = _listen(host, port)
+    with contextlib.closing(listener):
+        token = None if host in LOOPBACK else secrets.token_urlsafe(16)
+        addresses = [_address(name, listener, token) for name in _names(host)]
+        lab, server = _prepare(root, token)  # takes some seconds: what is told then answers at once
+        _tell_addresses(root, addresses, token, tell)
+        if show:
+            threading.Timer(0.5, _show, (addresses[0], tell)).start()
+        try:
+            server.run(sockets=[listener])
+        finally:
+            lab.close()
+
+
+def _root(folder: Path) -> Path:
+    if (folder / "study.json").exists():
+        raise StudyError(
+            f"{folder} is the folder of one study. Name the folder that it is in: {folder.resolve().parent}"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(
+            f"{folder} cannot be a folder of studies: {error.strerror or error}. Name another one."
+        ) from error
+    return folder.resolve()
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, proto, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, proto)
+    except OSError as error:
+        raise RealityGapError(
+            f"--host {host}: {error.strerror or error}. Name an address of this machine."
+        ) from error
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(address)
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        if error.errno == errno.EADDRNOTAVAIL:
+            raise RealityGapError(
+                f"--host {host} is no address of this machine. Name an address that it has, such as 0.0.0.0."
+            ) from error
+        raise RealityGapError(
+            f"The lab cannot answer at {host}, port {port}: {error.strerror or error}. Is a lab running there? Name "
+            "another port (--port N; 0 takes a free one)."
+        ) from error
+    return listener
+
+
+def _names(host: str) -> list[str]:
+    """By what the lab can be reached."""
+    if host not in ("0.0.0.0", "::"):
+        return [host]
+    outward = ""
+    with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))  # sends nothing: the system says by which address it would
+        outward = probe.getsockname()[0]
+    return [outward or socket.gethostname()]
+
+
+def _address(name: str, listener: socket.socket, token: str | None) -> str:
+    shown = f"[{name}]" if ":" in name else name
+    return f"{SCHEME}://{shown}:{listener.getsockname()[1]}/" + (f"?token={token}" if token else "")
+
+
+def _tell_addresses(root: Path, addresses: list[str], token: str | None, tell: Callable[[str], None]) -> None:
+    tell(f"The lab shows the studies in {root}. Ctrl-C ends it.")
+    for address in addresses:
+        tell(f"Open {address}")
+        if token is not None:
+            tell(_qr_code(address))
+    if token is not None:
+        tell("Whoever has this address can start studies and drive the robot. Give it to nobody else.")
+
+
+def _qr_code(text: str) -> str:
+    import io
+
+    drawn = io.StringIO()
+    from_extra("segno", "lab").make(text, error="l").terminal(drawn, compact=True, border=2)
+    return drawn.getvalue().rstrip("\n")
+
+
+def _prepare(root: Path, token: str | None) -> tuple[Any, Any]:
+    """The lab, and what will serve it."""
+    import uvicorn
+    from fastapi import FastAPI
+    from nicegui import app as nicegui_app
+    from nicegui import ui
+
+    from ._lab import Lab
+    from .pages import add_pages
+
+    lab = Lab(root)
+    nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = (
+        True  # pages show by themselves how far an upload is
+    )
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    add_pages(lab)
+    ui.run_with(
+        app,
+        title="realitygap lab",
+        tailwind=False,
+        show_welcome_message=False,
+        language="en-US",
+        reconnect_timeout=LOST_S,
+    )
+    logging.getLogger("uvicorn.error").addFilter(_is_news)
+    for name in ("nicegui", "asyncio", "uvicorn.error", "engineio.server", "socketio.server"):
+        logging.getLogger(name).addFilter(_in_one_line)
+    config = uvicorn.Config(
+        Access(app, token),
+        log_level="warning",
+        access_log=False,
+        ws_max_size=2**20,
+        ws_per_message_deflate=False,  # costs more than it saves: messages are small, and the network is near
+        server_header=False,
+        timeout_graceful_shutdown=2,
+    )
+    return lab, uvicorn.Server(config)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether a remark of the server is one: that a page was closed while it was served is not."""
+    return "ASGI callable returned without" not in record.getMessage()
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """A failure in a page is one line: what, and where."""
+    if record.exc_info and (error := record.exc_info[1]) is not None:
+        places = traceback.extract_tb(error.__traceback__)
+        where = f" ({Path(places[-1].filename).name}, line {places[-1].lineno})" if places else ""
+        record.msg = "A page said what no page says, or this is a mistake in realitygap: %s"
+        record.args, record.exc_info = (f"{shown(error)}{where}",), None
+    return True
+
+
+def _show(address: str, tell: Callable[[str], None]) -> None:
+    opened: Any = False
+    with contextlib.suppress(webbrowser.Error, OSError):
+        opened = webbrowser.open(address)
+    if not opened:
+        tell("No browser could be opened here; the address above opens the lab.")

@@ -1,0 +1,212 @@
+"""The studies in a folder, and how far each is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import socket
+import threading
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RealityGapError, StudyError
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
+from realitygap.runs import NAME_PATTERN
+from realitygap.settings import shown
+
+LATELY_S = 0.8
+"""How old what those who watch are told may be [s]."""
+_HOLDER = re.compile(r"process (\d+) on (.+)")
+
+
+@dataclass(frozen=True)
+class StudyState:
+    """How far a study is.
+
+    Attributes:
+        name: Of its folder.
+        title, note: What it says of itself.
+        n_runs, n_done: Simulated runs in all, and those published.
+        n_driven_runs, n_driven_done: Runs of conditions that a robot drives, and those complete.
+        trials: How many trials of the ledger are in each state.
+        used_by: The program that writes to it now, as it calls itself; empty where none does.
+        problem: Why nothing more is known of it; empty otherwise.
+    """
+
+    name: str
+    title: str = ""
+    note: str = ""
+    n_runs: int = 0
+    n_done: int = 0
+    n_driven_runs: int = 0
+    n_driven_done: int = 0
+    trials: dict[str, int] = field(default_factory=dict)
+    used_by: str = ""
+    problem: str = ""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether nothing is missing."""
+        return not self.problem and (self.n_done, self.n_driven_done) == (self.n_runs, self.n_driven_runs)
+
+    @property
+    def share(self) -> float:
+        """Of its runs that are there, 0 to 1."""
+        return (self.n_done + self.n_driven_done) / max(self.n_runs + self.n_driven_runs, 1)
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether a robot drives some of its conditions."""
+        return self.n_driven_runs > 0
+
+
+class Studies:
+    """The studies in the lab's folder; nothing outside it is opened.
+
+    Args:
+        root: Their folder.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self._open: dict[str, ResultsFolder] = {}
+        self._seen: dict[str, tuple[float, StudyState]] = {}
+        self._lock = threading.Lock()
+        self._looking = threading.Lock()
+
+    def names(self) -> list[str]:
+        """Of the studies that are there, the last one changed first."""
+        with contextlib.suppress(OSError):
+            found = [
+                entry
+                for entry in self.root.iterdir()
+                if re.match(NAME_PATTERN, entry.name)
+                and (entry / "study.json").is_file()
+                and self._is_within(entry)
+            ]
+            return [entry.name for entry in sorted(found, key=_changed, reverse=True)]
+        return []
+
+    def path(self, name: str) -> Path:
+        """The folder of a study.
+
+        Raises:
+            StudyError: There is none of this name.
+        """
+        path = self.root / name
+        if not (
+            re.fullmatch(NAME_PATTERN, name) and (path / "study.json").is_file() and self._is_within(path)
+        ):
+            raise StudyError(f"There is no study {shown(name)} in {self.root}.")
+        return path
+
+    def new_path(self, name: str) -> Path:
+        """Where a study of this name is to be.
+
+        Raises:
+            StudyError: The name cannot be had.
+        """
+        path = self.root / name
+        if not re.fullmatch(NAME_PATTERN, name):
+            raise StudyError(
+                f"A study cannot be named {shown(name)}: expected letters, digits, '.', '-' and '_'."
+            )
+        if path.exists():
+            raise StudyError(
+                f"There is a folder {name!r} already. Give the study another name, or go on with that one."
+            )
+        return path
+
+    def results(self, name: str) -> ResultsFolder:
+        """The results of a study, as they are now."""
+        path = self.path(name)
+        with self._lock:
+            known = self._open.get(name)
+            if known is None or known.description != ResultsFolder.open(path).description:
+                known = self._open[name] = ResultsFolder.open(path)
+            return known
+
+    def state(self, name: str) -> StudyState:
+        """How far a study is."""
+        try:
+            return _state(name, self.results(name))
+        except (RealityGapError, OSError, KeyError, TypeError, ValueError) as error:
+            return StudyState(name, title=name, problem=str(error) or repr(error))
+
+    def states(self) -> list[StudyState]:
+        """How far all of them are."""
+        return [self.state(name) for name in self.names()]
+
+    def lately(self, name: str) -> StudyState:
+        """How far a study was a moment ago: however many watch it, its folder is looked at once."""
+        with self._looking:
+            when, state = self._seen.get(name, (-LATELY_S, None))
+            if state is None or time.monotonic() - when >= LATELY_S:
+                state = self.state(name)
+                self._seen[name] = (time.monotonic(), state)
+            return state
+
+    def _is_within(self, path: Path) -> bool:
+        return path.resolve().parent == self.root
+
+
+def _changed(path: Path) -> float:
+    return max((path / "study.json").stat().st_mtime, path.stat().st_mtime)
+
+
+def _state(name: str, folder: ResultsFolder) -> StudyState:
+    described = folder.description
+    replicates = int(described["replicates"])
+    driven = [each["name"] for each in described["conditions"] if _is_driven(each)]
+    simulated = [each["name"] for each in described["conditions"] if not _is_driven(each)]
+    missing = sum(len(gap) for each in simulated for gap in folder.missing(each, replicates))
+    n_complete, trials = _of_ledger(folder.path / LEDGER_NAME, driven, replicates)
+    return StudyState(
+        name=name,
+        title=str(described.get("title") or name),
+        note=str(described.get("note") or ""),
+        n_runs=replicates * len(simulated),
+        n_done=replicates * len(simulated) - missing,
+        n_driven_runs=replicates * len(driven),
+        n_driven_done=n_complete,
+        trials=trials,
+        used_by=used_by(folder.path),
+    )
+
+
+def _is_driven(condition: dict[str, Any]) -> bool:
+    return bool(condition["settings"]["platform"] == "scribbler")
+
+
+def _of_ledger(path: Path, conditions: list[str], replicates: int) -> tuple[int, dict[str, int]]:
+    if not path.exists():
+        return 0, {}
+    with Ledger.open(path, writable=False) as ledger:
+        n_complete = sum(run < replicates for each in conditions for run in complete_runs(ledger, each))
+        return n_complete, dict(Counter(trial.state for trial in ledger.trials()))
+
+
+def used_by(folder: Path) -> str:
+    """The program that says in the folder's lock that it writes there, where it is still alive; else empty."""
+    try:
+        said = (folder / ".lock").read_text("utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""
+    match = _HOLDER.fullmatch(said)
+    if match is None or match[2] != socket.gethostname():
+        return said
+    return said if _is_alive(int(match[1])) else ""
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True

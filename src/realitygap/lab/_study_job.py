@@ -1,0 +1,98 @@
+"""A study that goes on in a process of its own, as the pages see it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ._job import MOST_POINTS, Job
+
+
+class StudyJob(Job):
+    """A study at work.
+
+    Attributes:
+        name: Of the study.
+        port: Of the robot that drives it; empty where none does.
+        progress: How far its simulated runs are; None before the first word.
+        card: Of the trial that is being driven; None while none is.
+        step: Its last step.
+        line: (x, y) [m] where an emulated robot has been in it; `pose` is where it is.
+        label: Of the robot: REAL or EMULATED; empty before one was met.
+        preflight: What its pre-flight found.
+        said: What the camera above the robot said last; empty where it said nothing.
+
+    Args:
+        name: Of the study.
+        order: What the process is told first.
+        root: Where it works.
+        changed: Called after each change, from another thread.
+    """
+
+    QUIET = frozenset({"pose", "step"})
+    STOPPED = "Stopped. What was published or scored is safe; it can go on where it stopped."
+    LOST = "Its process ended (status {status}). What was published or scored is safe."
+
+    def __init__(self, name: str, order: Mapping[str, Any], root: Path, changed: Callable[[], None]) -> None:
+        self.name = name
+        self.port = str(order.get("port") or "")
+        self.counts = str(order.get("counts") or "page")
+        self.progress: dict[str, Any] | None = None
+        self.card: dict[str, Any] | None = None
+        self.step: dict[str, Any] | None = None
+        self.pose: list[float] | None = None
+        self.line: list[list[float]] = []
+        self.label = ""
+        self.preflight: dict[str, Any] | None = None
+        self.said = ""
+        self.n_live = 0
+        super().__init__(order, root, changed)
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether a trial is under way."""
+        return self.card is not None and not self.is_over
+
+    def stop_robot(self) -> None:
+        """Stop the motors, and with them the trial."""
+        self._child.tell({"do": "stop"})
+
+    def _on_progress(self, message: dict[str, Any]) -> None:
+        self.progress = message
+
+    def _on_ask(self, message: dict[str, Any]) -> None:
+        super()._on_ask(message)
+        self.card = None
+
+    def _on_met(self, message: dict[str, Any]) -> None:
+        self.label = message["label"]
+
+    def _on_preflight(self, message: dict[str, Any]) -> None:
+        self.preflight = message
+
+    def _on_driving(self, message: dict[str, Any]) -> None:
+        self.card, self.step, self.line = message["card"], None, []
+
+    def _on_step(self, message: dict[str, Any]) -> None:
+        self.step = message
+        self.n_live += 1
+
+    def _on_pose(self, message: dict[str, Any]) -> None:
+        self.pose = message["pose"]
+        self.n_live += 1
+        if not self.line or self.line[-1] != message["pose"][:2]:
+            self.line = [*self.line[-MOST_POINTS:], message["pose"][:2]]
+
+    def _on_said(self, message: dict[str, Any]) -> None:
+        self.said = message["text"]
+
+    def _on_driven(self, message: dict[str, Any]) -> None:
+        self.card = None
+
+    def _on_done(self, message: dict[str, Any]) -> None:
+        self.outcome = message["waiting"] or "Complete."
+
+    def _on_ended(self, message: dict[str, Any]) -> None:
+        self.card = None
+        super()._on_ended(message)

@@ -1,0 +1,97 @@
+"""A study, carried out in a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import StudyError
+from realitygap.records import ResultsFolder
+from realitygap.study import Progress, Study, parse_study, run_study
+from realitygap.trials import Operator
+
+from ._channel import Channel, Message
+from ._described import study_of
+from ._page_operator import PageOperator, WatchedWitness
+
+_TOLD_S = 0.5
+"""Between two messages on how far a study is [s]."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Carry out a study, or what is missing of it.
+
+    Args:
+        channel: To the server.
+        order: `folder` of the results; `text` of the study file where it is new; `port` of the robot
+            and `camera` above it, where there are any.
+    """
+    folder = Path(order["folder"])
+    study = _study(order, folder)
+    port = order.get("port") or None
+    told = _Telling(channel)
+    result = run_study(study, folder, tell=told.show, threads=order.get("threads"))
+    if port is not None:
+        with _operated(channel, order, study, folder) as operator:
+            result = run_study(study, folder, port=port, operator=operator)
+    physical = result.physical
+    channel.say("done", waiting="" if physical is None else physical.waiting)
+
+
+def _study(order: Message, folder: Path) -> Study:
+    if order.get("text") is not None:
+        return parse_study(order["text"], str(folder.parent / f"{folder.name}.toml"))
+    return study_of(ResultsFolder.open(folder).description)
+
+
+@contextlib.contextmanager
+def _operated(channel: Channel, order: Message, study: Study, folder: Path) -> Iterator[Operator]:
+    """Who stands beside the robot, with a camera where one is named."""
+    operator = _operator(channel, order, folder)
+    camera = order.get("camera") or None
+    if camera is None:
+        yield operator
+        return
+    from ._camera import under_camera
+
+    if order.get("counts") == "witness":
+        raise StudyError(
+            "A camera goes with a robot on the floor: an emulator's witness sees where it drives."
+        )
+
+    def say(text: str) -> None:
+        channel.say("said", text=text)
+
+    asks = order.get("counts") != "camera"
+    with under_camera(camera, study, folder, operator, say, asks=asks) as looking:
+        yield looking
+
+
+def _operator(channel: Channel, order: Message, folder: Path) -> Operator:
+    from realitygap.emulator import connect_witness
+
+    address = order.get("witness") or None
+    remote = None if address is None else connect_witness(address)
+    if order.get("counts") == "witness":
+        return WatchedWitness(channel, folder, remote)
+    return PageOperator(channel, folder, when=order.get("when", "sheet"), witness=remote)
+
+
+class _Telling:
+    """Tells how far the study is, not too often."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._last = 0.0
+
+    def show(self, progress: Progress) -> None:
+        """Tell of it."""
+        now = time.monotonic()
+        if now - self._last < _TOLD_S and progress.n_done < progress.n_runs:
+            return
+        self._last = now
+        values: dict[str, Any] = vars(progress)
+        self._channel.say("progress", **values)

@@ -1,0 +1,103 @@
+"""Figures and replays of a study for those who watch it, drawn in a process of their own."""
+
+from __future__ import annotations
+
+import os
+import queue
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RealityGapError
+from realitygap.playback import pack_scene, pack_trials
+from realitygap.records import ResultsFolder
+from realitygap.report import (
+    NARROW,
+    WIDE,
+    Drawing,
+    choose_moving,
+    draw_archive,
+    draw_coverage,
+    draw_networks,
+    draw_paths,
+    draw_species,
+    write_report,
+)
+
+from ._channel import Channel, Message
+
+FIGURES: dict[str, Callable[..., Drawing]] = {
+    "coverage": draw_coverage,
+    "paths": draw_paths,
+    "networks": draw_networks,
+    "species": draw_species,
+    "archive": draw_archive,
+}
+WIDTHS = {"wide": WIDE, "narrow": NARROW}
+IDLE_S = 60.0
+"""After so long without a wish the process ends; the next wish begins another [s]."""
+_POLITE = 10
+"""How much it stands back behind what computes."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Draw what is wished for, until nobody wishes for anything.
+
+    Args:
+        channel: To the server.
+        order: `folder` of the study.
+    """
+    if hasattr(os, "nice"):
+        os.nice(_POLITE)
+    wishes: queue.Queue[Message] = queue.Queue()
+    channel.at_once("want", wishes.put)
+    folder = Path(order["folder"])
+    last = time.monotonic()
+    while time.monotonic() - last < IDLE_S:
+        try:
+            wish = wishes.get(timeout=0.2)
+        except queue.Empty:
+            continue
+        _grant(channel, folder, wish)
+        last = time.monotonic()
+
+
+def _grant(channel: Channel, folder: Path, wish: Message) -> None:
+    what = wish.get("what")
+    try:
+        if what == "figures":
+            _draw_all(channel, folder)
+        elif what == "replay":
+            channel.say("replay", key=wish["key"], **_replay(folder, wish))
+        elif what == "report":
+            write_report(ResultsFolder.open(folder), folder / "report.html")
+            channel.say("report")
+    except (RealityGapError, ValueError, TypeError, OSError) as error:
+        channel.say("refused", key=wish.get("key", ""), text=str(error))
+
+
+def _draw_all(channel: Channel, folder: Path) -> None:
+    """Every figure that can be drawn of what is there."""
+    began = time.process_time()
+    for name, draw in FIGURES.items():
+        try:
+            drawn = {key: draw(folder, width=width) for key, width in WIDTHS.items()}
+        except (RealityGapError, ValueError) as error:
+            channel.say("figure", name=name, text=str(error))
+            continue
+        caption, alt = drawn["wide"].caption, drawn["wide"].alt
+        channel.say(
+            "figure", name=name, caption=caption, alt=alt, **{key: each.svg for key, each in drawn.items()}
+        )
+    channel.say("drawn", seconds=time.process_time() - began)
+
+
+def _replay(folder: Path, wish: Message) -> dict[str, Any]:
+    """The scene and the trials that a player shows."""
+    each = wish.get("each") or None
+    numbers = {
+        key: wish[key] for key in ("condition", "replicate", "generation", "individual") if key in wish
+    }
+    title, trials = choose_moving([folder], each, **numbers)
+    return {"scene": pack_scene(trials[0].arena, title), "trials": pack_trials(trials)}

@@ -1,0 +1,54 @@
+"""The process in which a study goes on, or a robot is driven: `python -m realitygap.lab._work`."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+
+from realitygap.errors import RealityGapError
+
+from ._channel import Channel, Message
+
+_WORK = {
+    "study": "_study_work",
+    "robot": "_robot_work",
+    "watch": "_watch_work",
+    "gap": "_gap_work",
+    "calibrate": "_calibrate_work",
+    "photo": "_photo_work",
+    "track": "_track_work",
+    "live": "_live_work",
+}
+
+
+def main() -> int:
+    """Do what the first line asks for."""
+    wire = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what anything prints is no message
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell has it ignored
+    channel = Channel(sys.stdin, wire)
+    try:
+        order = channel.begin()
+        work: Callable[[Channel, Message], None] = import_module(f"{__package__}.{_WORK[order['work']]}").work
+        work(channel, order)
+    except KeyboardInterrupt:
+        channel.say("interrupted")
+        return 130
+    except (RealityGapError, OSError, ValueError) as error:
+        channel.say("error", text=str(error))
+        return 1
+    except Exception as error:
+        traceback.print_exc()
+        channel.say(
+            "error", text=f"This is a mistake in realitygap, and nothing that was written is lost: {error!r}."
+        )
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

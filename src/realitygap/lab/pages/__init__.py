@@ -1,0 +1,28 @@
+"""The pages of the lab, in NiceGUI."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+from nicegui import app
+
+from realitygap.lab._lab import Lab
+
+from ._calibrate import add_calibrate
+from ._gap import add_gap
+from ._home import add_home
+from ._new import add_new
+from ._photos import add_photos
+from ._robot import add_robot
+from ._trials import add_trials
+from ._watch import add_watch
+
+
+def add_pages(lab: Lab) -> None:
+    """Add all pages, to be served."""
+    app.add_static_files("/lab-files", str(resources.files(__package__) / "static"))
+    playback = resources.files("realitygap.playback")
+    app.add_static_file(local_file=str(playback / "player.js"), url_path="/lab-player/player.js")
+    app.add_static_file(local_file=str(playback / "player.css"), url_path="/lab-player/player.css")
+    for add in (add_home, add_new, add_trials, add_photos, add_robot, add_watch, add_gap, add_calibrate):
+        add(lab)

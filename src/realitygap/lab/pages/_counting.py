@@ -1,0 +1,278 @@
+"""Counting: which cells a line crosses, tapped; kept tap by tap, and entered into the ledger at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from realitygap.errors import LedgerError
+from realitygap.lab._counts import CountedTrial, Counts
+from realitygap.lab._drawn import Draft, read_drawn
+from realitygap.lab._lab import Lab
+from realitygap.lab._proposals import Proposal
+from realitygap.records import ScoreRole
+
+from ._frame import hint, section, text_of, told
+from ._grid import CellGrid, ink_of
+
+_ROLES: dict[ScoreRole, str] = {
+    "score": "The count that selection uses.",
+    "second": "A second count, for the agreement alone. You do not see the first one.",
+    "correction": "A correction, for reports alone: the generation is closed.",
+}
+
+_HOW = "Tap a cell, or draw along the line. What you tap is kept as you go."
+_FRAMED = " Look at the framed cells: it is less than 90 % sure of them."
+
+
+class Counting:
+    """The trials that wait for somebody to count them, and the grid for one of them.
+
+    Args:
+        lab: Whose page it is.
+        counts: The trials of the study.
+        who: The name of who counts.
+    """
+
+    def __init__(self, lab: Lab, counts: Counts, who: Callable[[], str]) -> None:
+        self._lab = lab
+        self._counts = counts
+        self._who = who
+        self._chosen: int | None = None
+        self._corrects = False
+        self._draft = Draft([])
+        self._shown: Any = None
+
+    def show(self) -> None:
+        """Show it."""
+        section("Counting")
+        self._lists = ui.refreshable(self._show_lists)
+        self._card = ui.refreshable(self._show_card)
+        self._lists()
+        self._shown = self._chosen_now()
+        self._n_seen = self._seen()
+        self._card()
+
+    def refresh(self) -> None:
+        """Show it anew; the grid only where another trial is to be counted, or in another way."""
+        self._lists.refresh()
+        now, seen = self._chosen_now(), self._seen()
+        if (now, seen) != (self._shown, self._n_seen):
+            self._shown, self._n_seen = now, seen
+            self._card.refresh()
+
+    def choose(self, number: int | None, *, corrects: bool = False) -> None:
+        """Count this trial."""
+        self._chosen, self._corrects = number, corrects
+        self.refresh()
+
+    # inside
+
+    def _chosen_now(self) -> tuple[int, ScoreRole, str] | None:
+        """Which trial is counted, as what, and by whom; the first that waits where none was chosen."""
+        who = self._who()
+        listed = self._counts.trials()
+        chosen = next((each for each in listed if each.number == self._chosen), None)
+        role = self._role(chosen, who)
+        if chosen is None or role is None:
+            chosen, role = next((each for each in listed if each.trial.state == "driven"), None), "score"
+        return None if chosen is None else (chosen.number, role, who)
+
+    def look(self) -> None:
+        """Show the trial anew where something has been proposed for it."""
+        if self._seen() != self._n_seen:
+            self.refresh()
+
+    def _seen(self) -> tuple[str, ...]:
+        """What is proposed for the trial that is being counted."""
+        if self._shown is None:
+            return ()
+        return tuple(each.mark for each in self._counts.proposals(self._shown[0]))
+
+    def _show_lists(self) -> None:
+        who = self._who()
+        listed = self._counts.trials()
+        shown = self._chosen_now()
+        number = None if shown is None else shown[0]
+        self._list("To be counted", [each for each in listed if each.role_of(who) == "score"], number)
+        if who:
+            second = [each for each in listed if each.role_of(who) == "second"]
+            self._list("To be counted a second time", second, number)
+        self._show_counted(listed)
+        self._corrections(listed)
+
+    def _show_card(self) -> None:
+        if self._shown is None:
+            ui.label("No line waits to be counted.")
+            return
+        number, role, who = self._shown
+        self._show_trial(self._counts.trial(number), role, who)
+
+    def _role(self, chosen: CountedTrial | None, who: str) -> ScoreRole | None:
+        if chosen is None:
+            return None
+        if self._corrects and chosen.trial.is_closed:
+            return "correction"
+        return chosen.role_of(who)
+
+    def _list(self, title: str, trials: list[CountedTrial], chosen: int | None) -> None:
+        if not trials:
+            return
+        ui.label(f"{title}: {len(trials)}")
+        with ui.row().classes("lab-row"):
+            for each in trials:
+                is_chosen = each.number == chosen
+                ui.button(
+                    f"{each.number}, {each.pen}", on_click=lambda number=each.number: self.choose(number)
+                ).props(f"{'unelevated' if is_chosen else 'outline'} no-caps dense padding='4px 10px'")
+
+    def _show_counted(self, listed: list[CountedTrial]) -> None:
+        """What was counted and may still be taken back."""
+        counted = [each for each in listed if each.trial.state == "scored" and not each.trial.is_closed]
+        if not counted:
+            return
+        with ui.expansion(f"Counted, and not closed: {len(counted)}").classes("lab-expansion"):
+            for each in counted:
+                with ui.row().classes("lab-row"):
+                    ui.label(f"Trial {each.number}, {each.pen}, by {each.first}")
+                    ui.button("Take back", on_click=lambda number=each.number: self._undo(number)).props(
+                        f'flat dense no-caps aria-label="Take back the count of trial {each.number}"'
+                    )
+
+    def _undo(self, number: int) -> None:
+        if told(lambda: self._counts.undo(number)):
+            ui.notify(f"The count of trial {number} is taken back; enter it anew.")
+        self._lab.changed()
+        self.choose(number)
+
+    def _corrections(self, listed: list[CountedTrial]) -> None:
+        closed = {each.number: f"Trial {each.number}, {each.pen}" for each in listed if each.trial.is_closed}
+        closed = {
+            number: text
+            for number, text in closed.items()
+            if self._counts.trial(number).trial.state == "scored"
+        }
+        if closed:
+            ui.select(
+                closed,
+                label="Correct a count of a closed generation",
+                on_change=lambda event: self.choose(event.value, corrects=True),
+            ).classes("lab-wide").props("outlined dense")
+
+    def _show_trial(self, each: CountedTrial, role: ScoreRole, who: str) -> None:
+        folder = self._lab.studies.path(self._counts.name)
+        self._draft = self._counts.draft(each.number, who, role)
+        arena = self._counts.arena(each.trial.condition)
+        proposals = self._counts.proposals(each.number)
+        chosen = next((one for one in proposals if one.mark == self._draft.proposal), None)
+        with ui.card().classes("lab-card").props(f'data-counting="{each.number}"'):
+            with ui.row().classes("lab-row"):
+                ui.element("span").classes("lab-pen").style(f"background: {ink_of(each.pen)}")
+                ui.label(f"Trial {each.number}: the {each.pen} line on sheet {each.trial.sheet}").classes(
+                    "lab-section"
+                )
+            hint(each.title)
+            hint(_ROLES[role])
+            for one in proposals:
+                self._show_proposal(each, role, one, is_chosen=one is chosen)
+            n_marked = ui.label(self._said(arena.grid.n_cells)).props('role="status"')
+
+            def put(draft: Draft) -> None:
+                self._draft = draft
+                self._counts.keep(each.number, who, role, draft)
+                n_marked.text = self._said(arena.grid.n_cells)
+
+            grid = CellGrid(
+                arena,
+                cells=self._draft.cells,
+                line=[] if chosen else read_drawn(folder, each.number),
+                pieces=chosen.lines if chosen else (),
+                sure=chosen.sure if chosen else (),
+                picture=self._picture(chosen),
+                ink=each.pen,
+                name=f"Cells crossed in trial {each.number}",
+                change=lambda cells: put(Draft(cells, self._draft.proposal)),
+            )
+            hint(_HOW + (_FRAMED if chosen and chosen.doubtful else ""))
+            with ui.row().classes("lab-row"):
+                ui.button("Enter this count", on_click=lambda: self._enter(each, role)).props(
+                    "unelevated no-caps"
+                )
+
+                def clear() -> None:
+                    put(Draft([]))
+                    grid.put([])
+                    if chosen:
+                        self._card.refresh()
+
+                ui.button("Clear", on_click=clear).props("flat no-caps")
+            self._more(each)
+
+    def _show_proposal(
+        self, each: CountedTrial, role: ScoreRole, proposal: Proposal, *, is_chosen: bool
+    ) -> None:
+        """What something saw of the trial, and a way to begin with it."""
+        doubt = f", {len(proposal.doubtful)} to look at" if proposal.doubtful else ""
+        name = proposal.name[:1].upper() + proposal.name[1:]
+        with ui.row().classes("lab-row").props(f'data-proposal="{proposal.kind}"'):
+            ui.label(f"{name}: {len(proposal.cells)} cells{doubt}.")
+            if is_chosen:
+                ui.label("Shown").classes("lab-state")
+            else:
+                ui.button(
+                    f"Begin with its cells ({proposal.kind})",
+                    on_click=lambda: self._take(each, role, proposal),
+                ).props("outline no-caps dense")
+        if proposal.said:
+            ui.label(proposal.said).classes("lab-problem")
+
+    def _take(self, each: CountedTrial, role: ScoreRole, proposal: Proposal) -> None:
+        self._counts.keep(each.number, self._who(), role, Draft(proposal.cells, proposal.mark))
+        self._card.refresh()
+
+    def _picture(self, proposal: Proposal | None) -> tuple[str, list[float]] | None:
+        """The sheet below the cells, where they are of a photograph."""
+        photo = None if proposal is None else self._lab.photos(self._counts.name).photo(proposal.mark)
+        if photo is None or photo.state != "read":
+            return None
+        return f"/photos/{self._counts.name}/{photo.mark}.jpg", photo.box
+
+    def _said(self, n_cells: int) -> str:
+        return f"{len(self._draft.cells)} of {n_cells} cells"
+
+    def _enter(self, each: CountedTrial, role: ScoreRole) -> None:
+        def enter() -> None:
+            if self._counts.trial(each.number).trial.state != each.trial.state:
+                raise LedgerError(f"Somebody else has just changed trial {each.number}. Look again.")
+            self._counts.score(each.number, self._draft, self._who(), role)
+
+        if told(enter):
+            ui.notify(
+                f"Trial {each.number}: {len(self._draft.cells)} cells are in the ledger.", type="positive"
+            )
+            self._chosen, self._corrects = None, False
+        self._lab.changed()
+        self.refresh()
+
+    def _more(self, each: CountedTrial) -> None:
+        """A note, and the ways to say that it does not count."""
+        with ui.expansion("Note, or void").classes("lab-expansion"):
+            text = ui.input("What is to be said of this trial").props("outlined dense").classes("lab-wide")
+
+            def note() -> None:
+                if told(lambda: self._counts.note(each.number, text_of(text), self._who())):
+                    ui.notify("Noted.")
+                    self._lab.changed()
+
+            def void() -> None:
+                if told(lambda: self._counts.void(each.number, text_of(text))):
+                    ui.notify(f"Trial {each.number} is void; it will be driven again.")
+                    self._lab.changed()
+
+            with ui.row().classes("lab-row"):
+                ui.button("Keep as a note", on_click=note).props("outline no-caps")
+                ui.button("Void, with this reason", on_click=void).props("outline no-caps").set_enabled(
+                    not each.trial.is_closed
+                )

@@ -1,0 +1,62 @@
+"""A trial that is being driven, as it goes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+
+from realitygap.lab._counts import Counts
+from realitygap.lab._lab import Lab
+from realitygap.lab._study_job import StudyJob
+
+from ._frame import hint
+from ._grid import CellGrid
+
+LIVE_S = 0.05
+"""Between two looks: 20 a second. The robot is driven by a process of its own, whoever looks."""
+
+
+class Driving:
+    """Shows a trial while it is driven; the abort is for everyone."""
+
+    def __init__(self, lab: Lab, job: StudyJob, counts: Counts) -> None:
+        self._lab, self._job, self._counts = lab, job, counts
+        self._n_shown = -1
+        self._n_points = 0
+
+    def show(self) -> None:
+        """Show it."""
+        card: dict[str, Any] = self._job.card or {}
+        arena = self._counts.arena(self._counts.trial(card["trial"]).trial.condition)
+        with ui.card().classes("lab-card lab-question"):
+            ui.label(f"Trial {card['trial']} is being driven").classes("lab-section").props('role="status"')
+            hint(f"{card['title']}. Pen: {card['pen']}.")
+            self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
+            self._said = ui.label("")
+            self._grid = CellGrid(arena, ink=card["pen"], name="Where the robot is").classes("lab-sketch")
+            ui.button("Abort this trial", on_click=self._job.stop_robot, color="negative").props(
+                "unelevated no-caps"
+            )
+        ui.timer(LIVE_S, self._look)
+
+    def _look(self) -> None:
+        job = self._job
+        if job.n_live == self._n_shown or job.card is None:
+            return
+        self._n_shown = job.n_live
+        step = job.step
+        if step is not None:
+            self._bar.value = (step["step"] + 1) / step["n_steps"]
+            seen = ", ".join(f"{value:.0f}" for value in step["raw"])
+            stalled = ", blocked" if step["stalled"] else ""
+            self._said.text = (
+                f"Step {step['step'] + 1} of {step['n_steps']}: sees {seen}{stalled}; "
+                f"move {step['move']:+.2f}, turn {step['turn']:+.2f}"
+            )
+        line = job.line
+        anew = len(line) < self._n_points or self._n_points == 0
+        points = line if anew else line[self._n_points :]
+        self._n_points = len(line)
+        if job.pose is not None:
+            self._grid.follow(job.pose, points, anew=anew)

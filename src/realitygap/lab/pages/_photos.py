@@ -1,0 +1,190 @@
+"""Photographs of sheets: sent, read, looked at, and entered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import app, run, ui
+from nicegui.element import Element
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, PlainTextResponse, Response
+
+from realitygap.errors import RealityGapError
+from realitygap.lab._access import LARGEST_BODY
+from realitygap.lab._counts import CountedTrial, Counts
+from realitygap.lab._drawn import Draft
+from realitygap.lab._lab import Lab
+from realitygap.lab._photos import SheetPhoto
+
+from ._frame import hint, told
+
+
+class PhotoInput(Element, component="photo_input.js"):
+    """Takes a photograph; `address` is where it is sent."""
+
+    def __init__(self, address: str, name: str) -> None:
+        super().__init__()
+        self._props |= {"address": address, "name": name}
+
+
+def add_photos(lab: Lab) -> None:
+    """Add what takes photographs, and what shows them."""
+
+    @app.post("/photos/{name}")
+    async def take(name: str, request: Request) -> Response:
+        try:
+            sheet = int(request.query_params.get("sheet", ""))
+            photos = lab.photos(name)
+            data = await _body(request)
+            await run.io_bound(photos.add, data, request.query_params.get("name", ""), sheet)
+        except ValueError:
+            return PlainTextResponse("Which sheet does the photo show? Expected its number.", 400)
+        except RealityGapError as error:
+            return PlainTextResponse(str(error), 400)
+        return PlainTextResponse("")
+
+    @app.get("/photos/{name}/{mark}.jpg")
+    def picture(name: str, mark: str) -> Response:
+        try:
+            path = lab.photos(name).picture(mark)
+        except RealityGapError as error:
+            return PlainTextResponse(str(error), 404)
+        if path is None or not path.is_file():
+            return PlainTextResponse("There is no such picture.", 404)
+        return FileResponse(path, media_type="image/jpeg", headers={"cache-control": "no-cache"})
+
+
+async def _body(request: Request) -> bytes:
+    """What is sent, as far as it may be: what is longer is refused by what takes it."""
+    parts, size = [], 0
+    try:
+        async for part in request.stream():
+            parts.append(part)
+            size += len(part)
+            if size > LARGEST_BODY:
+                break
+    except ClientDisconnect:
+        return b""
+    return b"".join(parts)
+
+
+class SheetPhotos:
+    """Photographs of the sheets that wait to be counted.
+
+    Args:
+        lab: Whose page it is.
+        counts: The trials of the study.
+        who: The name of who counts.
+        jump: Shows a trial to be counted.
+    """
+
+    def __init__(self, lab: Lab, counts: Counts, who: Callable[[], str], jump: Callable[[int], Any]) -> None:
+        self._lab, self._counts, self._who, self._jump = lab, counts, who, jump
+        self._photos = lab.photos(counts.name)
+        self._sheet: int | None = None
+
+    def stand(self) -> Any:
+        """Changes when something else is to be shown."""
+        sheets = tuple(self.sheets())
+        states = tuple((each.mark, each.state, each.said) for each in self._photos.photos())
+        return sheets, states, tuple(each.trial.state for each in self._counts.trials())
+
+    def sheets(self) -> list[int]:
+        """Those with lines that may be counted, once or twice."""
+        found = {
+            each.trial.sheet
+            for each in self._counts.trials()
+            if each.trial.state == "driven" or (each.trial.state == "scored" and not each.trial.is_closed)
+        }
+        return sorted(found)
+
+    def show(self) -> None:
+        """Show it; where no sheet has a line, nothing."""
+        sheets = self.sheets()
+        if not sheets:
+            return
+        if self._sheet not in sheets:
+            self._sheet = next((each for each in sheets if self._waiting(each)), sheets[-1])
+        if len(sheets) > 1:
+            ui.select(sheets, value=self._sheet, label="Sheet", on_change=self._chosen).props(
+                "outlined dense"
+            ).classes("lab-number")
+        hint(
+            f"A photo of the whole of sheet {self._sheet} proposes its cells. Look at them, correct them by tapping, "
+            "enter them. The sheet is one of realitygap print-sheet."
+        )
+        PhotoInput(f"/photos/{self._counts.name}?sheet={self._sheet}", f"sheet {self._sheet}")
+        last = self._photos.of_sheet(self._sheet)
+        for photo in self._photos.photos():
+            if photo.sheet == self._sheet and (photo.state != "read" or photo is last):
+                self._show_photo(photo)
+
+    # inside
+
+    def _waiting(self, sheet: int) -> list[CountedTrial]:
+        return [
+            each
+            for each in self._counts.trials()
+            if each.trial.sheet == sheet and each.trial.state == "driven"
+        ]
+
+    def _chosen(self, event: Any) -> None:
+        self._sheet = event.value
+        self._lab.changed()
+
+    def _show_photo(self, photo: SheetPhoto) -> None:
+        with ui.card().classes("lab-card").props(f'data-photo="{photo.state}"'):
+            with ui.row().classes("lab-row"):
+                ui.label(photo.name).props('role="heading" aria-level="3"')
+                ui.label(photo.state).classes("lab-state")
+            if photo.state in ("waiting", "reading"):
+                ui.linear_progress(show_value=False).props(f'indeterminate aria-label="{photo.said}"')
+                ui.label(f"{photo.said} ... You may leave this page; it goes on.").props('role="status"')
+            elif photo.state == "refused":
+                ui.label(photo.said).classes("lab-problem").props('role="alert"')
+                ui.button("Leave it out", on_click=lambda: self._photos.forget(photo.mark)).props(
+                    "outline no-caps"
+                )
+            else:
+                self._show_read(photo)
+
+    def _show_read(self, photo: SheetPhoto) -> None:
+        if photo.said:
+            ui.label(photo.said)
+        waiting = [each for each in self._waiting(photo.sheet) if self._seen(each, photo)]
+        if not waiting:
+            ui.label("All trials on it are counted.")
+            return
+        for each in waiting:
+            with ui.row().classes("lab-row"):
+                ui.button(
+                    f"Look at trial {each.number}, {each.pen}",
+                    on_click=lambda number=each.number: self._jump(number),
+                ).props("outline no-caps")
+                ui.label(self._told(each, photo))
+        ready = [each for each in waiting if self._draft(each, photo) is not None]
+        if len(ready) > 1:
+            ui.button(
+                f"I looked at all: enter {len(ready)} trials", on_click=lambda: self._enter(photo)
+            ).props("unelevated no-caps")
+
+    def _seen(self, each: CountedTrial, photo: SheetPhoto) -> bool:
+        return any(found.mark == photo.mark for found in self._counts.proposals(each.number))
+
+    def _told(self, each: CountedTrial, photo: SheetPhoto) -> str:
+        found = next(one for one in self._counts.proposals(each.number) if one.mark == photo.mark)
+        doubt = f", {len(found.doubtful)} to look at" if found.doubtful else ""
+        return f"{len(found.cells)} cells{doubt}. {found.said}"
+
+    def _draft(self, each: CountedTrial, photo: SheetPhoto) -> Draft | None:
+        """What is entered together with the others: what began from this photo, and was perhaps corrected."""
+        draft = self._counts.draft(each.number, self._who(), "score")
+        return draft if draft.cells and draft.proposal == photo.mark else None
+
+    def _enter(self, photo: SheetPhoto) -> None:
+        found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
+        drafts = {number: draft for number, draft in found.items() if draft is not None}
+        if told(lambda: self._counts.score_all(drafts, self._who())):
+            ui.notify(f"{len(drafts)} trials are in the ledger.", type="positive")
+        self._lab.changed()

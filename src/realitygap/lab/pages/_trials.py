@@ -1,0 +1,305 @@
+"""Trials: the page of the operator beside the robot, and of those who count what it drew."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+from starlette.requests import Request
+
+from realitygap.errors import RealityGapError, StudyError
+from realitygap.lab._counts import Counts
+from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._study_job import StudyJob
+from realitygap.report import measure_agreement
+from realitygap.robots.scribbler import find_ports
+
+from ._counting import Counting
+from ._driving import Driving
+from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, told, visitor_of, watching
+from ._photos import SheetPhotos
+from ._questions import show_question
+from ._videos import Videos
+
+EMULATED = "emulator://s2?fluke=2"
+_NUMBER = """
+<q-td :props="props">
+  <q-btn v-if="props.row.counts" outline dense no-caps padding="4px 12px" :label="String(props.value)"
+         :aria-label="`Count trial ${props.value}`" @click="$parent.$emit('choose', props.value)" />
+  <template v-else>{{ props.value }}</template>
+</q-td>
+"""
+"""The number of a trial in the table: who can count it taps it."""
+
+
+def add_trials(lab: Lab) -> None:
+    """Add the page."""
+
+    @ui.page("/trials/{name}", response_timeout=30)
+    def trials(name: str, request: Request) -> None:
+        try:
+            counts = lab.counts(name)
+        except RealityGapError as error:
+            with framed(lab, "Trials", ""):
+                ui.label(str(error)).classes("lab-problem")
+            return
+        with framed(lab, f"Trials of {name}", ""):
+            _Page(lab, name, counts, visitor_of(request)).show()
+
+
+class _Page:
+    def __init__(self, lab: Lab, name: str, counts: Counts, visitor: Visitor) -> None:
+        self._lab = lab
+        self._name = name
+        self._counts = counts
+        self._visitor = visitor
+        self._counting = Counting(lab, counts, lambda: self._visitor.who)
+        self._videos = Videos(lab, counts, self._look_at)
+        self._sheets = SheetPhotos(lab, counts, lambda: self._visitor.who, self._look_at)
+
+    def show(self) -> None:
+        ui.input(
+            "Your name",
+            value=self._visitor.who,
+            on_change=lambda event: self._named(text_of(event)),
+        ).props(f"outlined dense debounce=400 maxlength={LONGEST_NAME}").classes("lab-wide")
+        hint(
+            "It stands in the ledger with whatever you enter. Two people who count the same trials have two names."
+        )
+        self._robot = ui.refreshable(self._show_robot)
+        with ui.element("section").props('aria-label="Robot"').classes("lab-part"):
+            self._robot()
+        self._photos = ui.refreshable(self._sheets.show)
+        self._photo_part = ui.element("section").props('aria-label="Photos of sheets"').classes("lab-part")
+        with self._photo_part:
+            section("From a photo of the sheet")
+            self._photos()
+        self._photo_part.set_visibility(bool(self._sheets.sheets()))
+        self._filmed = ui.refreshable(self._videos.show)
+        with ui.element("section").props('aria-label="Video"'):
+            self._filmed()
+        with ui.element("section").props('aria-label="Counting"').classes("lab-part"):
+            self._counting.show()
+        self._table = ui.refreshable(self._show_table)
+        with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
+            self._table()
+            self._show_note()
+        self._seen: Any = self._stand()
+        self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
+        self._listed = self._counts.trials()
+        watching(self._lab, self._look)
+        ui.timer(1.0, self._look)  # another program may write to the ledger
+
+    def _stand(self) -> Any:
+        job = self._lab.jobs.get(self._name)
+        shown = (
+            None
+            if job is None
+            else (id(job), job.ask, job.card, job.outcome, job.label, job.preflight, job.said)
+        )
+        return shown, self._lab.operator, self._lab.has_robot
+
+    def _look(self) -> None:
+        """Show anew what has changed; what somebody is tapping stays as it is."""
+        now = self._stand()
+        if now != self._seen:
+            self._seen = now
+            self._robot.refresh()
+        if self._counts.trials() is not self._listed:
+            self._listed = self._counts.trials()
+            self._counting.refresh()
+            self._table.refresh()
+        self._counting.look()
+        if self._pictured != (now := self._sheets.stand()):
+            self._pictured = now
+            self._photos.refresh()
+            self._photo_part.set_visibility(bool(self._sheets.sheets()))
+        if self._tracked != (now := self._videos.stand()):
+            self._tracked = now
+            self._filmed.refresh()
+
+    def _look_at(self, number: int) -> None:
+        """Count this trial, below."""
+        self._counting.choose(number)
+        ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})")
+
+    def _named(self, who: str) -> None:
+        self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
+        remember_who(self._visitor.who)
+        if self._lab.operator is not None and self._lab.operator.key == self._visitor.key:
+            self._lab.operator = self._visitor
+        self._counting.refresh()
+        self._table.refresh()
+
+    # the robot
+
+    def _show_robot(self) -> None:
+        job = self._lab.jobs.get(self._name)
+        section("Robot")
+        if job is not None and job.outcome is not None:
+            ui.label(job.outcome).classes("lab-problem" if job.is_failed else "").props('role="status"')
+        if job is None or job.is_over or not job.port:
+            self._show_beginning()
+            return
+        ui.label(f"{job.label or 'Connecting to the robot'} at {job.port}")
+        if job.preflight is not None:
+            self._show_preflight(job)
+        if job.said:
+            ui.label(job.said).classes("lab-problem").props('role="status"')
+        may = self._lab.may_operate(self._visitor)
+        if not may:
+            with ui.row().classes("lab-row"):
+                ui.label(f"{self._lab.operator_name} has the robot; you are watching.")
+                ui.button("Take the robot over", on_click=self._take_over).props("outline no-caps")
+        if job.ask is not None:
+            show_question(job, self._counts, may=may, jump=self._counting.choose)
+        elif job.is_driving:
+            Driving(self._lab, job, self._counts).show()
+        else:
+            ui.label("Getting ready ...").props('role="status"')
+        ui.button("End the sitting", on_click=job.ask_to_end).props("flat no-caps").set_enabled(may)
+
+    def _show_preflight(self, job: StudyJob) -> None:
+        found = job.preflight or {}
+        n_problems = len(found["problems"])
+        with ui.expansion(f"Pre-flight: {n_problems or 'nothing'} against driving").classes("lab-expansion"):
+            for name, value in found["facts"].items():
+                ui.label(f"{name}: {value}")
+            for problem in found["problems"]:
+                ui.label(problem).classes("lab-problem")
+
+    def _show_beginning(self) -> None:
+        """What to say before a robot drives."""
+        try:
+            state = self._lab.studies.state(self._name)
+        except RealityGapError:
+            return
+        if state.is_complete:
+            ui.label("All runs on a robot are complete.")
+            return
+        found = find_ports()
+        ports = [guess.port for guess in found]
+        likely = [guess.port for guess in found if guess.seems != "a serial port"]
+        ui.label(
+            "Where is the robot? Stand it free: it turns on the spot for its pre-flight. An emulated one drives in "
+            "this program, and draws its line for you to count."
+        )
+        port = (
+            ui.input("Port", value=likely[0] if likely else EMULATED, autocomplete=[*ports, EMULATED])
+            .props("outlined dense")
+            .classes("lab-wide")
+        )
+        counts = (
+            ui.select(
+                {
+                    "page": "People, at this page",
+                    "camera": "The camera by itself (else people confirm what it sees)",
+                    "witness": "The emulator itself (emulated robots only)",
+                },
+                value="page",
+                label="Who counts cells",
+            )
+            .classes("lab-wide")
+            .props("outlined dense")
+        )
+        when = (
+            ui.select(
+                {"sheet": "When a sheet is full", "trial": "After each trial"},
+                value="sheet",
+                label="When to count",
+            )
+            .classes("lab-wide")
+            .props("outlined dense")
+        )
+        witness = (
+            ui.input("Witness of an emulator in another program, HOST:PORT (else leave it empty)")
+            .props("outlined dense")
+            .classes("lab-wide")
+        )
+
+        camera = (
+            ui.input("Camera above the robot: its number, such as 0?tag=10 (else leave it empty)")
+            .props("outlined dense")
+            .classes("lab-wide")
+        )
+
+        def begin() -> None:
+            if counts.value == "camera" and not text_of(camera):
+                raise StudyError("Which camera counts? Give its number, such as 0.")
+            self._lab.go_on(
+                self._name,
+                port=text_of(port),
+                counts=counts.value,
+                when=when.value,
+                witness=text_of(witness),
+                camera=text_of(camera),
+            )
+            self._lab.take_robot(self._visitor, over=True)
+
+        ui.button("Begin a sitting", on_click=lambda: told(begin)).props("unelevated no-caps")
+
+    def _take_over(self) -> None:
+        told(lambda: self._lab.take_robot(self._visitor, over=True))
+
+    # what there is
+
+    def _show_table(self) -> None:
+        section("All trials")
+        found = self._counts.trials()
+        if not found:
+            ui.label("No trial is planned yet.")
+            return
+        if any(each.second for each in found):
+            told(lambda: ui.label(measure_agreement(self._lab.studies.path(self._name)).sentence))
+        rows = [
+            {
+                "number": each.number,
+                "counts": each.role_of(self._visitor.who) is not None,
+                "code": each.trial.code,
+                "sheet": each.trial.sheet,
+                "pen": each.pen,
+                "state": each.trial.state,
+                "cells": self._n_cells(each),
+                "said": "; ".join(filter(None, (each.trial.reason or each.trial.problem or "", *each.notes))),
+            }
+            for each in found
+        ]
+        columns = [
+            {"name": name, "label": label, "field": name, "align": "left"}
+            for name, label in (
+                ("number", "Trial"),
+                ("code", "Code"),
+                ("sheet", "Sheet"),
+                ("pen", "Pen"),
+                ("state", "State"),
+                ("cells", "Cells"),
+                ("said", "Said of it"),
+            )
+        ]
+        table = ui.table(rows=rows, columns=columns, row_key="number", pagination=20)
+        table.classes("lab-table").props("flat bordered dense wrap-cells")
+        table.add_slot("body-cell-number", _NUMBER)
+        table.on("choose", lambda event: self._choose(event.args))
+
+    def _choose(self, number: Any) -> None:
+        if type(number) is int:
+            self._counting.choose(number)
+            ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'center'})")
+
+    def _show_note(self) -> None:
+        ui.input("A note on the whole").props("outlined dense").classes("lab-wide").on(
+            "keydown.enter", lambda event: self._note(event.sender)
+        )
+        hint("Enter keeps it.")
+
+    def _n_cells(self, each: Any) -> str:
+        """How many cells, hidden from who might still count them a second time."""
+        if each.trial.cells is None:
+            return ""
+        is_seen = each.trial.is_closed or each.second or each.first == self._visitor.who
+        return str(len(each.trial.cells)) if is_seen else "counted"
+
+    def _note(self, field: Any) -> None:
+        if told(lambda: self._counts.note(None, text_of(field), self._visitor.who)):
+            field.value = ""
+            ui.notify("Noted.")

@@ -1,0 +1,94 @@
+"""A video of a sitting, tracked: the cells of its trials, to be looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from realitygap.lab._counts import Counts
+from realitygap.lab._lab import Lab
+from realitygap.lab._video_job import VideoJob, videos_in
+
+from ._frame import hint, text_of, told
+
+
+class Videos:
+    """Trials looked for in a video of the camera above the robot.
+
+    Args:
+        lab: Whose page it is.
+        counts: The trials of the study.
+        jump: Shows a trial to be counted.
+    """
+
+    def __init__(self, lab: Lab, counts: Counts, jump: Callable[[int], Any]) -> None:
+        self._lab, self._counts, self._jump = lab, counts, jump
+        self._open = False
+
+    def stand(self) -> Any:
+        """Changes when something else is to be shown."""
+        job = self._job()
+        shown = None if job is None else (id(job), job.outcome)
+        return shown, bool(self._waiting())
+
+    def show(self) -> None:
+        """Show it; where no line waits to be counted, only how a video went."""
+        job = self._job()
+        if job is not None and not job.is_over:
+            self._show_tracking(job)
+            return
+        if job is not None:
+            self._show_outcome(job)
+        if self._waiting():
+            with ui.expansion("Cells from a video of the camera").classes("lab-expansion"):
+                self._show_form()
+
+    # inside
+
+    def _job(self) -> VideoJob | None:
+        return self._lab.videos.get(self._counts.name)
+
+    def _waiting(self) -> list[int]:
+        return [each.number for each in self._counts.trials() if each.trial.state == "driven"]
+
+    def _show_tracking(self, job: VideoJob) -> None:
+        bar = ui.linear_progress(job.share, show_value=False).props('aria-label="Of the video gone through"')
+        ui.label(f"Tracking {job.spec} ... You may leave this page; it goes on.").props('role="status"')
+        ui.timer(0.3, lambda: bar.set_value(round(job.share, 3)))
+        ui.button("Stop tracking", on_click=job.ask_to_end).props("outline no-caps")
+
+    def _show_outcome(self, job: VideoJob) -> None:
+        ui.label(job.outcome or "").classes("lab-problem" if job.is_failed else "").props('role="status"')
+        for text in job.missed:
+            hint(text)
+        waiting = set(self._waiting())
+        with ui.row().classes("lab-row"):
+            for number in job.found:
+                if number in waiting:
+                    ui.button(
+                        f"Look at trial {number}", on_click=lambda number=number: self._jump(number)
+                    ).props("outline no-caps")
+
+    def _show_form(self) -> None:
+        found, waiting = videos_in(self._lab.root), self._waiting()
+        hint(
+            "Film the arena with its corner tags and the robot with its tag, from before a trial until the robot "
+            "stands. One video may show several trials. Put it into the lab's folder."
+        )
+        video = ui.input("Video", value=found[-1] if found else "", autocomplete=found)
+        options = ui.input("What to look for", value="tag=10&tag-height=0.1")
+        which: dict[int, str] = {0: f"All {len(waiting)} that wait"} | {
+            each: f"Trial {each}" for each in waiting
+        }
+        trial = ui.select(which, value=0, label="Trials in it")
+        for each in (video, options, trial):
+            each.props("outlined dense").classes("lab-wide")
+        hint("As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.")
+
+        def track() -> None:
+            spec = f"{text_of(video)}?{text_of(options)}"
+            self._lab.track(self._counts.name, spec, [trial.value] if trial.value else self._waiting())
+
+        ui.button("Track it", on_click=lambda: told(track)).props("unelevated no-caps")

@@ -1,0 +1,277 @@
+"""Watch: a study as it goes, and its trials played."""
+
+from __future__ import annotations
+
+import secrets
+from typing import Any
+
+from nicegui import app, run, ui
+from starlette.responses import FileResponse, PlainTextResponse, Response
+
+from realitygap.errors import RealityGapError
+from realitygap.lab._lab import Lab
+from realitygap.lab._live_robot import EMULATED
+from realitygap.lab._studies import StudyState
+from realitygap.lab._study_job import StudyJob
+
+from ._driving import Driving
+from ._frame import framed, hint, section, text_of, told, watching, whole_of
+from ._player import LivePlayer, Player
+
+LOOK_S = 1.0
+"""How often the study's folder is looked at [s]."""
+
+_TITLES = {
+    "coverage": "Coverage by generation",
+    "paths": "Best paths",
+    "networks": "Networks",
+    "species": "Species",
+    "archive": "Archive of novelty",
+}
+_EACH = {
+    "": "One trial: the best of a generation, or an individual",
+    "individual": "Each individual of a generation",
+    "generation": "The best of each generation",
+    "condition": "The best of each condition",
+}
+
+
+def add_watch(lab: Lab) -> None:
+    """Add the page, and the files that it shows."""
+
+    @ui.page("/watch/{name}", response_timeout=30)
+    async def watch(name: str) -> None:
+        state = await run.io_bound(lab.studies.state, name)
+        with framed(lab, f"Study {name}", ""):
+            if state is None or state.problem:
+                ui.label(state.problem if state else "The lab is closing.").classes("lab-problem")
+                return
+            _Page(lab, state).show()
+
+    @app.get("/figures/{name}/{figure}-{width}.svg")
+    def figure(name: str, figure: str, width: str) -> Response:
+        watcher = lab.watchers.get(name)
+        drawn = {} if watcher is None else watcher.figures.get(figure, {})
+        if width not in ("wide", "narrow") or width not in drawn:
+            return PlainTextResponse("There is no such figure.", 404)
+        headers = {
+            "cache-control": "no-store",
+            "content-encoding": "gzip",
+        }  # once for all, and every browser reads it
+        return Response(drawn[width], media_type="image/svg+xml", headers=headers)
+
+    @app.get("/reports/{name}")
+    def report(name: str) -> Response:
+        try:
+            path = lab.studies.path(name) / "report.html"
+        except RealityGapError as error:
+            return PlainTextResponse(str(error), 404)
+        if not path.is_file() or path.is_symlink():
+            return PlainTextResponse("There is no report yet.", 404)
+        return FileResponse(path, media_type="text/html", headers={"cache-control": "no-store"})
+
+
+class _Page:
+    def __init__(self, lab: Lab, state: StudyState) -> None:
+        self._lab = lab
+        self._state = state
+        self._name = state.name
+        self._watcher = lab.watcher(state.name)
+        self._key = secrets.token_hex(8)
+        self._asked = False
+        self._report_stamp = self._watcher.report_stamp
+
+    def show(self) -> None:
+        hint(self._state.note)
+        self._bar = ui.linear_progress(0, show_value=False)
+        self._said = ui.label("").props('role="status"')
+        self._show_progress()
+        self._drive = ui.refreshable(self._show_driving)
+        self._drive()
+        self._figures = ui.refreshable(self._show_figures)
+        with ui.column().classes("lab-cards"):
+            self._figures()
+        self._show_replay()
+        with ui.row().classes("lab-row"):
+            ui.button("Write the report", on_click=self._watcher.write_report).props("outline no-caps")
+            self._report = ui.refreshable(self._show_report)
+            self._report()
+        self._n_drawn, self._card = self._watcher.n_drawn, self._job_card()
+        self._lived = self._live_stand()
+        self._look_at_figures()
+        watching(self._lab, self._look)
+        ui.timer(LOOK_S, self._look_at_disk)
+
+    # how far it is
+
+    def _job(self) -> StudyJob | None:
+        return self._lab.jobs.get(self._name)
+
+    def _job_card(self) -> Any:
+        job = self._job()
+        return None if job is None or not job.is_driving else job.card
+
+    def _look(self) -> None:
+        self._show_progress()
+        if self._card != self._job_card():
+            self._card = self._job_card()
+            self._drive.refresh()
+        if self._n_drawn != self._watcher.n_drawn:
+            self._n_drawn = self._watcher.n_drawn
+            self._figures.refresh()
+        if self._asked and self._key in self._watcher.replays:
+            self._asked = False
+            self._stage.refresh()
+        if self._lived != (now := self._live_stand()):
+            self._lived = now
+            self._live.refresh()
+        if self._report_stamp != (stamp := self._watcher.report_stamp):
+            self._report_stamp = stamp
+            self._report.refresh()
+
+    async def _look_at_disk(self) -> None:
+        state = await run.io_bound(self._lab.studies.lately, self._name)
+        if state is not None and state != self._state:
+            self._state = state
+            self._show_progress()
+        self._look_at_figures()
+
+    def _look_at_figures(self) -> None:
+        state = self._state
+        if state.n_done or state.n_driven_done:
+            self._watcher.look((state.n_done, state.n_driven_done))
+
+    def _show_progress(self) -> None:
+        """Texts alone are changed: it happens often, and at every page that watches."""
+        state, job = self._state, self._job()
+        n_done = state.n_done
+        progress = None if job is None or job.is_over else job.progress
+        if progress:
+            n_done = max(n_done, progress["n_done"])
+        share = (n_done + state.n_driven_done) / max(state.n_runs + state.n_driven_runs, 1)
+        self._bar.value = share
+        self._bar.props(f'aria-label="{100 * share:.0f} % done"')
+        said = []
+        if state.n_runs:
+            said.append(f"{n_done:,} of {state.n_runs:,} simulated runs")
+        if state.n_driven_runs:
+            said.append(f"{state.n_driven_done} of {state.n_driven_runs} runs on a robot")
+        if progress and progress["n_computed"] and progress["seconds"] > 0 and n_done < state.n_runs:
+            rate = progress["n_computed"] / progress["seconds"]
+            said.append(f"{rate:,.0f} runs/s, {(state.n_runs - n_done) / rate:,.0f} s left")
+        self._said.text = "; ".join(said) or "Nothing yet."
+
+    def _show_driving(self) -> None:
+        job = self._job()
+        if job is not None and job.is_driving:
+            Driving(self._lab, job, self._lab.counts(self._name)).show()
+
+    # figures
+
+    def _show_figures(self) -> None:
+        if not self._watcher.figures:
+            ui.label("Figures come as soon as there are runs.")
+        for name, figure in self._watcher.figures.items():
+            section(_TITLES.get(name, name))
+            if "text" in figure:
+                hint(figure["text"])
+                continue
+            with ui.element("picture").classes("lab-figure"):
+                address = f"/figures/{self._name}/{name}"
+                version = f"?v={self._watcher.n_drawn}"
+                ui.element("source").props(
+                    f'media="(max-width: 700px)" srcset="{address}-narrow.svg{version}"'
+                )
+                image = ui.element("img").props(f'src="{address}-wide.svg{version}"')
+                image._props["alt"] = figure["alt"]
+            hint(figure["caption"])
+
+    # replays
+
+    def _show_replay(self) -> None:
+        section("Play trials")
+        names = self._lab.studies.results(self._name).conditions
+        with ui.row().classes("lab-row"):
+            each = ui.select(_EACH, value="", label="What").classes("lab-wide").props("outlined dense")
+            condition = (
+                ui.select(names, value=names[0], label="Condition")
+                .classes("lab-wide")
+                .props("outlined dense")
+            )
+            numbers = {
+                key: ui.number(label, min=0, precision=0).props("outlined dense").classes("lab-number")
+                for key, label in (
+                    ("replicate", "Run"),
+                    ("generation", "Generation"),
+                    ("individual", "Individual"),
+                )
+            }
+
+        def ask() -> None:
+            wish: dict[str, Any] = {"each": each.value or None}
+            if each.value != "condition":
+                wish["condition"] = condition.value
+            wish |= {key: value for key, field in numbers.items() if (value := whole_of(field)) is not None}
+            self._asked = True
+            self._stage.refresh()
+            self._watcher.replay(self._key, **wish)
+
+        def drive() -> None:
+            wish: dict[str, Any] = {"condition": condition.value, "platform": text_of(platform)}
+            wish |= {key: value for key, field in numbers.items() if (value := whole_of(field)) is not None}
+            self._lab.drive_live(self._name, wish)
+
+        with ui.row().classes("lab-row"):
+            ui.button("Show", on_click=lambda: told(ask)).props("unelevated no-caps")
+            platform = (
+                ui.input("Live on (else where the study has it)", autocomplete=self._platforms())
+                .props("outlined dense")
+                .classes("lab-wide")
+            )
+            ui.button("Drive it live", on_click=lambda: told(drive)).props("outline no-caps")
+        hint(
+            "Where no run is named, it is the typical one. Trials of a robot are shown where somebody saw their lines."
+        )
+        self._live = ui.refreshable(self._show_live)
+        self._live()
+        self._stage = ui.refreshable(self._show_stage)
+        self._stage()
+
+    def _platforms(self) -> list[str]:
+        """On which a network may be seen live; files are those in the lab's folder."""
+        twins = [f"twin:{path.name}" for path in sorted(self._lab.root.glob("*.toml"))]
+        return ["sim", "jyro", EMULATED, *twins]
+
+    def _show_live(self) -> None:
+        job = self._lab.lives.get(self._name)
+        if job is None:
+            return
+        LivePlayer(self._lab, job).show()
+        if not job.is_over:
+            ui.button("End it", on_click=job.ask_to_end).props("flat no-caps")
+        elif job.scene is not None:
+            ui.label(job.outcome or "").classes("lab-problem" if job.is_failed else "lab-hint").props(
+                'role="status"'
+            )
+
+    def _live_stand(self) -> Any:
+        job = self._lab.lives.get(self._name)
+        return None if job is None else (id(job), job.scene is None, job.is_over)
+
+    def _show_stage(self) -> None:
+        if self._asked:
+            ui.label("Computing the trials again ...").props('role="status"')
+            return
+        found = self._watcher.replays.get(self._key)
+        if found is None:
+            return
+        if "text" in found:
+            ui.label(found["text"]).classes("lab-problem")
+        else:
+            Player(found["scene"], found["trials"])
+
+    def _show_report(self) -> None:
+        if self._watcher.report_said:
+            ui.label(self._watcher.report_said).classes("lab-problem")
+        if (self._lab.studies.path(self._name) / "report.html").is_file():
+            ui.link("The report", f"/reports/{self._name}", new_tab=True)

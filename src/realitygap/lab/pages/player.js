@@ -1,0 +1,30 @@
+// The player of notebooks, on a page: trials that were driven, or one that is being driven.
+export default {
+  props: { scene: Object, trials: Array, live: Boolean },
+  template: `<div class="lab-player" ref="place"></div>`,
+  async mounted() {
+    const { default: player } = await import(`${window.path_prefix || ""}/lab-player/player.js`);
+    const { scene, trials, live } = this;
+    const values = { scene, trials, speed: 1, live, was_live: live };
+    const heard = (this.heard = {});
+    const model = {
+      get: (name) => values[name],
+      set: (name, value) => { values[name] = value; },
+      save_changes: () => {}, off: () => {},
+      on: (what, handler) => { heard[what] = handler; },
+      send: (message) => this.$emit(message.kind),
+    };
+    this.values = values;
+    if (this.$refs.place) this.close = player.render({ model, el: this.$refs.place });
+  },
+  methods: {
+    // called by the server while a trial goes on, and once it has ended
+    told(messages) { if (this.heard) for (const message of messages) this.heard["msg:custom"](message); },
+    ended(trials) {
+      if (!this.heard) return;
+      Object.assign(this.values, { trials, live: false });
+      this.heard["change:live"]();
+    },
+  },
+  unmounted() { if (this.close) this.close(); },
+};

@@ -1,0 +1,59 @@
+"""What somebody is told who puts a robot where a calibration wants it, and how what they measure is read."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+from realitygap.calibration import distance_of, end_pose_of
+from realitygap.records import ObservedTrial
+from realitygap.trials import TrialPlan
+from realitygap.world import INCH, Arena, RobotModel
+
+_NUMBER = re.compile(r"^(-?)(?:(\d+(?:\.\d*)?|\.\d+)(?:[ -](\d+)/(\d+))?|(\d+)/(\d+))$")
+
+
+def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
+    """Where the robot has to stand for a trial of a calibration, and what it will do."""
+    if plan.purpose == "sensors":
+        inches = distance_of(plan, arena, robot) / INCH
+        return (
+            f"put it square to a wall, its sensors {inches:g} in from it and nothing else near. It reads "
+            f"{len(plan.commands)} times and does not move."
+        )
+    if plan.purpose == "path" and plan.commands[0, 0] != 0:
+        return (
+            f"put it with 24 in free ahead, and mark where it stands. It drives {len(plan.commands)} full steps "
+            "ahead."
+        )
+    if plan.purpose == "path":
+        n = len(plan.commands)
+        return f"put it free on all sides, and mark which way it faces. It turns for {n} full steps."
+    start = plan.start or arena.start
+    left = min(x for wall in arena.walls for x in wall[::2])
+    lower = min(y for wall in arena.walls for y in wall[1::2])
+    return (
+        f"put its middle {(start.x - left) / INCH:.1f} in from the left wall and {(start.y - lower) / INCH:.1f} "
+        f"in from the lower one, turned by {math.degrees(start.heading):.0f} degrees to the left from facing "
+        f"right. It drives {len(plan.commands) or plan.steps} steps."
+    )
+
+
+def parse_length(text: str) -> float | None:
+    """A number as it is read off a ruler, such as 13 3/4 or -.5; None where it is none."""
+    found = _NUMBER.match(text.strip())
+    if found is None:
+        return None
+    sign, whole, over, under, alone_over, alone_under = found.groups()
+    if "0" in (under or "1", alone_under or "1"):
+        return None
+    value = float(whole) if whole else int(alone_over) / int(alone_under)
+    value += int(over) / int(under) if over else 0.0
+    return -value if sign else value
+
+
+def with_ruled_end(trial: ObservedTrial, ahead_in: float, left_in: float, turned_deg: float) -> ObservedTrial:
+    """A path whose end somebody has measured from its start: inches ahead and to the left, degrees to the left."""
+    end = end_pose_of(trial, ahead_in * INCH, left_in * INCH, math.radians(turned_deg))
+    return replace(trial, end_pose=end)

@@ -1,0 +1,129 @@
+"""A lab in a process of its own, and pages of it in a real browser.
+
+Every test also fails on any message of the console and on any request but to the lab.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .served import LOG, begin
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
+
+CHROMIUM = next(
+    filter(
+        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
+    ),
+    None,
+)
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+DESKTOP, PHONE = (1280, 900), (390, 844)
+PATIENCE_MS = 120_000
+OUTAGE = ("net::ERR", "WebSocket connection", "reloading because")
+"""What a browser says of a page whose lab is gone."""
+
+
+class RunningLab:
+    """A lab of a folder; `address` is that of its first page."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.address = ""
+        self._port = 0
+        self._process: BaseProcess | None = None
+
+    def start(self) -> None:
+        self._process, self.address = begin(self.root, self._port)
+        self._port = int(self.address.rstrip("/").rpartition(":")[2])
+
+    def kill(self) -> None:
+        """End it as a power cut does."""
+        assert self._process is not None
+        self._process.kill()
+        self._process.join()
+
+    def stop(self) -> None:
+        """End it as Ctrl-C does."""
+        process = self._process
+        assert process is not None
+        assert process.pid is not None
+        if process.is_alive():
+            os.kill(process.pid, signal.SIGINT)
+            process.join(PATIENCE_MS / 1000)
+        if process.is_alive():
+            os.kill(process.pid, signal.SIGABRT)  # which says where it hangs
+            process.join()
+            raise AssertionError(f"the lab does not end: {self.said}")
+
+    @property
+    def said(self) -> str:
+        """What it said to its terminal."""
+        return (self.root.parent / LOG).read_text("utf-8")
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[RunningLab]:
+    running = RunningLab(tmp_path / "studies")
+    running.start()
+    yield running
+    running.stop()
+    assert "Traceback" not in running.said
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Any]:
+    assert CHROMIUM is not None, "needs Chromium or Chrome on the PATH"
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
+    """Opens a page of the lab, in a browser of its own: visit("new")."""
+    contexts, complaints = [], []
+
+    def open_page(
+        path: str = "", size: tuple[int, int] = DESKTOP, forgive: Sequence[str] = (), **options: Any
+    ) -> Any:
+        context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(PATIENCE_MS)
+
+        def complain(text: str) -> None:
+            if not any(each in text for each in forgive):
+                complaints.append(text)
+
+        page.on("console", lambda message: complain(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: complain(str(error)))
+        context.on("request", lambda request: check_request(request.url))
+        page.goto(lab.address + path)
+        return page
+
+    def check_request(url: str) -> None:
+        if not url.startswith((lab.address, lab.address.replace("http", "ws"), "data:", "blob:")):
+            complaints.append(f"request to {url}")
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []

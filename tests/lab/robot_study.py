@@ -1,0 +1,70 @@
+"""A small study on a robot, and what people do at its page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.study import parse_study
+
+FAST = "emulator://s2?fluke=2&speed=off"
+SLOW = "emulator://s2?fluke=2&speed=1"
+
+TEXT = """
+[study]
+name = "by-robot"
+replicates = 1
+
+[neat]
+population = 2
+generations = 2
+
+[trials]
+blind = {blind}
+pens = ["red", "blue"]
+
+[platform.scribbler]
+steps = {steps}
+wait_s = 0.5
+
+[[condition]]
+name = "coverage-robot"
+platform = "scribbler"
+"""
+
+
+def make_study(root: Path, *, steps: int = 12, blind: bool = True) -> Path:
+    """The folder of a study of which no trial is driven."""
+    study = parse_study(TEXT.format(steps=steps, blind=str(blind).lower()), "study.toml")
+    return ResultsFolder.create(root / "by-robot", study.description()).path
+
+
+def begin_sitting(page: Any, port: str = FAST, who: str = "anna") -> None:
+    page.get_by_label("Your name").fill(who)
+    page.get_by_label("Port", exact=True).fill(port)
+    page.get_by_role("button", name="Begin a sitting").click()
+
+
+def start_trial(page: Any, number: int) -> None:
+    page.locator(f'.lab-question [data-trial="{number}"]').wait_for()
+    page.get_by_role("button", name="Start the trial").click()
+
+
+def tap(page: Any, *cells: int) -> None:
+    """Tap cells of the grid that is being counted, one by one."""
+    for cell in cells:
+        page.locator(f'[data-counting] [data-cell="{cell}"]').click()
+
+
+def count(page: Any, number: int, *cells: int) -> None:
+    card = page.locator(f'[data-counting="{number}"]')
+    card.wait_for()
+    tap(page, *cells)
+    card.get_by_text(f"{len(cells)} of 72 cells").wait_for()
+    card.get_by_role("button", name="Enter this count").click()
+    card.wait_for(state="detached")
+
+
+def ledger_of(root: Path) -> Ledger:
+    return Ledger.open(root / "by-robot" / LEDGER_NAME, writable=False)

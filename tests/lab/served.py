@@ -1,0 +1,49 @@
+"""A lab in a process that is forked from one that has imported everything: there at once, killed as any other."""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import multiprocessing
+import os
+import sys
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import uvicorn  # noqa: F401  # imported once, for all that are forked
+from fastapi import FastAPI  # noqa: F401
+
+import realitygap.lab.pages  # noqa: F401
+from realitygap.lab import open_lab
+
+LOG = "lab.log"
+"""What a lab says to its terminal, beside its folder."""
+
+
+def serve(root: Path, port: int, told: Connection) -> None:
+    """Serve the lab of a folder; say its address."""
+    os.environ.pop("PYTEST_CURRENT_TEST", None)  # of which NiceGUI thinks that it is under test itself
+    sys.stdout = sys.stderr = (root.parent / LOG).open("a", buffering=1, encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), 2)
+    faulthandler.enable(sys.stderr)
+
+    def tell(line: str) -> None:
+        if line.startswith("Open "):
+            told.send(line.split()[1])
+
+    with contextlib.suppress(KeyboardInterrupt):  # as the command does
+        open_lab(root, port=port, show=False, tell=tell)
+
+
+def begin(root: Path, port: int) -> tuple[multiprocessing.process.BaseProcess, str]:
+    """Begin to serve; the process, and its address."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=serve, args=(root, port, there))
+    process.start()
+    there.close()
+    try:
+        return process, here.recv()
+    except EOFError:
+        raise AssertionError(f"the lab told no address: {(root.parent / LOG).read_text('utf-8')}") from None

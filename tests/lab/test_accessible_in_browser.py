@@ -1,0 +1,104 @@
+"""Every page of the lab, on a desktop and a phone: axe-core finds no serious or critical fault, nothing is cut off."""
+
+from __future__ import annotations
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from realitygap.study import parse_study, run_study
+
+from .conftest import DESKTOP, PHONE
+from .robot_study import begin_sitting, make_study
+from .sheets import drive_sheet, photo_of
+
+SIZES = {"desktop": DESKTOP, "phone": PHONE}
+GRAVE = ("serious", "critical")
+TEXT = """
+[study]
+name = "seen"
+replicates = 3
+
+[[condition]]
+name = "novelty-10"
+selection = "novelty"
+"""
+
+
+@pytest.fixture(params=SIZES)
+def look(request, visit):
+    """Opens a page in one of the sizes: look("robot")."""
+    return lambda path: visit(path, size=SIZES[request.param], bypass_csp=True)
+
+
+def faults(page) -> list[str]:
+    """What axe-core finds that keeps people out, and whether the page is wider than the screen."""
+    page.wait_for_timeout(300)  # until nothing fades in any more
+    found = [
+        f"{fault['impact']}: {fault['id']}: {[node['target'] for node in fault['nodes']][:3]}"
+        for fault in Axe().run(page).response["violations"]
+        if fault["impact"] in GRAVE
+    ]
+    over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
+    return [*found, f"{over} px wider than the screen"] if over > 0 else found
+
+
+def test_pages_without_a_study(lab, look):
+    for path, text in (
+        ("", "No study is here yet."),
+        ("new", "Start"),
+        ("calibrate", "What is seen of it"),
+        ("gap", "Measure"),
+        ("robot", "Connect"),
+        ("trials/nobody", "There is no study"),
+    ):
+        page = look(path)
+        page.get_by_text(text).first.wait_for()
+        assert faults(page) == [], path
+
+
+def test_a_study_that_is_watched_and_played(lab, look):
+    run_study(parse_study(TEXT, "study.toml"), lab.root / "seen")
+    page = look("watch/seen")
+    page.locator(".lab-figure img").nth(4).wait_for()
+    page.get_by_role("button", name="Show", exact=True).click()
+    page.locator(".rg-player").wait_for()
+    assert faults(page) == []
+    home = look("")
+    home.locator('[data-study="seen"]').wait_for()
+    assert faults(home) == []
+
+
+def test_trials_that_are_counted_from_a_photo(lab, look):
+    lines = drive_sheet(lab.root)
+    page = look("trials/by-robot")
+    page.get_by_label("Your name").fill("anna")
+    photo = {"name": "sheet.jpg", "mimeType": "image/jpeg", "buffer": photo_of(lines)}
+    page.get_by_label("Choose a photo").set_input_files(photo)
+    page.get_by_text("it goes on.").wait_for()
+    assert faults(page) == []
+    page.locator("[data-counting] image").wait_for()
+    page.get_by_text("Cells from a video of the camera").click()
+    page.get_by_label("What to look for").wait_for()
+    assert faults(page) == []
+
+
+def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
+    make_study(lab.root)
+    page = look("trials/by-robot")
+    begin_sitting(page)
+    page.get_by_role("button", name="Start the trial").wait_for()
+    assert faults(page) == []
+    page.get_by_role("button", name="End the sitting").click()
+    page.get_by_role("button", name="Begin a sitting").wait_for()
+    robot = look("robot")
+    robot.get_by_role("button", name="Connect").click()
+    robot.get_by_text("Battery: ").wait_for()
+    assert faults(robot) == []
+
+
+def test_a_calibration_whose_plot_grows(lab, look):
+    page = look("calibrate")
+    page.get_by_label("Trials in all").fill("4")
+    page.get_by_role("button", name="Calibrate", exact=True).click()
+    page.locator(".lab-plot").wait_for()
+    assert faults(page) == []

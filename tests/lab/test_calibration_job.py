@@ -1,0 +1,48 @@
+"""A calibration that somebody at a page is led through, on an emulator that nobody says is one with a witness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from realitygap.emulator import Emulator, serve_tcp
+from realitygap.lab._calibration_job import CalibrationJob
+from realitygap.records import read_observations
+
+from .test_hand import wait_for
+
+
+def asked(job: CalibrationJob, question: str) -> dict[str, Any]:
+    wait_for(lambda: job.is_over or (job.ask is not None and job.ask["question"] == question))
+    assert job.ask is not None, job.outcome
+    return job.ask
+
+
+def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path):
+    with serve_tcp(Emulator("s2"), speed=20) as server:
+        order = {
+            "kind": "path",
+            "platform": f"scribbler:{server.name}",
+            "out": str(tmp_path / "mine.toml"),
+            "observe": "cells",
+            "base": "scribbler-s2-fluke2",
+            "budget": 4,
+        }
+        job = CalibrationJob(order, tmp_path, lambda: None)
+        assert "24 in free ahead" in asked(job, "place")["text"]
+        assert job.has_robot
+        job.answer(answer="go")
+        assert set(asked(job, "measure")["questions"]) == {"ahead", "left", "turned"}
+        job.answer(ahead="a lot", left="0", turned="0")
+        wait_for(lambda: job.ask is not None and bool(job.ask.get("said")))
+        assert "13 3/4" in asked(job, "measure")["said"]
+        job.answer(ahead="13 3/4", left="-1/8", turned="2")
+        asked(job, "place")
+        job.answer(answer="stop")
+        wait_for(lambda: job.is_over)
+        assert not job.is_failed
+        (kept,) = read_observations(tmp_path / "mine.trials.jsonl").trials
+        assert kept.end_pose is not None
+        assert kept.end_pose[0] - kept.start[0] == pytest.approx(13.75 * 0.0254)

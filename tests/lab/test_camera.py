@@ -1,0 +1,71 @@
+"""What a camera above the robot sees of a sitting's trials waits for somebody to look at it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from realitygap.errors import StudyError
+from realitygap.lab._camera import ProposingCamera, under_camera
+from realitygap.lab._counts import Counts
+from realitygap.lab._drawn import Draft
+from realitygap.lab._files import refuse_camera
+from realitygap.lab._proposals import read_proposals
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.study import run_study
+from realitygap.trials import WitnessOperator
+from realitygap.world import paper_arena
+from tests.study.physical import small_study
+from tests.vision.test_track_live import _AboveStudy, _Beside
+
+PORT = "emulator://s2?fluke=1&speed=off"
+
+
+def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebody_has_looked(tmp_path):
+    study, folder = small_study("coverage", steps="6"), tmp_path / "seen"
+    witness, said = WitnessOperator(), []
+    camera = ProposingCamera(
+        _Beside(witness), _AboveStudy(witness), paper_arena().grid, said.append, folder, "camera 2"
+    )
+    assert run_study(study, folder, port=PORT, operator=camera).physical.waiting
+    run_study(study, tmp_path / "true", port=PORT)
+    with Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as ledger:
+        true = {row["trial"]: row for row in ledger.scores()}
+    counts = Counts(folder, ResultsFolder.open(folder).description)
+    for number in (1, 2, 3):
+        (seen,) = read_proposals(folder, number)
+        assert len(set(seen.cells) ^ set(true[number]["cells"])) <= 1
+        draft = counts.draft(number, "anna", "score")
+        assert draft == Draft(seen.cells, seen.mark)
+        corrected = Draft(sorted({*draft.cells, 71}), draft.proposal)
+        counts.score(number, corrected, "anna", "score")
+    with Ledger.open(folder / LEDGER_NAME, writable=False) as ledger:
+        rows, notes = list(ledger.scores()), list(ledger.notes())
+    for row in rows:
+        assert row["who"] == "anna"
+        assert 71 in row["cells"]
+        off = np.array(row["path"])[:, :2] - np.array(true[row["trial"]]["path"])[:, :2]
+        assert np.hypot(*off.T).max() < 0.01
+    assert [note["text"] for note in notes] == 3 * [
+        "Cells and path by camera 2, looked at by who entered them."
+    ]
+
+
+def test_a_camera_that_is_a_file_or_is_not_there_is_refused_in_words(tmp_path):
+    study, beside = small_study(), _Beside(WitnessOperator())
+
+    def look(spec):
+        with under_camera(spec, study, tmp_path, beside, print, asks=True):
+            pass
+
+    with pytest.raises(StudyError, match="expected its number such as 0"):
+        look("film.mp4")
+    with pytest.raises(StudyError, match="unknown option 'tagg'"):
+        look("0?tagg=3")
+
+
+def test_no_lens_outside_the_labs_folder_is_read(tmp_path):
+    refuse_camera(tmp_path, "0?lens=phone.toml")
+    for spec in ("0?lens=/etc/passwd", "../film.mp4", "film.mp4?lens=../../lens.toml"):
+        with pytest.raises(StudyError, match="would be a file outside"):
+            refuse_camera(tmp_path, spec)

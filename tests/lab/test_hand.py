@@ -1,0 +1,87 @@
+"""A robot driven by hand, in its process: who says nothing has it stop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from realitygap.lab._hand import Hand
+
+PORT = "emulator://s2?fluke=2&speed=1"
+
+
+def wait_for(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < end, "it did not come about"
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def hand(tmp_path: Path) -> Iterator[Hand]:
+    hand = Hand({"port": PORT}, tmp_path, lambda: None)
+    wait_for(lambda: hand.senses is not None or hand.is_over)
+    assert hand.outcome is None
+    yield hand
+    hand.end()
+
+
+def x(hand: Hand) -> float:
+    assert hand.senses is not None
+    return float(hand.senses["pose"][0])
+
+
+def test_a_word_moves_the_robot_and_silence_stops_it(hand):
+    began = x(hand)
+    hand.drive(1.0, 0.0)
+    wait_for(lambda: hand.senses["moves"])
+    wait_for(lambda: not hand.senses["moves"])  # nothing more was said
+    stood = x(hand)
+    assert stood > began + 0.005
+    time.sleep(0.5)
+    assert x(hand) == pytest.approx(stood, abs=1e-3)
+
+
+def test_stop_is_heard_while_it_drives(hand):
+    hand.drive(1.0, 0.0)
+    wait_for(lambda: hand.senses["moves"])
+    hand.stop()
+    wait_for(lambda: not hand.senses["moves"])
+
+
+def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
+    hand.drive(1.0, 0.0)
+    wait_for(lambda: hand.senses["moves"])
+    hand.stop()
+    for _ in range(20):  # ten times a second, as the page says it
+        hand.drive(1.0, 0.0)
+        time.sleep(0.1)
+    assert not hand.senses["moves"]
+    hand.release()
+    hand.drive(1.0, 0.0)
+    wait_for(lambda: hand.senses["moves"])
+
+
+def test_what_is_no_number_drives_nowhere(hand):
+    hand.drive("fast", float("nan"))  # type: ignore[arg-type]
+    hand.drive([], {})  # type: ignore[arg-type]
+    began = x(hand)
+    time.sleep(0.5)
+    assert x(hand) == pytest.approx(began, abs=1e-6)
+    assert hand.outcome is None
+
+
+def test_a_robot_that_is_not_there_is_told_in_words(tmp_path):
+    hand = Hand({"port": "/dev/no-such-port"}, tmp_path, lambda: None)
+    wait_for(lambda: hand.is_over)
+    assert hand.is_failed
+    assert "/dev/no-such-port" in str(hand.outcome)
+
+
+def test_its_process_ends_with_the_lab(hand):
+    hand._child._process.stdin.close()  # as when the lab is killed
+    wait_for(lambda: hand.is_over)
+    assert hand._child._process.wait() == 130

@@ -1,0 +1,82 @@
+"""A robot driven by hand, at its page."""
+
+from __future__ import annotations
+
+import re
+
+from .conftest import PHONE
+
+PORT = "emulator://s2?fluke=2"
+
+
+def connect(page) -> None:
+    page.get_by_label("Port", exact=True).fill(PORT)
+    page.get_by_role("button", name="Connect").click()
+    page.get_by_text(f"EMULATED at {PORT}").wait_for()
+
+
+def hold(page) -> None:
+    """Pull the handle to its upper end, and hold it."""
+    box = page.locator(".lab-pad").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.15, steps=3)
+    page.get_by_text("Driving", exact=True).wait_for()
+
+
+def test_it_drives_while_the_handle_is_held_and_stands_when_it_is_let_go(visit):
+    page = visit("robot", size=PHONE)
+    connect(page)
+    page.get_by_text("Standing", exact=True).wait_for()
+    hold(page)
+    page.mouse.up()
+    page.get_by_text("Standing", exact=True).wait_for()
+
+
+def test_it_stands_when_the_page_goes_away(visit):
+    page = visit("robot")
+    connect(page)
+    hold(page)
+    watcher = visit("robot")
+    watcher.get_by_text(re.compile("has the robot; you are watching")).wait_for()
+    page.context.close()
+    watcher.get_by_text("Standing", exact=True).wait_for()
+
+
+def test_arrow_keys_drive_and_escape_stops(visit):
+    page = visit("robot")
+    connect(page)
+    page.locator(".lab-pad").focus()
+    page.keyboard.down("ArrowUp")
+    page.get_by_text("Driving", exact=True).wait_for()
+    page.keyboard.press("Escape")
+    page.get_by_text("The robot was told to stop.").wait_for()
+    page.keyboard.up("ArrowUp")
+    page.get_by_text("Standing", exact=True).wait_for()
+
+
+def test_who_watches_can_stop_it_and_cannot_drive_it(visit):
+    page = visit("robot")
+    connect(page)
+    watcher = visit("robot")
+    watcher.locator('.lab-pad[aria-disabled="true"]').wait_for()
+    watcher.get_by_role("button", name="Stop the robot").click()
+    watcher.get_by_text("The robot was told to stop.").wait_for()
+
+
+def test_its_preflight_and_its_picture_are_shown(visit):
+    page = visit("robot")
+    connect(page)
+    page.get_by_role("button", name="Pre-flight").click()
+    page.get_by_text("Nothing speaks against driving.").wait_for()
+    page.get_by_role("button", name="Take a picture").click()
+    page.get_by_alt_text("What the robot sees").wait_for()
+    page.get_by_text(re.compile(r"Battery: \d\.\d\d V")).wait_for()
+
+
+def test_a_port_without_a_robot_is_told_in_words(visit):
+    page = visit("robot")
+    page.get_by_label("Port", exact=True).fill("/dev/nothing")
+    page.get_by_role("button", name="Connect").click()
+    page.get_by_text("/dev/nothing").first.wait_for()
+    page.get_by_role("button", name="Connect").wait_for()

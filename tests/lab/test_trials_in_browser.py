@@ -1,0 +1,239 @@
+"""A physical study on an emulated robot, through the page: driven, counted, taken up again."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable
+
+from .conftest import OUTAGE, PHONE
+from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
+
+PAGE = "trials/by-robot"
+
+
+def wait_for(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < end, "it did not come about"
+        time.sleep(0.1)
+
+
+def states(lab) -> list[str]:
+    with ledger_of(lab.root) as ledger:
+        return [trial.state for trial in ledger.trials()]
+
+
+def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE, size=PHONE, has_touch=True)
+    begin_sitting(page)
+    for first in (1, 3):
+        start_trial(page, first)
+        start_trial(page, first + 1)
+        page.get_by_text("is full").wait_for()
+        count(page, first, 0, 1, 13)
+        count(page, first + 1, 0, 12)
+        page.get_by_role("button", name="Close the generation").click()
+    page.get_by_text("All runs on a robot are complete.").wait_for()
+    with ledger_of(lab.root) as ledger:
+        assert [(each.cells, each.is_closed) for each in ledger.trials()] == 2 * [
+            ((0, 1, 13), True),
+            ((0, 12), True),
+        ]
+        assert {row["who"] for row in ledger.scores()} == {"anna"}
+        assert all(len(ledger.steps(number)) == 12 for number in range(1, 5))
+        assert ledger.conditions()["coverage-robot"]["label"] == "EMULATED"
+
+
+def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE, forgive=OUTAGE)
+    begin_sitting(page)
+    start_trial(page, 1)
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    tap(page, 0, 1, 2)
+    page.get_by_text("3 of 72 cells").wait_for()
+    page.reload()
+    page.get_by_text("3 of 72 cells").wait_for()
+    tap(page, 14)
+    page.get_by_text("4 of 72 cells").wait_for()
+    lab.kill()
+    lab.start()
+    page = visit(PAGE)
+    page.get_by_label("Your name").fill("anna")
+    page.get_by_text("4 of 72 cells").wait_for()
+    page.get_by_role("button", name="Enter this count").click()
+    page.get_by_text("4 cells are in the ledger").wait_for()
+    assert states(lab) == ["scored", "driven"]
+
+
+def test_a_lab_killed_in_the_middle_of_a_trial_loses_nothing(lab, visit):
+    make_study(lab.root, steps=60)
+    page = visit(PAGE, forgive=OUTAGE)
+    begin_sitting(page, SLOW)
+    start_trial(page, 1)
+    page.get_by_text(re.compile(r"Step [3-9] of 60")).wait_for()
+    lab.kill()
+    with ledger_of(lab.root) as ledger:
+        wait_for(lambda: ledger.trial(1).problem is not None)
+        assert ledger.trial(1).state == "running"
+        assert 2 < len(ledger.steps(1)) < 60
+    lab.start()
+    page = visit(PAGE)
+    begin_sitting(page, FAST)
+    page.get_by_text("It was cut off").wait_for()
+    page.get_by_role("button", name="Void, drive it again").click()
+    start_trial(page, 3)
+    wait_for(lambda: states(lab)[:2] == ["void", "driven"])
+
+
+def test_an_aborted_trial_stops_the_robot_and_is_asked_about(lab, visit):
+    make_study(lab.root, steps=200)
+    page = visit(PAGE)
+    begin_sitting(page, SLOW)
+    start_trial(page, 1)
+    page.get_by_text(re.compile(r"Step [3-9] of 200")).wait_for()
+    page.get_by_role("button", name="Stop the robot").click()
+    page.get_by_text("It was cut off: aborted by the operator").wait_for()
+    page.get_by_role("button", name="Driven, count it").click()
+    wait_for(lambda: states(lab)[0] == "driven")
+    with ledger_of(lab.root) as ledger:
+        assert ledger.trial(1).end == "aborted"
+
+
+def test_a_trial_goes_on_when_the_page_goes_away(lab, visit):
+    make_study(lab.root, steps=20)
+    page = visit(PAGE)
+    begin_sitting(page, "emulator://s2?fluke=2&speed=1")
+    start_trial(page, 1)
+    page.get_by_text(re.compile(r"Step \d+ of 20")).wait_for()
+    page.context.close()
+    wait_for(lambda: states(lab)[0] == "driven")
+    with ledger_of(lab.root) as ledger:
+        assert ledger.trial(1).end == "step limit"
+    again = visit(PAGE)
+    again.get_by_text("Pen: blue").wait_for()
+
+
+def test_one_operator_has_the_robot_and_others_watch(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    page.get_by_role("button", name="Start the trial").wait_for()
+    other = visit(PAGE)
+    other.get_by_text("anna has the robot; you are watching.").wait_for()
+    assert other.get_by_role("button", name="Start the trial").is_disabled()
+    other.get_by_role("button", name="Take the robot over").click()
+    start_trial(other, 1)
+    page.get_by_text("has the robot; you are watching.").wait_for()
+
+
+def test_two_people_count_and_their_agreement_is_told(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    start_trial(page, 1)
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    count(page, 1, 0, 1)
+    other = visit(PAGE)
+    other.get_by_label("Your name").fill("ben")
+    other.get_by_text("To be counted a second time: 1").wait_for()
+    other.get_by_role("button", name="1, red").last.click()
+    other.get_by_text("You do not see the first one.").wait_for()
+    assert other.locator("[data-counting] .lab-marked").count() == 0
+    count(other, 1, 0, 1, 2)
+    other.get_by_text("1 trial counted by two people, 72 cells: 98.6 % judged alike.").wait_for()
+
+
+def test_a_void_trial_needs_a_reason_and_is_driven_again(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    start_trial(page, 1)
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    page.get_by_text("Note, or void").click()
+    page.get_by_role("button", name="Void, with this reason").click()
+    page.get_by_text("Give a reason.").wait_for()
+    page.get_by_label("What is to be said of this trial").fill("the pen fell out")
+    page.get_by_role("button", name="Void, with this reason").click()
+    wait_for(lambda: states(lab) == ["void", "planned", "driven"])
+    count(page, 2, 0, 1)
+    start_trial(page, 3)
+    wait_for(lambda: states(lab) == ["void", "driven", "scored"])
+
+
+def test_the_arena_is_drawn_where_cells_are(lab, visit):
+    """A tap on the lower left of the grid is cell 0, and the highest row is the last."""
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    start_trial(page, 1)
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    page.get_by_role("button", name="Enter this count").scroll_into_view_if_needed()
+    first, last = (page.locator(f'[data-counting] [data-cell="{cell}"]').bounding_box() for cell in (0, 71))
+    assert first["x"] < last["x"]
+    assert first["y"] > last["y"]
+    page.mouse.move(first["x"] + 5, first["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(first["x"] + 3.5 * first["width"], first["y"] + 5, steps=20)
+    page.mouse.up()
+    page.get_by_text("4 of 72 cells").wait_for()
+
+
+def test_codes_alone_are_shown_while_counting_is_blind(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    page.get_by_role("button", name="Start the trial").wait_for()
+    assert "coverage-robot" not in page.content()
+
+
+def test_an_unknown_study_is_told_in_words(visit):
+    visit("trials/nobody").get_by_text("There is no study 'nobody'").wait_for()
+
+
+def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    page.get_by_label("Who counts cells").click()
+    page.get_by_text("The emulator itself").click()
+    begin_sitting(page)
+    page.get_by_text("All runs on a robot are complete.").wait_for()
+    with ledger_of(lab.root) as ledger:
+        assert {row["who"] for row in ledger.scores()} == {"witness"}
+
+
+def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    begin_sitting(page)
+    start_trial(page, 1)
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    page.get_by_label("A note on the whole").fill("half a note")
+    page.get_by_role("button", name="Count trial 2").click()
+    page.locator('[data-counting="2"]').wait_for()
+    page.get_by_role("button", name="Count trial 1").focus()
+    page.keyboard.press("Enter")
+    page.locator('[data-counting="1"]').wait_for()
+    count(page, 1, 0)
+    page.locator('[data-counting="2"]').wait_for()
+    page.get_by_role("button", name="Count trial 1").wait_for(state="detached")  # anna has
+    assert page.get_by_label("A note on the whole").input_value() == "half a note"
+
+
+def test_a_page_that_was_open_comes_back_by_itself_when_the_lab_does(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource", "Failed to fetch"])
+    page.get_by_label("Your name").fill("anna")
+    lab.kill()
+    page.get_by_text("Connection lost").wait_for()
+    lab.start()
+    page.get_by_text("Connection lost").wait_for(state="hidden")
+    begin_sitting(page)
+    page.get_by_role("button", name="Start the trial").wait_for()

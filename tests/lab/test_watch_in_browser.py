@@ -1,0 +1,99 @@
+"""A study watched, and its trials played, in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from realitygap.study import parse_study, run_study
+
+from .conftest import PHONE
+from .robot_study import SLOW, begin_sitting, make_study, start_trial
+
+TEXT = """
+[study]
+name = "seen"
+replicates = 6
+
+[[condition]]
+name = "coverage-10"
+
+[[condition]]
+name = "novelty-10"
+selection = "novelty"
+"""
+
+
+def carry_out(root: Path) -> None:
+    run_study(parse_study(TEXT, "study.toml"), root / "seen")
+
+
+def test_a_study_is_shown_in_figures_and_its_trials_are_played(lab, visit):
+    carry_out(lab.root)
+    page = visit("watch/seen", size=PHONE)
+    page.get_by_text("12 of 12 simulated runs").wait_for()
+    page.locator(".lab-figure img").nth(3).wait_for()
+    for image in page.locator(".lab-figure img").all():
+        image.scroll_into_view_if_needed()
+        page.wait_for_function("image => image.naturalWidth > 0", arg=image.element_handle())
+        assert "narrow" in image.evaluate("image => image.currentSrc")
+    page.get_by_role("button", name="Show").click()
+    player = page.locator(".rg-player")
+    player.wait_for()
+    player.get_by_role("button", name="Play").click()
+    page.wait_for_function("() => document.querySelector('.rg-clock').textContent.match(/step [1-9]/)")
+    slider = player.get_by_role("slider", name="Step")
+    slider.fill("87")
+    assert "step 87 of 87" in player.locator(".rg-clock").text_content()
+
+
+def test_several_trials_are_played_together_and_a_wish_that_cannot_be_is_told(lab, visit):
+    carry_out(lab.root)
+    page = visit("watch/seen")
+    page.get_by_label("What", exact=True).click()
+    page.get_by_text("The best of each condition").click()
+    page.get_by_role("button", name="Show").click()
+    page.locator(".rg-player").wait_for()
+    assert page.locator(".rg-names > *").count() == 2
+    page.get_by_label("Run", exact=True).fill("99")
+    page.get_by_label("Run", exact=True).press("Tab")
+    page.get_by_role("button", name="Show").click()
+    page.locator(".lab-problem", has_text="99").wait_for()
+
+
+def test_the_report_is_written_and_shown(lab, visit):
+    carry_out(lab.root)
+    page = visit("watch/seen")
+    page.get_by_role("button", name="Write the report").click()
+    link = page.get_by_role("link", name="The report")
+    link.wait_for()
+    with page.context.expect_page() as opened:
+        link.click()
+    opened.value.get_by_role("heading", name="seen").first.wait_for()
+
+
+def test_whoever_watches_sees_a_trial_while_it_is_driven(lab, visit):
+    make_study(lab.root, steps=60)
+    page = visit("trials/by-robot")
+    begin_sitting(page, SLOW)
+    start_trial(page, 1)
+    watcher = visit("watch/by-robot", size=PHONE)
+    watcher.get_by_text("Trial 1 is being driven").wait_for()
+    line = watcher.locator(".lab-line")
+    line.wait_for()
+    before = line.get_attribute("points")
+    watcher.wait_for_function(
+        "before => document.querySelector('.lab-line').getAttribute('points') !== before", arg=before
+    )
+
+
+def test_no_file_but_the_report_of_a_study_can_be_read(lab, visit):
+    (lab.root / "secret.txt").write_text("secret")
+    carry_out(lab.root)
+    page = visit("")
+    for path in (
+        "reports/%2e%2e%2fsecret.txt",
+        "reports/secret.txt",
+        "reports/seen",
+        "gaps/%2e%2e%2fsecret.txt",
+    ):
+        assert page.request.get(lab.address + path).status == 404

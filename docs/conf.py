@@ -9,6 +9,7 @@ sys.path.insert(0, str(HERE))
 
 import make_billion  # noqa: E402
 import make_gallery  # noqa: E402
+import make_lab  # noqa: E402
 import make_sensors  # noqa: E402
 import make_speed  # noqa: E402
 import reference_pages  # noqa: E402
@@ -103,6 +104,7 @@ def setup(app):
         "parts/billion.md": make_billion.page_tables(),
         "parts/gallery.md": make_gallery.page_part(),
         **make_speed.page_parts(),
+        **make_lab.page_parts(),
         **make_sensors.page_parts(),
     }
     reference_pages.write_all(HERE / "generated", more)

@@ -19,6 +19,7 @@ from realitygap.records._columns import (
     list_column,
     schema_with,
 )
+from realitygap.records._ctrl_c import wake_on_ctrl_c
 from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
@@ -53,6 +54,8 @@ from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._published_results import PublishedResults
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
+
+wake_on_ctrl_c()
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # the folder and what is in it

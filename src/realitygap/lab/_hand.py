@@ -50,9 +50,14 @@ class Hand(Job):
         self.n_live = 0
         super().__init__({"work": "robot", **order}, root, changed)
 
-    def drive(self, move: float, turn: float) -> None:
-        """Drive so for the next moment; said again and again, or it stops."""
-        self._child.tell({"do": "drive", "move": move, "turn": turn})
+    def drive(self, move: float, turn: float, press: str) -> None:
+        """Drive so for the next moment; said again and again, or it stops.
+
+        Args:
+            move, turn: -1..1.
+            press: Which press of the handle this is: a stop ends the press that drove, however late its words come.
+        """
+        self._child.tell({"do": "drive", "move": move, "turn": turn, "press": press})
 
     def release(self) -> None:
         """The handle was let go: stop, until it is pulled again."""

@@ -61,8 +61,8 @@ class _Hand:
         self._channel, self._robot, self._witness = channel, robot, witness
         self._wheels = (0.0, 0.0)
         self._told_s = 0.0
-        self._heard_s = 0.0
-        self._is_stopped = False
+        self._press: str | None = None
+        self._stopped: str | None = None
         self._moves = False
         self._lock = threading.Lock()
         self._wanted: queue.Queue[Message] = queue.Queue()
@@ -90,23 +90,21 @@ class _Hand:
         """From the thread that listens."""
         move, turn = (_share(message.get(name)) for name in ("move", "turn"))
         with self._lock:
-            now, before = time.monotonic(), self._heard_s
-            self._heard_s = now
-            if self._is_stopped and now - before < DEAD_MAN_S:
+            press = str(message.get("press"))
+            if press == self._stopped:
                 return  # the handle that was held when somebody pressed stop is held still
-            self._is_stopped = False
+            self._press = press
             self._wheels = (_share(move - turn), _share(move + turn))
-            self._told_s = now
+            self._told_s = time.monotonic()
 
     def _release(self, message: Message) -> None:
         """The handle was let go."""
         self._stop(message)
-        self._is_stopped = False
 
     def _stop(self, message: Message) -> None:
         """From the thread that listens, whatever the loop is at; nothing moves until the handle was let go."""
         with self._lock:
-            self._is_stopped = True
+            self._stopped = self._press
             self._told_s = 0.0
             self._moves = False
             self._robot.stop()

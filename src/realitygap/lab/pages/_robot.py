@@ -216,7 +216,7 @@ class _Page:
         hand = self._lab.hand
         given = event.args if isinstance(event.args, dict) else {}
         if hand is not None and self._lab.may_operate(self._visitor):
-            hand.drive(given.get("move", 0), given.get("turn", 0))
+            hand.drive(given.get("move", 0), given.get("turn", 0), str(given.get("press"))[:64])
 
     def _release(self, event: events.GenericEventArguments) -> None:
         hand = self._lab.hand

@@ -10,7 +10,7 @@ export default {
       <path d="M -1 0 L -0.78 0.14 L -0.78 -0.14 Z M 1 0 L 0.78 0.14 L 0.78 -0.14 Z" class="lab-pad-way" />
       <circle :cx="-turn" :cy="-ahead" r="0.3" class="lab-pad-knob" />
     </svg>`,
-  data() { return { ahead: 0, turn: 0, timer: null, keys: new Set() }; },
+  data() { return { ahead: 0, turn: 0, timer: null, press: "", keys: new Set() }; },
   mounted() {
     this.away = () => this.release();
     document.addEventListener("visibilitychange", this.away);
@@ -26,11 +26,12 @@ export default {
       this.ahead = ahead;
       this.turn = turn;
       if (this.timer === null) {
+        this.press = `${Date.now()} ${Math.random()}`; // a name that no other press of any page has
         this.tell();
         this.timer = setInterval(this.tell, 100);
       }
     },
-    tell() { this.$emit("drive", { move: this.ahead, turn: this.turn }); },
+    tell() { this.$emit("drive", { move: this.ahead, turn: this.turn, press: this.press }); },
     release() {
       this.keys.clear();
       if (this.timer === null) return;

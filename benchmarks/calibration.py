@@ -4,6 +4,9 @@
 of each in `sim`, and says which of the 90 % intervals hold the truth (simulation-based calibration) and how far
 identified parameters are off.
 
+`python benchmarks/calibration.py motion` (`contact`, `sensors`) does the same for what that calibration fits, with
+poses; other numbers are those of the robot's file.
+
 `python benchmarks/calibration.py flags --families alien` says which twins are flagged as what `sim` cannot make.
 
 `python benchmarks/calibration.py same --n 30` measures the gap to twins that have none, and says which intervals
@@ -21,7 +24,7 @@ from __future__ import annotations
 import argparse
 import json
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -30,12 +33,21 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.calibration import numbers_of, random_controllers, scribbler_prior, values_of
+from realitygap.calibration import (
+    Effect,
+    Floats,
+    Parameter,
+    numbers_of,
+    random_controllers,
+    scribbler_prior,
+    values_of,
+)
+from realitygap.calibration._ir_scales import AMPLITUDE, BURST, DECAY, DROP
 from realitygap.robots import SimPlatform
 from realitygap.robots.twin import sample_twin
-from realitygap.study import calibrate_all, gap_between
+from realitygap.study import calibrate, calibrate_all, gap_between
 from realitygap.trials import SimEnsemble, SimTarget, TrialPlan, TwinTarget
-from realitygap.world import Calibration, paper_arena
+from realitygap.world import Calibration, Distribution, paper_arena
 
 ARENA = paper_arena()
 PLATFORM = SimPlatform()
@@ -56,14 +68,60 @@ def on_sim(_: str, seed: int, observe: str) -> dict[str, Any]:
     numbers = {name: float(v[0]) for name, v in numbers_of(prior, values, PLATFORM.robot).items()}
     with SimTarget(SimPlatform(set=numbers), ARENA, key=seed) as target:
         found = calibrate_all(target, observe=observe, budget=BUDGET, seed=seed, threads=1, effort="small")  # type: ignore[arg-type]
+    return _judged(prior, values, found) | {"misspecified": found.misspecified}
+
+
+def on_motion(_: str, seed: int, observe: str) -> dict[str, Any]:
+    """The same of a robot with a drive drawn from the prior, and `calibrate motion`."""
+    return _one_kind("motion", _prior_of("drive."), seed, observe)
+
+
+def on_contact(_: str, seed: int, observe: str) -> dict[str, Any]:
+    """The same of a robot with contact drawn from the prior, and `calibrate contact`."""
+    return _one_kind("contact", _prior_of("contact."), seed, observe)
+
+
+def on_sensors(_: str, seed: int, observe: str) -> dict[str, Any]:
+    """The same of a robot with range sensors drawn from the prior, each by itself, and `calibrate sensors`."""
+    prior = [
+        Parameter(
+            f"range.{k}.{scale.name}",
+            Distribution(**{"log_uniform" if scale.kind == "ratio" else "uniform": (scale.low, scale.high)}),
+            expand=(Effect(f"range.{k}.{scale.name}"),),
+        )
+        for k in range(len(PLATFORM.robot.range))
+        for scale in (AMPLITUDE, DECAY, *DROP, BURST)
+    ]
+    return _one_kind("sensors", prior, seed, observe)
+
+
+def _prior_of(group: str) -> list[Parameter]:
+    return [parameter for parameter in scribbler_prior(PLATFORM.robot) if parameter.name.startswith(group)]
+
+
+def _one_kind(kind: str, prior: list[Parameter], seed: int, observe: str) -> dict[str, Any]:
+    """Whether one kind of calibration finds what was drawn; other numbers are as the robot's file has them."""
+    uniform = np.random.default_rng(seed).random(len(prior))
+    values = {p.name: p.prior.of(np.array([place])) for p, place in zip(prior, uniform, strict=True)}
+    numbers = {name: float(v[0]) for name, v in numbers_of(prior, values, PLATFORM.robot).items()}
+    with SimTarget(SimPlatform(set=numbers), ARENA, key=seed) as target:
+        found = calibrate(kind, target, observe=observe, seed=seed)  # type: ignore[arg-type]
+    return _judged(prior, values, found)
+
+
+def _judged(prior: Sequence[Parameter], values: Mapping[str, Floats], found: Calibration) -> dict[str, Any]:
+    """Whether the interval of each parameter holds it, and whether what is identified is near it."""
+    fitted = {fit.name: fit for fit in found.fitted}
     held, near = {}, {}
-    for parameter, fit in zip(prior, found.fitted, strict=True):
+    for parameter in prior:
+        if (fit := fitted.get(parameter.name)) is None:
+            continue
         truth = float(values[parameter.name][0])
         held[parameter.name] = bool(fit.low <= truth <= fit.high)
         off = abs(float(parameter.scale(fit.estimate)) - float(parameter.scale(truth))) / parameter.width
         if fit.identified:
             near[parameter.name] = bool(off <= NEAR_PRIOR or abs(fit.estimate - truth) <= NEAR * abs(truth))
-    return {"held": held, "near": near, "misspecified": found.misspecified}
+    return {"held": held, "near": near}
 
 
 def flags(family: str, seed: int, observe: str) -> dict[str, Any]:
@@ -131,10 +189,11 @@ def _rms_gap(predicted: np.ndarray[Any, Any], truth: np.ndarray[Any, Any]) -> fl
     return float(np.sqrt(max(np.mean(off**2 - noise), 0.0)))
 
 
-MEASURES = {"sim": on_sim, "flags": flags, "same": same, "twins": on_twins}
-FAMILIES = {
-    "sim": ["sim"], "flags": ["alien"], "same": ["same"], "twins": ["close", "worn", "delayed", "slippery"]
+MEASURES = {
+    "sim": on_sim, "motion": on_motion, "contact": on_contact, "sensors": on_sensors,
+    "flags": flags, "same": same, "twins": on_twins,
 }  # fmt: skip
+FAMILIES = {"flags": ["alien"], "same": ["same"], "twins": ["close", "worn", "delayed", "slippery"]}
 
 
 def one(key: tuple[str, str, int, str]) -> dict[str, Any]:
@@ -166,7 +225,7 @@ def main() -> None:
     keys = [
         (options.what, family, seed, observe)
         for seed in range(options.first_seed, options.first_seed + options.n)
-        for family in options.families or FAMILIES[options.what]
+        for family in options.families or FAMILIES.get(options.what, ["sim"])
         for observe in options.observe
     ]
     with ProcessPoolExecutor(options.processes, get_context("spawn")) as pool:

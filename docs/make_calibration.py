@@ -1,12 +1,15 @@
-"""The tables of the page "All parameters at once, from whole trials".
+"""The tables of measured intervals: on the pages "Calibration" and "All parameters at once, from whole trials".
 
     uv run python docs/make_calibration.py
 
 Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and docs/data/closing/summary.json,
-and writes tables into the page and each parameter into docs/data/calibration.csv. Measuring takes an hour, by hand:
+and writes tables into the pages and each parameter into docs/data/calibration.csv. Measuring takes an hour, by hand:
 
     data="--out docs/data/calibration.jsonl"
     uv run python benchmarks/calibration.py sim --n 24 --first-seed 1000 --observe track cells $data
+    uv run python benchmarks/calibration.py motion --n 24 --first-seed 1000 $data
+    uv run python benchmarks/calibration.py contact --n 24 --first-seed 1000 $data
+    uv run python benchmarks/calibration.py sensors --n 12 --first-seed 1000 $data
     uv run python benchmarks/calibration.py flags --n 30 --first-seed 1001 $data
     uv run python benchmarks/calibration.py same --n 30 --first-seed 1001 $data
 """
@@ -24,7 +27,7 @@ from typing import Any
 import numpy as np
 
 DOCS = Path(__file__).parent
-PAGE = DOCS / "explanations" / "inference.md"
+PAGES = (DOCS / "explanations" / "calibration.md", DOCS / "explanations" / "inference.md")
 MEASURED = DOCS / "data" / "calibration.jsonl"
 EACH = DOCS / "data" / "calibration.csv"
 CLOSING = DOCS / "data" / "closing" / "summary.json"
@@ -48,6 +51,20 @@ def intervals(rows: Sequence[Row]) -> str:
         held = [inside for row in some for inside in row["held"].values()]
         near = [close for row in some for close in row["near"].values()]
         lines.append(f"| `{observe}` | {len(some)} | {share(held)} | {share(near)} |")
+    return "\n".join(lines) + "\n"
+
+
+def kinds(rows: Sequence[Row]) -> str:
+    """The same of calibrations of one kind of parameters."""
+    lines = [
+        "| `calibrate` | robots | 90 % intervals that hold the truth | identified parameters near it |",
+        "|---|---|---|---|",
+    ]
+    for kind in ("motion", "contact", "sensors"):
+        some = [row for row in rows if row["what"] == kind]
+        held = [inside for row in some for inside in row["held"].values()]
+        near = [close for row in some for close in row["near"].values()]
+        lines.append(f"| `{kind}` | {len(some)} | {share(held)} | {share(near)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -95,15 +112,17 @@ def each(rows: Sequence[Row]) -> str:
 
 
 def rewrite(text: str) -> str:
-    """The page with the tables of what was measured."""
+    """A page with the tables of what was measured."""
     rows = [json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]
-    blocks = {"intervals": intervals(rows), "flagged": flagged(rows, json.loads(CLOSING.read_text("utf-8")))}
+    closing = json.loads(CLOSING.read_text("utf-8"))
+    blocks = {"intervals": intervals(rows), "kinds": kinds(rows), "flagged": flagged(rows, closing)}
     return BLOCK.sub(lambda found: found[1] + blocks[found[2]] + found[3], text)
 
 
 def main() -> None:
     """Write the tables."""
-    PAGE.write_text(rewrite(PAGE.read_text("utf-8")), "utf-8")
+    for page in PAGES:
+        page.write_text(rewrite(page.read_text("utf-8")), "utf-8")
     EACH.write_text(each([json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]), "utf-8")
 
 

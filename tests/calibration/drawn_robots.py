@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from realitygap.calibration import ranges_of, scribbler_prior
 from realitygap.calibration._handles import parameters_of, robot_numbers
-from realitygap.calibration._prior import Parameter, ranges_of, scribbler_prior
 from realitygap.records import ObservedTrial
 from realitygap.robots import SimPlatform
 from realitygap.trials import SimEnsemble, TrialPlan
-from realitygap.world import Distribution, load_robot, paper_arena
+from realitygap.world import load_robot, paper_arena
 
 ROBOT, ARENA = load_robot("scribbler-s2-fluke2"), paper_arena()
-# Milder than what is thought possible: with commands late by as much as half a step, late commands are no small errors.
-MILD = {
-    "drive.lag": Distribution(uniform=(0.0, 0.25)),
-    "drive.delay": Distribution(uniform=(0.0, 0.4)),
-    "drive.delay_jitter": Distribution(uniform=(0.0, 0.05)),
-    "drive.travel_noise_per_m": Distribution(log_uniform=(0.002, 0.03)),
-    "drive.heading_noise_per_m": Distribution(log_uniform=(0.02, 0.2)),
-    "drive.heading_noise_per_s": Distribution(log_uniform=(0.003, 0.05)),
-}
-PRIOR: tuple[Parameter, ...] = tuple(
-    replace(parameter, prior=MILD.get(parameter.name, parameter.prior))
-    for parameter in scribbler_prior(ROBOT)
-)
+PRIOR = scribbler_prior(ROBOT)
 KNOWN = parameters_of(ROBOT, PRIOR)
 ENSEMBLE = SimEnsemble(SimPlatform(robot=ROBOT), ARENA, ranges=ranges_of(PRIOR, ROBOT), threads=1)
 

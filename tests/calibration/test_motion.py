@@ -112,14 +112,14 @@ def test_a_place_too_narrow_to_turn_is_refused() -> None:
 
 def test_scatter_is_the_normal_distribution_that_its_covariance_says() -> None:
     rng = np.random.default_rng(1)
-    late, carried = rng.normal(size=(2, 1, 5)) * 0.1
+    moved = rng.normal(size=(5, 5)) * 0.1
+    late = moved @ moved.T
     scatter = Scatter(
         way=np.array([0.07]),
         chord=np.array([0.9]),
         wheel_way=np.array([[0.08, 0.06]]),
         moving_s=np.array([0.5]),
-        late=late[None, 0] if late.ndim == 1 else late,
-        carried=carried[None, 0] if carried.ndim == 1 else carried,
+        late=late[None],
         seen=np.ones((1, 5), np.bool_),
     )
     noise = np.array([0.05, 0.02, 0.1, 0.03, 0.01, 0.001, 0.002, 0.004, 0.0005])
@@ -127,8 +127,7 @@ def test_scatter_is_the_normal_distribution_that_its_covariance_says() -> None:
         0.02**2 * 0.07 * 0.9**2 + 2e-6, 0.01**2 * 0.07 + 2e-6, 0.1**2 * 0.07 + 0.03**2 * 0.5 + 2 * 0.002**2,
         0.004**2 * 0.08 + 2 * 0.0005**2, 0.004**2 * 0.06 + 2 * 0.0005**2,
     ]) + LEAST  # fmt: skip
-    one, two = scatter.late[0], scatter.carried[0]
-    covariance = np.diag(own) + 0.05**2 / 3 * (np.outer(one, one) + np.outer(two, two))
+    covariance = np.diag(own) + 0.05**2 * late
     off = rng.normal(size=(1, 5)) * 0.01
     expected = multivariate_normal(np.zeros(5), covariance).logpdf(off[0]) + 2.5 * np.log(2 * np.pi)
     assert scatter.log_likelihood(off, noise) == pytest.approx(expected, rel=1e-9)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from realitygap.records import Observe, ObservedTrial
 from realitygap.world import Arena, RobotModel
@@ -19,17 +20,19 @@ from ._motion import N_DRAWS, MotionFit, fitted_parameter, nothing_known, observ
 from ._posterior import sample_clusters
 from ._prior import Parameter
 from ._shooting import Problem, make_problem
-from ._simulate import Floats, Simulate
-from ._windows import CHANNELS, make_windows
+from ._simulate import Floats, Simulate, motor_noise, plain_numbers
+from ._windows import CHANNELS, make_windows, wrapped
 
 METHOD = (
-    "Each window near a wall is simulated from where the robot was seen, with the drive as given; differences have a t "
-    "distribution, as encounters near the border between aligning and stalling flip. Population Monte Carlo (Cappe et "
-    "al. 2004); intervals from trials weighed anew (Newton & Raftery 1994)."
+    "Each window near a wall is simulated from where the robot was seen, with the drive and its noise as given; "
+    "differences have a t distribution, as encounters near the border between aligning and stalling flip. Population "
+    "Monte Carlo (Cappe et al. 2004); intervals from trials weighed anew (Newton & Raftery 1994)."
 )
 WINDOW = 1  # commands: pushes are not linear, and longer ones less so
 FREEDOM = 4.0  # degrees, of the t distribution
-ROUNDS = 2  # of draws and of the scale of differences in turn
+REACHES = (0.12, 0.04, 0.02)  # from where draws begin, in turn with what noise makes of windows
+N_PLACES = 500  # of each look around
+N_NOISY = 100  # robots that show it
 LEAST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] of that scale
 PLACES = (0.15, 0.4, 0.65, 0.9)  # of each parameter, from which a fit begins where they come closest
 FLIPS = 5.0  # robust standard deviations: beyond it a window took the other way at a border
@@ -77,8 +80,23 @@ def fit_contact(
         raise ValueError(
             "In no trial the robot was seen to meet a wall, expected some. Record trials of contact_plans."
         )
-    problem = replace(make_problem(simulate, robot, known, windows, CONTACT), fixed=dict(motion or {}))
-    return _report(problem, np.random.default_rng(seed), encounters_of(seen, robot, arena))
+    own, given = plain_numbers(robot), dict(motion or {})
+    noise = {name: given.pop(name, own[name]) for name in motor_noise(robot)}
+    problem = replace(make_problem(simulate, robot, known, windows, CONTACT), fixed=given)
+    return _report(problem, noise, np.random.default_rng(seed), encounters_of(seen, robot, arena))
+
+
+@dataclass(frozen=True)
+class Expected:
+    """How windows differ from those of a robot without noise.
+
+    Attributes:
+        shift: (w, 3) in the mean: a wall that is met by chance turns a robot one way only.
+        scale: (w, 3) typically.
+    """
+
+    shift: Floats
+    scale: Floats
 
 
 def _off(problem: Problem, places: Floats) -> Floats:
@@ -86,34 +104,54 @@ def _off(problem: Problem, places: Floats) -> Floats:
     return np.nan_to_num(problem.off(places)[..., :3])
 
 
-def _first_place(problem: Problem) -> tuple[Floats, Floats]:
-    """Of places all over the prior, that from which most windows end where they were seen to, and (3,) how far off."""
+def _first_place(problem: Problem) -> Floats:
+    """Of places all over the prior, that from which most windows end where they were seen to."""
     places = np.array([*product(PLACES, repeat=len(problem.free)), tuple(problem.own)])
     off = np.abs(_off(problem, places))
     scales = MAD * np.median(off, axis=1) + LEAST
     cost = np.minimum(off / scales.min(axis=0), CAP).mean(axis=(1, 2))
-    best = int(np.argmin(cost))
-    return places[best], scales[best]
+    return np.asarray(places[int(np.argmin(cost))])
 
 
-def _log_likelihoods(problem: Problem, scale: Floats, places: Floats) -> Floats:
+def _expected(problem: Problem, noise: Mapping[str, float], place: Floats) -> Expected:
+    """What the noise of the drive makes of windows at a place, and by how much more they differ from what was seen."""
+    off = _off(problem, place[None])[0]
+    moved = _off(problem.fixed_at(**noise), np.repeat(place[None], N_NOISY, axis=0)) - off
+    moved[..., 2] = wrapped(moved[..., 2])
+    shift, scale = moved.mean(axis=0), np.sqrt(moved.var(axis=0) + LEAST**2)
+    return Expected(shift, scale * np.maximum(MAD * np.median(np.abs(off + shift) / scale, axis=0), 1.0))
+
+
+def _log_likelihoods(problem: Problem, expected: Expected, places: Floats) -> Floats:
     """(m, k) of the trials' windows, whose differences have a t distribution: some go another way altogether."""
-    squares = ((_off(problem, places) / scale) ** 2).sum(axis=-1)
+    squares = (((_off(problem, places) + expected.shift) / expected.scale) ** 2).sum(axis=-1)
     logs = -0.5 * (FREEDOM + 3.0) * np.log1p(squares / FREEDOM)
     trials = np.unique(problem.windows.trial)
     return np.stack([logs[:, problem.windows.trial == k].sum(axis=1) for k in trials], axis=1)
 
 
-def _report(problem: Problem, rng: np.random.Generator, encounters: Encounters) -> MotionFit:
-    place, scale = _first_place(problem)
-    for _ in range(ROUNDS):
-        places = sample_clusters(rng, place, partial(_log_likelihoods, problem, scale), N_DRAWS)
+def _few(n: int) -> float:
+    """By how much draws that weigh n trials anew spread too little: Student's interval over the normal one."""
+    return float(stdtrit(n - 1, 0.95) / ndtri(0.95) * np.sqrt(n / (n - 1))) if n > 1 else 1.0
+
+
+def _report(
+    problem: Problem, noise: Mapping[str, float], rng: np.random.Generator, encounters: Encounters
+) -> MotionFit:
+    place = _first_place(problem)
+    expected = _expected(problem, noise, place)
+    for reach in REACHES:
+        places = sample_clusters(
+            rng, place, partial(_log_likelihoods, problem, expected), N_DRAWS, reach, N_PLACES
+        )
         place = np.median(places, axis=0)
-        off = _off(problem, place[None])[0]
-        scale = MAD * np.median(np.abs(off), axis=0) + LEAST
+        expected = _expected(problem, noise, place)
+    places = np.clip(place + _few(len(np.unique(problem.windows.trial))) * (places - place), 0.0, 1.0)
+    off, scale = _off(problem, place[None])[0] + expected.shift, expected.scale
+    typical = np.median(scale, axis=0).tolist()
     draws = values_at(problem.free, places)
     best = {name: float(value[0]) for name, value in values_at(problem.free, place[None]).items()}
-    slopes = np.nan_to_num(problem.slopes(place)[:, :3]) / scale[:, None]
+    slopes = np.nan_to_num(problem.slopes(place)[:, :3]) / scale[:, :, None]
     found = identify_from(draws, problem.known, slopes, problem.free)
     fitted = tuple(
         fitted_parameter(problem.known[name], best[name], draws[name], found[name], "track") for name in draws
@@ -129,6 +167,6 @@ def _report(problem: Problem, rng: np.random.Generator, encounters: Encounters) 
             f"{len(off)} windows near walls, {other} of which went another way than simulated",
             f"{agree} of {len(encounters.aligned)} encounters align or stall as the fitted friction has it",
         ),
-        {"windows": len(off), "flips": other, "typical": dict(zip(CHANNELS[:3], scale.tolist(), strict=True)),
+        {"windows": len(off), "flips": other, "typical": dict(zip(CHANNELS[:3], typical, strict=True)),
          "encounters": len(encounters.aligned), "agreeing": agree},
     )  # fmt: skip

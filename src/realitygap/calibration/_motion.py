@@ -14,7 +14,7 @@ from realitygap.world import Arena, Fitted, RobotModel
 from ._handles import MOTION, MOTION_NOISE, Known, own_values, parameters_of, robot_numbers, values_at
 from ._identify import Identified, advice_for, identify_from
 from ._prior import Parameter
-from ._scatter import Scatter, scatter_parameters
+from ._scatter import JITTER, NoisePrior, Scatter, scatter_parameters
 from ._shooting import (
     FIRST_NOISE,
     Problem,
@@ -24,8 +24,9 @@ from ._shooting import (
     scatter_of,
     typical_noise,
     widening,
+    widening_of_noise,
 )
-from ._simulate import Bools, Floats, Simulate, plain_numbers
+from ._simulate import Bools, Floats, Ints, Simulate, plain_numbers
 from ._windows import CHANNELS, make_windows
 
 METHOD = (
@@ -34,7 +35,9 @@ METHOD = (
     "widened where trials disagree by more than that (sandwich covariance, clustered by trial)."
 )
 N_DRAWS = 200
-ROUNDS = 3  # of weights and least squares in turn
+MOST_ROUNDS = 8  # of weights and least squares in turn
+DEAD_BANDS = 2  # rounds in which commands are told that move no wheel
+SETTLED = 0.004  # move of a place after which no further round is needed
 DELAYS = (0.0, 0.15, 0.3, 0.5)  # from which a fit begins, as parts of the range: it may have several minima
 
 
@@ -113,8 +116,7 @@ def fit_motion(
             "wheels (observe = encoders). Record trials of motion_plans that way."
         )
     problem = make_problem(simulate, robot, known, windows, MOTION)
-    place, dead_band, noise = _solve(problem)
-    problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
+    problem, place, dead_band, noise = _solve(problem)
     return _report(problem, place, noise, dead_band, np.random.default_rng(seed))
 
 
@@ -149,20 +151,27 @@ def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method:
     return MotionFit(fitted, {}, {}, method, notes)
 
 
-def _solve(problem: Problem) -> tuple[Floats, DeadBand, Floats]:
+def _solve(problem: Problem) -> tuple[Problem, Floats, DeadBand, Floats]:
     noise = FIRST_NOISE
     problem = problem.fixed_at(**{"drive.dead_band": plain_numbers(problem.robot)["drive.dead_band"]})
     scatter = scatter_of(problem, problem.own)
     place = _first_place(problem, scatter, noise)
-    rng = np.random.default_rng(0)
-    for _ in range(ROUNDS):
+    for turn in range(MOST_ROUNDS):
+        problem = replace(problem, jitter=float(noise[JITTER]))
         scatter = scatter_of(problem, place)
-        dead_band = _dead_band(problem, scatter, noise, place)
-        problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
+        if turn < DEAD_BANDS:
+            dead_band = _dead_band(problem, scatter, noise, place)
+            problem = problem.fixed_at(**{"drive.dead_band": dead_band.estimate})
+        before = place
         place, _ = best_place(problem, scatter, noise, place)
         off = np.nan_to_num(problem.off(place[None])[0])
-        noise = typical_noise(rng, scatter, off, scatter_parameters(problem.known), noise)
-    return place, dead_band, noise
+        # the same random numbers in each round, so that rounds come to an end
+        noise = typical_noise(
+            np.random.default_rng(0), scatter, off, scatter_parameters(problem.known), noise
+        )
+        if turn >= DEAD_BANDS and np.abs(place - before).max() < SETTLED:
+            break
+    return problem, place, dead_band, noise
 
 
 def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
@@ -216,6 +225,7 @@ def _report(
     places, scatters = draw_posterior(rng, scatter, place, slopes, off, noise, noises)
     wide = widening(scatter, slopes, off, problem.windows.trial, np.median(scatters, axis=0))
     places = np.clip(place + (places - place) * wide, 0.0, 1.0)
+    scatters = _widened(scatters, noises, scatter, off, problem.windows.trial)
     draws = values_at(problem.free, places)
     draws |= {parameter.name: scatters[:, k] for k, parameter in enumerate(noises[: len(MOTION_NOISE)])}
     draws["drive.dead_band"] = dead_band.draws(rng, len(places))
@@ -241,6 +251,17 @@ def _report(
         notes=_notes(problem, noises, scatters),
         evidence={"windows": len(off), "rms": dict(zip(CHANNELS, _rms(off, scatter.seen), strict=True))},
     )
+
+
+def _widened(
+    scatters: Floats, noises: Sequence[Parameter], scatter: Scatter, off: Floats, trial: Ints
+) -> Floats:
+    """(d, q) the simulator's own noise, around its median."""
+    prior, middle = NoisePrior.of(noises), np.median(scatters, axis=0)
+    wide = np.ones(len(noises))
+    wide[: len(MOTION_NOISE)] = widening_of_noise(scatter, off, trial, middle, noises)
+    places, at = prior.places(scatters), prior.places(middle)
+    return prior.at(at + (places - at) * wide)
 
 
 def _rms(off: Floats, seen: Bools) -> list[float]:

@@ -25,7 +25,7 @@ OBSERVER = (
 )
 """Skids sideways, errors of a camera in a place and a heading, errors of encoders that grow with the way or do not."""
 
-LEAST = np.array([1e-4, 1e-4, 1e-4, 1e-4, 1e-4]) ** 2
+LEAST = np.array([3e-5, 3e-5, 3e-5, 3e-5, 3e-5]) ** 2
 """Variance of each channel in any case [m2, rad2]: single precision, and what no camera tells."""
 
 
@@ -33,16 +33,15 @@ LEAST = np.array([1e-4, 1e-4, 1e-4, 1e-4, 1e-4]) ** 2
 class Scatter:
     """The likelihood of what differs between observed and simulated windows.
 
-    Variances grow with the way and the time as in `sim`. A late command, or the one before it, moves all
-    channels of a window together: ranks of their own in their covariance.
+    Variances grow with the way and the time as in `sim`. Early and late commands move all channels of a window
+    together.
 
     Attributes:
         way: (w,) driven by the wheels, the mean of both [m].
         wheel_way: (w, 2) of each [m].
         moving_s: (w,) time in which a wheel turns [s].
         chord: (w,) share of a way that its arc leads away: 1 straight on.
-        late: (w, 5) what one second of delay changes.
-        carried: (w, 5) what one second of delay of the command before changes.
+        late: (w, 5, 5) covariance that early and late commands make, by the square of a second of jitter.
         seen: (w, 5) whether a channel was observed.
     """
 
@@ -51,63 +50,63 @@ class Scatter:
     wheel_way: Floats
     moving_s: Floats
     late: Floats
-    carried: Floats
     seen: Bools
 
     def variances(self, noise: Floats) -> Floats:
-        """(w, 5) of the channels, without what lateness does."""
+        """(5, w) of the channels, without what lateness does."""
         square = noise * noise
-        own = np.empty(self.late.shape)
-        own[:, 0] = square[TRAVEL_PER_M] * self.way * self.chord**2 + 2 * square[PLACE]
-        own[:, 1] = square[ACROSS_PER_M] * self.way + 2 * square[PLACE]
-        own[:, 2] = (
-            square[HEADING_PER_M] * self.way + square[HEADING_PER_S] * self.moving_s + 2 * square[ANGLE]
-        )
-        own[:, 3:] = square[WHEEL_PER_M] * self.wheel_way + 2 * square[WHEEL]
-        return np.asarray(own + LEAST)
+        own = np.empty((5, len(self.way)))
+        own[0] = square[TRAVEL_PER_M] * self.way * self.chord**2 + 2 * square[PLACE]
+        own[1] = square[ACROSS_PER_M] * self.way + 2 * square[PLACE]
+        own[2] = square[HEADING_PER_M] * self.way + square[HEADING_PER_S] * self.moving_s + 2 * square[ANGLE]
+        own[3:] = square[WHEEL_PER_M] * self.wheel_way.T + 2 * square[WHEEL]
+        return np.asarray(own + LEAST[:, None])
 
     def log_likelihood(self, off: Floats, noise: Floats) -> float:
         """Of differences (w, 5), where those not observed are 0."""
-        own = self.variances(noise)
-        precise = self.seen / own
-        jitter = noise[JITTER] ** 2 / 3.0  # the variance of jitter * U(-1, 1)
-        (a, b), c = self._shared(precise)
-        a, b, c = 1.0 + jitter * a, 1.0 + jitter * b, jitter * c
-        whole = a * b - c * c
-        weighed = precise * off
-        one = np.einsum("wc,wc->w", weighed, self.late)
-        two = np.einsum("wc,wc->w", weighed, self.carried)
-        logs = np.log(own).sum(where=self.seen) + np.log(whole).sum()
-        explained = (b * one * one - 2.0 * c * one * two + a * two * two) / whole
-        return -0.5 * float(logs + (weighed * off).sum() - jitter * explained.sum())
+        return float(self.log_likelihoods(off, noise).sum())
 
-    def _shared(self, precise: Floats) -> tuple[tuple[Floats, Floats], Floats]:
-        """(w,) weighed squares of both kinds of lateness, and their product."""
-        one = precise * self.late
-        return (
-            np.einsum("wc,wc->w", one, self.late),
-            np.einsum("wc,wc->w", precise * self.carried, self.carried),
-        ), np.einsum("wc,wc->w", one, self.carried)
+    def log_likelihoods(self, off: Floats, noise: Floats) -> Floats:
+        """(w,) the same of each window."""
+        root = self._root(noise)
+        white = _solved(root, off.T)
+        sizes = np.einsum("ccw->cw", root)
+        return np.asarray(-0.5 * np.einsum("cw,cw->w", white, white) - np.log(sizes).sum(axis=0))
 
     def whitened(self, rows: Floats, noise: Floats) -> Floats:
-        """Differences (w, 5) or their derivatives (w, 5, p), made of variance 1 and independent.
+        """Differences (w, 5) or their derivatives (w, 5, p), made of variance 1 and independent."""
+        deep = np.moveaxis(rows, 0, -1)
+        seen = np.where(self.seen.T.reshape(5, *(1,) * (deep.ndim - 2), -1), deep, 0.0)
+        return np.asarray(np.moveaxis(_solved(self._root(noise), seen), -1, 0))
 
-        Both kinds of lateness are turned into principal directions, and what lies along each is shrunk.
-        """
-        deep = rows.reshape(*rows.shape[:2], -1)
-        root = np.sqrt(self.seen / self.variances(noise))
-        scaled = root[:, :, None] * deep
-        (a, b), c = self._shared(root * root)
-        angle = 0.5 * np.arctan2(2.0 * c, a - b)
-        cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        first = root * (cos * self.late + sin * self.carried)
-        second = root * (cos * self.carried - sin * self.late)
-        for direction in (first, second):
-            size = np.einsum("wc,wc->w", direction, direction)
-            share = 1.0 - 1.0 / np.sqrt(1.0 + noise[JITTER] ** 2 / 3.0 * size)
-            along = np.einsum("wc,wcp->wp", direction, scaled) * (share / np.maximum(size, 1e-300))[:, None]
-            scaled -= direction[:, :, None] * along[:, None, :]
-        return np.asarray(scaled.reshape(rows.shape))
+    def _root(self, noise: Floats) -> Floats:
+        """(5, 5, w) lower triangles whose squares are the covariances; 1 for what was not observed."""
+        seen = self.seen.T
+        covariance = noise[JITTER] ** 2 * np.moveaxis(self.late, 0, -1) * (seen[:, None] & seen)
+        at = np.arange(5)
+        covariance[at, at] = np.where(seen, covariance[at, at] + self.variances(noise), 1.0)
+        return _cholesky(covariance)
+
+
+def _cholesky(matrices: Floats) -> Floats:
+    """(n, n, w) of small matrices: all of them at once are far faster than one by one."""
+    root = np.zeros_like(matrices)
+    for k in range(len(matrices)):
+        root[k, k] = np.sqrt(matrices[k, k] - np.einsum("jw,jw->w", root[k, :k], root[k, :k]))
+        for i in range(k + 1, len(matrices)):
+            root[i, k] = (matrices[i, k] - np.einsum("jw,jw->w", root[i, :k], root[k, :k])) / root[k, k]
+    return root
+
+
+def _solved(root: Floats, rows: Floats) -> Floats:
+    """(n, ..., w) x where root (n, n, w) times x is `rows`."""
+    found = np.empty_like(rows)
+    for k in range(len(root)):
+        found[k] = rows[k]
+        for j in range(k):
+            found[k] -= root[k, j] * found[j]
+        found[k] /= root[k, k]
+    return found
 
 
 def scatter_parameters(known: Known) -> list[Parameter]:
@@ -145,3 +144,20 @@ class NoisePrior:
     def inside(self, noise: Floats) -> Floats:
         """The nearest noise that is possible."""
         return np.clip(noise, self.low, self.high)
+
+    def places(self, noise: Floats) -> Floats:
+        """(..., q) between the ends, 0..1, on the scale on which the prior is even."""
+        low, high = self._ends()
+        scaled = np.where(self.is_ratio, np.log(np.maximum(noise, 1e-300)), noise)
+        return np.asarray((scaled - low) / (high - low))
+
+    def at(self, places: Floats) -> Floats:
+        """(..., q) noise at such places; of the nearest end where they lie beyond."""
+        low, high = self._ends()
+        scaled = low + np.clip(places, 0.0, 1.0) * (high - low)
+        return np.where(self.is_ratio, np.exp(scaled), scaled)
+
+    def _ends(self) -> tuple[Floats, Floats]:
+        with np.errstate(divide="ignore"):
+            logs = np.log([self.low, self.high])
+        return np.where(self.is_ratio, logs[0], self.low), np.where(self.is_ratio, logs[1], self.high)

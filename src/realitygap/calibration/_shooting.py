@@ -14,20 +14,23 @@ import numpy as np
 
 from realitygap.world import RobotModel
 
-from ._handles import Known, own_values, place_of, values_at
+from ._handles import MOTION_NOISE, Known, own_values, place_of, values_at
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
 from ._prior import Parameter
 from ._scatter import NoisePrior, Scatter
-from ._simulate import Floats, Ints, Simulate, plain_numbers
+from ._simulate import Floats, Ints, Simulate
 from ._wheel_ways import wheel_ways
 from ._windows import Windows, differences, simulate_windows, wrapped
 
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
-STANDS = 1e-3  # [m/s] of the wheels, below which no noise goes on, as in kernels/_sim_drive.py
 FIRST_NOISE = np.array([0.02, 0.03, 0.1, 0.05, 0.01, 0.001, 0.005, 0.005, 0.001])
 PRIOR_PRECISION = 12.0  # of an even prior over 0..1
+NOISE_STEP = 0.004  # likewise of the noise
 MOST_STEPS, MOST_DAMPING = 15, 1e4  # of least squares
+N_MEAN = 40  # robots that show what early and late commands do in the mean
+N_SCATTER = 200  # and how they scatter
+LEAST_JITTER = 0.01  # [s] of theirs
 TUNING = 160  # rounds of Metropolis steps between two fits
 FEWEST_TRIALS = 4  # below which their disagreement says nothing
 
@@ -44,6 +47,7 @@ class Problem:
         free: Parameters that are fitted.
         fixed: Values of others.
         own: (p,) where the robot's own numbers lie between the ends of the free ones.
+        jitter: [s] of commands: early and late ones change what windows do in the mean, too.
     """
 
     simulate: Simulate
@@ -53,9 +57,21 @@ class Problem:
     free: tuple[Parameter, ...]
     fixed: Mapping[str, float]
     own: Floats
+    jitter: float = 0.0
 
     def off(self, places: Floats) -> Floats:
-        """(m, w, 5) observed less simulated at places (m, p)."""
+        """(m, w, 5) observed less simulated in the mean at places (m, p)."""
+        if self.jitter == 0.0:
+            return self._off(places)
+        return np.stack([self.jittered(place, N_MEAN).mean(axis=0) for place in places])
+
+    def jittered(self, place: Floats, n: int) -> Floats:
+        """(n, w, 5) the same of n robots at one place, whose commands come early or late, each as it happens."""
+        off = self.fixed_at(**{"drive.delay_jitter": self.jitter})._off(np.repeat(place[None], n, axis=0))
+        off[..., 2] = off[:1, :, 2] + wrapped(off[..., 2] - off[:1, :, 2])
+        return off
+
+    def _off(self, places: Floats) -> Floats:
         values = values_at(self.free, places)
         values |= {name: np.full(len(places), value) for name, value in self.fixed.items()}
         simulated = simulate_windows(self.simulate, self.robot, self.known, self.windows, values)
@@ -82,7 +98,8 @@ def make_problem(
     """Windows that are to be met by parameters of these names."""
     own = own_values(robot)
     places = np.array([place_of(known[name], own[name]) for name in names])
-    return Problem(simulate, robot, known, windows, tuple(known[name] for name in names), {}, places)
+    free = tuple(known[name] for name in names)
+    return Problem(simulate, robot, known, windows, free, {}, places)
 
 
 def scatter_of(problem: Problem, place: Floats) -> Scatter:
@@ -90,35 +107,30 @@ def scatter_of(problem: Problem, place: Floats) -> Scatter:
     values = values_at(problem.free, place[None])
     values |= {name: np.array([value]) for name, value in problem.fixed.items()}
     windows = problem.windows
-    ways = wheel_ways(problem.simulate, problem.robot, problem.known, windows, values)
+    jitter = max(problem.jitter, LEAST_JITTER)
+    ways = wheel_ways(problem.simulate, problem.robot, problem.known, windows, values, jitter)
     made = simulate_windows(problem.simulate, problem.robot, problem.known, windows, values)
     before, after, wheels = windows.seen
     seen = np.concatenate([np.repeat(np.isfinite(after[:, :1]), 3, axis=1), np.isfinite(wheels)], axis=1)
-    span = (windows.last - windows.first) * windows.step_s
-    stands = ways.way.mean(axis=1) <= STANDS * span
     turn = np.nan_to_num(wrapped(made.after[0, :, 2] - before[:, 2]))
-    own = plain_numbers(problem.robot)
-    slip, track = (
-        float(values[name][0]) if name in values else own[name] for name in ("drive.slip", "drive.track")
-    )
     return Scatter(
         way=ways.way.mean(axis=1),
         chord=np.sinc(turn / (2 * np.pi)),
         wheel_way=ways.way,
-        moving_s=np.where(stands, 0.0, span),
-        late=_in_channels(ways.late, slip, track),
-        carried=_in_channels(ways.carried, slip, track),
+        moving_s=ways.moving_s,
+        late=_lateness(problem, place, jitter),
         seen=seen,
     )
 
 
-def _in_channels(wheels: Floats, slip: float, track: float) -> Floats:
-    """(w, 5) what ways (w, 2) of the wheels come to along, across, around and at each of them."""
-    left, right = wheels.T
-    grip = 1.0 - slip
-    return np.stack(
-        [grip * (left + right) / 2, np.zeros_like(left), grip * (right - left) / track, left, right], axis=1
-    )
+def _lateness(problem: Problem, place: Floats, jitter: float) -> Floats:
+    """(w, 5, 5) covariance of windows by the square of a second of jitter, of the mean of a few robots as well.
+
+    As simulated: no command comes before it is given, and one that comes late enough stays for the next step.
+    """
+    off = np.nan_to_num(replace(problem, jitter=jitter).jittered(place, N_SCATTER))
+    around = np.moveaxis(off - off.mean(axis=0), 0, 1) / jitter
+    return np.asarray((1.0 + 1.0 / N_MEAN) / (N_SCATTER - 1) * np.einsum("wmc,wmd->wcd", around, around))
 
 
 def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats) -> tuple[Floats, float]:
@@ -200,16 +212,53 @@ def draw_posterior(
 
 def widening(scatter: Scatter, slopes: Floats, off: Floats, trial: Ints, noise: Floats) -> Floats:
     """(p,) by how much intervals grow because trials differ by more than the noise says; 1 where they do not."""
-    p = slopes.shape[-1]
     rows = scatter.whitened(slopes, noise)
     left = scatter.whitened(off, noise)
-    prior = PRIOR_PRECISION * np.eye(p)
-    known = rows.reshape(-1, p)
-    inverse = np.linalg.inv(known.T @ known + prior)
-    trials = np.unique(trial)
-    if len(trials) < FEWEST_TRIALS:
+    known = rows.reshape(-1, slopes.shape[-1])
+    pulls = np.array([np.einsum("wcp,wc->p", rows[trial == k], left[trial == k]) for k in np.unique(trial)])
+    return _sandwich(known.T @ known, pulls)
+
+
+def widening_of_noise(
+    scatter: Scatter, off: Floats, trial: Ints, noise: Floats, parameters: Sequence[Parameter]
+) -> Floats:
+    """(q,) the same of the places of the simulator's own noise.
+
+    Channels that one late command moves are no independent witnesses of how late it was.
+
+    Args:
+        scatter, off, trial: Of windows.
+        noise: (n,) all of it.
+        parameters: (n,) likewise; the first q are the simulator's own.
+    """
+    prior, q = NoisePrior.of(parameters), len(MOTION_NOISE)
+    here = prior.places(noise)
+    here[:q] = np.clip(here[:q], 2 * NOISE_STEP, 1.0 - 2 * NOISE_STEP)
+    trials = np.unique(trial, return_inverse=True)[1]
+    steps = NOISE_STEP * np.eye(q, len(here))
+
+    def pulls(place: Floats) -> Floats:
+        rises = [
+            scatter.log_likelihoods(off, prior.at(place + step))
+            - scatter.log_likelihoods(off, prior.at(place - step))
+            for step in steps
+        ]
+        return np.stack([np.bincount(trials, rise) for rise in rises], axis=1) / (2 * NOISE_STEP)
+
+    falls = [(pulls(here - step) - pulls(here + step)).sum(axis=0) for step in steps]
+    known = np.array(falls) / (2 * NOISE_STEP)
+    sizes, vectors = np.linalg.eigh((known + known.T) / 2)
+    own = pulls(here)
+    return _sandwich((vectors * np.maximum(sizes, 0.0)) @ vectors.T, own - own.mean(axis=0))
+
+
+def _sandwich(known: Floats, pulls: Floats) -> Floats:
+    """(p,) from the curvature (p, p) and what each of n trials (n, p) pulls at places."""
+    n, p = pulls.shape
+    if n < FEWEST_TRIALS:
         return np.ones(p)
-    pulls = np.array([np.einsum("wcp,wc->p", rows[trial == k], left[trial == k]) for k in trials])
-    meat = pulls.T @ pulls * len(trials) / (len(trials) - 1.0) + prior
+    prior = PRIOR_PRECISION * np.eye(p)
+    inverse = np.linalg.inv(known + prior)
+    meat = pulls.T @ pulls * n / (n - 1.0) + prior
     ratio = np.diag(inverse @ meat @ inverse) / np.diag(inverse)
     return np.asarray(np.sqrt(np.maximum(ratio, 1.0)))

@@ -1,4 +1,4 @@
-"""How far wheels drive in each window, and what a late command changes of it: what noise of `sim` grows with."""
+"""How far wheels drive in each window: what noise of `sim` grows with."""
 
 from __future__ import annotations
 
@@ -14,27 +14,32 @@ from ._simulate import Floats, Simulate, motor_noise, plain_numbers, starts_of
 from ._windows import Windows
 
 LEAST_LAG = 1e-6  # [s] what stands for none
+STANDS = 1e-3  # [m/s] of the wheels, below which no noise goes on, as in kernels/_sim_drive.py
+N_DELAYS = 9  # between the least and the most that a command may be late
 
 
 @dataclass(frozen=True)
 class WheelWays:
-    """Of w windows and both wheels.
+    """Of w windows, in the mean over how late commands may be.
 
     Attributes:
-        way: (w, 2) there and back added up [m]: the way until a command is heard, and the way after it.
-        late: (w, 2) what a second of delay of the window's own commands changes [m/s].
-        carried: (w, 2) what a second of delay of the command before changes, by the speed that is left of it [m/s].
+        way: (w, 2) of both wheels, there and back added up [m]: the way until a command is heard, and the way after it.
+        moving_s: (w,) how long a wheel turns, in whole steps [s].
     """
 
     way: Floats
-    late: Floats
-    carried: Floats
+    moving_s: Floats
 
 
 def wheel_ways(
-    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
+    simulate: Simulate,
+    robot: RobotModel,
+    known: Known,
+    windows: Windows,
+    values: Mapping[str, Floats],
+    jitter: float,
 ) -> WheelWays:
-    """With one set of parameters, from what the wheels would drive without delay and lag.
+    """With one set of parameters and a jitter [s], from what the wheels would drive without delay and lag.
 
     A wheel keeps its old target until the command is heard, and nears each exponentially, as in `kernels._sim_drive`.
     """
@@ -46,13 +51,17 @@ def wheel_ways(
     delay, lag = (
         float(values[name][0]) if name in values else now[name] for name in ("drive.delay", "drive.lag")
     )
-    ways = np.stack(_rolled(target, delay, max(lag, LEAST_LAG), windows.step_s))
-    total = np.concatenate([np.zeros_like(ways[:, :, :1]), np.cumsum(ways, axis=2)], axis=2)
-    return WheelWays(*(total[:, windows.trial, windows.last] - total[:, windows.trial, windows.first]))
+    delays = np.maximum(delay + jitter * np.linspace(-1.0, 1.0, 2 * N_DELAYS + 1)[1::2], 0.0)
+    ways = np.stack([_rolled(target, late, max(lag, LEAST_LAG), windows.step_s) for late in delays])
+    moving = windows.step_s * (ways.mean(axis=-1, keepdims=True) > STANDS * windows.step_s)
+    steps = np.concatenate([ways, moving], axis=-1).mean(axis=0)
+    total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
+    found = total[windows.trial, windows.last] - total[windows.trial, windows.first]
+    return WheelWays(found[:, :2], found[:, 2])
 
 
-def _rolled(target: Floats, delay: float, lag: float, step_s: float) -> tuple[Floats, Floats, Floats]:
-    """(k, t, 2) ways, and what lateness of a step and of the one before it changes; from targets [m/s]."""
+def _rolled(target: Floats, delay: float, lag: float, step_s: float) -> Floats:
+    """(k, t, 2) ways from targets [m/s]."""
     whole = int(delay / step_s)
     first = delay - whole * step_s
     last = step_s - first
@@ -66,8 +75,4 @@ def _rolled(target: Floats, delay: float, lag: float, step_s: float) -> tuple[Fl
             steps += np.abs(to * time + (speed - to) * lag * (1.0 - left))
             speed = to + (speed - to) * left
         way[:, k] = steps
-    change = -np.diff(padded, axis=1)[:, : target.shape[1]]
-    faded = np.exp(-last / lag)
-    carried = np.zeros_like(change)
-    carried[:, 1:] = change[:, :-1] * faded * (1.0 - np.exp(-step_s / lag))
-    return way, change * (1.0 - faded), carried
+    return way

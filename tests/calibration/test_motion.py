@@ -42,10 +42,10 @@ def test_intervals_hold_what_is_true() -> None:
 
 
 @pytest.mark.long
-def test_intervals_hold_what_is_true_in_80_to_95_of_100() -> None:
-    """40 robots with 14 parameters each: noise takes some of 90 in 100 away (see the page on calibration)."""
+def test_intervals_hold_what_is_true_in_85_to_95_of_100() -> None:
+    """40 robots: chance alone keeps 560 intervals of 90 % between 85 and 95 in 100, 999 times of 1000."""
     inside, total = _covered(range(100, 140))
-    assert 0.80 <= inside / total <= 0.95
+    assert 0.85 <= inside / total <= 0.95
 
 
 def test_gains_and_track_come_out_within_a_percent_of_what_is_possible() -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
 import numpy as np
-from scipy.special import ndtri, stdtrit
 
 from realitygap.records import Observe, ObservedTrial
 from realitygap.world import Arena, RobotModel
@@ -31,8 +30,9 @@ METHOD = (
 WINDOW = 1  # commands: pushes are not linear, and longer ones less so
 FREEDOM = 4.0  # degrees, of the t distribution
 REACHES = (0.12, 0.04, 0.02)  # from where draws begin, in turn with what noise makes of windows
-N_PLACES = 500  # of each look around
+N_PLACES = 300  # of each look around
 N_NOISY = 100  # robots that show it
+N_MEAN = 6  # and what it does in the mean
 LEAST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] of that scale
 PLACES = (0.15, 0.4, 0.65, 0.9)  # of each parameter, from which a fit begins where they come closest
 FLIPS = 5.0  # robust standard deviations: beyond it a window took the other way at a border
@@ -86,19 +86,6 @@ def fit_contact(
     return _report(problem, noise, np.random.default_rng(seed), encounters_of(seen, robot, arena))
 
 
-@dataclass(frozen=True)
-class Expected:
-    """How windows differ from those of a robot without noise.
-
-    Attributes:
-        shift: (w, 3) in the mean: a wall that is met by chance turns a robot one way only.
-        scale: (w, 3) typically.
-    """
-
-    shift: Floats
-    scale: Floats
-
-
 def _off(problem: Problem, places: Floats) -> Floats:
     """(m, w, 3) by which poses are off."""
     return np.nan_to_num(problem.off(places)[..., :3])
@@ -113,41 +100,47 @@ def _first_place(problem: Problem) -> Floats:
     return np.asarray(places[int(np.argmin(cost))])
 
 
-def _expected(problem: Problem, noise: Mapping[str, float], place: Floats) -> Expected:
-    """What the noise of the drive makes of windows at a place, and by how much more they differ from what was seen."""
-    off = _off(problem, place[None])[0]
-    moved = _off(problem.fixed_at(**noise), np.repeat(place[None], N_NOISY, axis=0)) - off
-    moved[..., 2] = wrapped(moved[..., 2])
-    shift, scale = moved.mean(axis=0), np.sqrt(moved.var(axis=0) + LEAST**2)
-    return Expected(shift, scale * np.maximum(MAD * np.median(np.abs(off + shift) / scale, axis=0), 1.0))
+def _mean_off(noisy: Problem, places: Floats) -> Floats:
+    """(m, w, 3) by which poses are off in the mean: a wall that is met by chance turns a robot one way only."""
+    all_off = (np.nan_to_num(noisy.with_noise(places, key)[..., :3]) for key in range(1, N_MEAN + 1))
+    mean = next(all_off)
+    for n, off in enumerate(all_off, 2):
+        further = off - mean
+        further[..., 2] = wrapped(further[..., 2])
+        mean += further / n
+    return mean
 
 
-def _log_likelihoods(problem: Problem, expected: Expected, places: Floats) -> Floats:
+def _scale(noisy: Problem, place: Floats) -> Floats:
+    """(w, 3) of differences: what noise makes of windows, and by how much more they differ from what was seen."""
+    off = _mean_off(noisy, place[None])[0]
+    around = _off(noisy, np.repeat(place[None], N_NOISY, axis=0)) - off
+    around[..., 2] = wrapped(around[..., 2])
+    scale = np.sqrt((1.0 + 1.0 / N_MEAN) * (around**2).mean(axis=0) + LEAST**2)
+    return np.asarray(scale * np.maximum(MAD * np.median(np.abs(off) / scale, axis=0), 1.0))
+
+
+def _log_likelihoods(noisy: Problem, scale: Floats, places: Floats) -> Floats:
     """(m, k) of the trials' windows, whose differences have a t distribution: some go another way altogether."""
-    squares = (((_off(problem, places) + expected.shift) / expected.scale) ** 2).sum(axis=-1)
+    squares = ((_mean_off(noisy, places) / scale) ** 2).sum(axis=-1)
     logs = -0.5 * (FREEDOM + 3.0) * np.log1p(squares / FREEDOM)
-    trials = np.unique(problem.windows.trial)
-    return np.stack([logs[:, problem.windows.trial == k].sum(axis=1) for k in trials], axis=1)
-
-
-def _few(n: int) -> float:
-    """By how much draws that weigh n trials anew spread too little: Student's interval over the normal one."""
-    return float(stdtrit(n - 1, 0.95) / ndtri(0.95) * np.sqrt(n / (n - 1))) if n > 1 else 1.0
+    trials = np.unique(noisy.windows.trial)
+    return np.stack([logs[:, noisy.windows.trial == k].sum(axis=1) for k in trials], axis=1)
 
 
 def _report(
     problem: Problem, noise: Mapping[str, float], rng: np.random.Generator, encounters: Encounters
 ) -> MotionFit:
     place = _first_place(problem)
-    expected = _expected(problem, noise, place)
+    noisy = problem.fixed_at(**noise)
+    scale = _scale(noisy, place)
     for reach in REACHES:
         places = sample_clusters(
-            rng, place, partial(_log_likelihoods, problem, expected), N_DRAWS, reach, N_PLACES
+            rng, place, partial(_log_likelihoods, noisy, scale), N_DRAWS, reach, N_PLACES
         )
         place = np.median(places, axis=0)
-        expected = _expected(problem, noise, place)
-    places = np.clip(place + _few(len(np.unique(problem.windows.trial))) * (places - place), 0.0, 1.0)
-    off, scale = _off(problem, place[None])[0] + expected.shift, expected.scale
+        scale = _scale(noisy, place)
+    off = _mean_off(noisy, place[None])[0]
     typical = np.median(scale, axis=0).tolist()
     draws = values_at(problem.free, places)
     best = {name: float(value[0]) for name, value in values_at(problem.free, place[None]).items()}

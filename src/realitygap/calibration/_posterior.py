@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr, ndtri, stdtrit
 
 from ._scatter import NoisePrior
 from ._simulate import Floats, Ints
@@ -138,13 +138,27 @@ def sample_clusters(
         logs = np.concatenate([logs, found]) if logs.size else found
         drawn = places[_weighed_anew(rng, heat * logs, proposed, n)]
         center, spread = drawn.mean(axis=0), WIDER * np.cov(drawn.T).reshape(p, p)
-    return np.asarray(places[_weighed_anew(rng, logs, proposed, n_draws)])
+    k = logs.shape[1]
+    if k == 1:
+        return np.asarray(places[_weighed_anew(rng, logs, proposed, n_draws)])
+    # the best by each set of weights: with draws around it, too, what is not known would count twice
+    best = places[np.argmax(_shares(rng, n_draws, k) @ logs.T, axis=1)]
+    middle = np.median(best, axis=0)
+    return np.asarray(np.clip(middle + _few(k) * (best - middle), 0.0, 1.0))
+
+
+def _shares(rng: np.random.Generator, n: int, k: int) -> Floats:
+    """(n, k) weights of clusters."""
+    return np.asarray(k * rng.dirichlet(np.ones(k), n))
+
+
+def _few(k: int) -> float:
+    """By how much k clusters that are weighed anew spread too little: Student's interval over the normal one."""
+    return float(stdtrit(k - 1, 0.95) / ndtri(0.95) * np.sqrt(k / (k - 1)))
 
 
 def _weighed_anew(rng: np.random.Generator, logs: Floats, proposed: Floats, n: int) -> Ints:
     """(n,) which of the places, each with other weights (Dirichlet) of the clusters."""
-    k = logs.shape[1]
-    shares = k * rng.dirichlet(np.ones(k), n)
-    scores = shares @ logs.T - proposed
+    scores = _shares(rng, n, logs.shape[1]) @ logs.T - proposed
     picks = scores + rng.gumbel(size=scores.shape)  # draws in proportion to the exponentials
     return np.asarray(np.argmax(picks, axis=1), np.int64)

@@ -71,10 +71,14 @@ class Problem:
         off[..., 2] = off[:1, :, 2] + wrapped(off[..., 2] - off[:1, :, 2])
         return off
 
-    def _off(self, places: Floats) -> Floats:
+    def with_noise(self, places: Floats, key: int) -> Floats:
+        """(m, w, 5) the same with the noise that is among what is fixed; one key has the same noise at all places."""
+        return self._off(places, key)
+
+    def _off(self, places: Floats, same_noise: int | None = None) -> Floats:
         values = values_at(self.free, places)
         values |= {name: np.full(len(places), value) for name, value in self.fixed.items()}
-        simulated = simulate_windows(self.simulate, self.robot, self.known, self.windows, values)
+        simulated = simulate_windows(self.simulate, self.robot, self.known, self.windows, values, same_noise)
         return differences(self.robot, self.windows, simulated, values)
 
     def slopes(self, place: Floats) -> Floats:

@@ -58,6 +58,7 @@ class Simulate(Protocol):
         *,
         anchors: Floats | None = None,
         keep: Sequence[str] = ("poses", "wheels", "stalled"),
+        same_noise: bool = False,
     ) -> Rehearsed:
         """Carry out k trials with each of m sets of numbers.
 
@@ -68,6 +69,7 @@ class Simulate(Protocol):
             key: Of the random numbers.
             anchors: (k, t + 1, 3) where the robot is put back to before a command; not a number for nowhere.
             keep: Of what every step is kept.
+            same_noise: Whether all sets draw the same random numbers; each its own otherwise.
         """
         ...
 

@@ -122,9 +122,17 @@ def is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
 
 
 def simulate_windows(
-    simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, values: Mapping[str, Floats]
+    simulate: Simulate,
+    robot: RobotModel,
+    known: Known,
+    windows: Windows,
+    values: Mapping[str, Floats],
+    same_noise: int | None = None,
 ) -> Simulated:
-    """Each window from where the robot was seen at its beginning, without noise, with each of m sets of parameters."""
+    """Each window from where the robot was seen at its beginning, with each of m sets of parameters.
+
+    Without noise, where the values have none; with the same for all sets, where a key is given.
+    """
     m = len(next(iter(values.values())))
     numbers = dict.fromkeys(motor_noise(robot), np.zeros(m)) | robot_numbers(known, robot, values)
     has_poses = bool(np.isfinite(windows.anchors).any())
@@ -132,9 +140,10 @@ def simulate_windows(
         starts_of(windows.trials),
         windows.commands,
         numbers,
-        0,
+        same_noise or 0,
         anchors=windows.anchors if has_poses else None,
         keep=("poses", "wheels"),
+        same_noise=same_noise is not None,
     )
     wheels = np.asarray(done.wheels, np.float64)
     return Simulated(

@@ -141,7 +141,7 @@ class Served:
             time.sleep(0.1)
         self.lab.go_on("watched", port=PORT, counts="page", when="sheet", witness="")
         self._until(lambda job: job.ask and job.ask["question"] == "place")
-        self._job.answer()
+        self._job.answer(self._job.ask["number"])
         self._until(lambda job: job.step)
 
     def window(self, seconds: float) -> dict[str, float]:

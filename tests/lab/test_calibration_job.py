@@ -20,6 +20,11 @@ def asked(job: CalibrationJob, question: str) -> dict[str, Any]:
     return job.ask
 
 
+def answer(job: CalibrationJob, **values: Any) -> None:
+    assert job.ask is not None
+    assert job.answer(job.ask["number"], **values)
+
+
 def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path):
     with serve_tcp(Emulator("s2"), speed=20) as server:
         order = {
@@ -33,14 +38,14 @@ def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path):
         job = CalibrationJob(order, tmp_path, lambda: None)
         assert "24 in free ahead" in asked(job, "place")["text"]
         assert job.has_robot
-        job.answer(answer="go")
+        answer(job, answer="go")
         assert set(asked(job, "measure")["questions"]) == {"ahead", "left", "turned"}
-        job.answer(ahead="a lot", left="0", turned="0")
+        answer(job, ahead="a lot", left="0", turned="0")
         wait_for(lambda: job.ask is not None and bool(job.ask.get("said")))
         assert "13 3/4" in asked(job, "measure")["said"]
-        job.answer(ahead="13 3/4", left="-1/8", turned="2")
+        answer(job, ahead="13 3/4", left="-1/8", turned="2")
         asked(job, "place")
-        job.answer(answer="stop")
+        answer(job, answer="stop")
         wait_for(lambda: job.is_over)
         assert not job.is_failed
         (kept,) = read_observations(tmp_path / "mine.trials.jsonl").trials

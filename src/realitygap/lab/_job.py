@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -40,6 +41,7 @@ class Job:
         self.ask: dict[str, Any] | None = None
         self.outcome: str | None = None
         self.is_failed = False
+        self._asking = threading.Lock()
         self._changed = changed
         self._child = Child(order, root, self._hear)
 
@@ -48,12 +50,16 @@ class Job:
         """Whether it has ended."""
         return self.outcome is not None
 
-    def answer(self, **values: Any) -> bool:
-        """Answer what is asked; False where somebody else has done so already."""
-        ask, self.ask = self.ask, None
-        if ask is None:
-            return False
-        self._child.tell({"do": "answer", "number": ask["number"], **values})
+    def answer(self, number: int, **values: Any) -> bool:
+        """Answer the question of this number; False where it is not asked any more.
+
+        A tap belongs to the question that it was made for: a second one must not answer what is asked next.
+        """
+        with self._asking:
+            if self.ask is None or self.ask["number"] != number:
+                return False
+            self.ask = None
+        self._child.tell({"do": "answer", "number": number, **values})
         self._changed()
         return True
 
@@ -75,11 +81,13 @@ class Job:
             self._changed()
 
     def _on_ask(self, message: dict[str, Any]) -> None:
-        self.ask = message
+        with self._asking:
+            self.ask = message
 
     def _on_answered(self, message: dict[str, Any]) -> None:
-        if self.ask is not None and self.ask["number"] == message["number"]:
-            self.ask = None
+        with self._asking:
+            if self.ask is not None and self.ask["number"] == message["number"]:
+                self.ask = None
 
     def _on_error(self, message: dict[str, Any]) -> None:
         self.outcome, self.is_failed = message["text"], True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
@@ -14,6 +15,7 @@ from realitygap.world import load_arena
 
 from ._frame import framed, hint, section, text_of, told, visitor_of, watching, whole_of
 from ._grid import CellGrid
+from ._part import Part
 
 _KINDS = {
     "path": "path: the paper's, five full steps ahead and five turning",
@@ -50,20 +52,32 @@ class _Page:
         self._work, self._plot, self._made = (
             ui.refreshable(show) for show in (self._show_work, self._show_plot, self._show_made)
         )
+        self._asked = Part(self._asked_stand, _show_question)
+        self._seen = self._stand()
         with ui.column().classes("lab-cards"):
             self._work()
+            self._asked.show()
             self._plot()
             self._made()
-        self._seen = self._stand()
         watching(self._lab, self._look)
 
     def _stand(self) -> Any:
         job = self._lab.calibration
         if job is None:
             return None
-        return id(job), job.n_done, job.n_trials, job.ask, job.outcome, self._lab.operator, len(job.readings)
+        return id(job), job.n_done, job.n_trials, job.outcome, self._lab.operator, len(job.readings)
+
+    def _asked_stand(self) -> tuple[CalibrationJob, dict[str, Any]] | None:
+        """What it asks this visitor."""
+        job = self._lab.calibration
+        ask = None if job is None or job.is_over else job.ask
+        return None if job is None or ask is None or not self._may(job) else (job, ask)
+
+    def _may(self, job: CalibrationJob) -> bool:
+        return not job.has_robot or self._lab.may_operate(self._visitor)
 
     def _look(self) -> None:
+        self._asked.look()
         before, now, job = self._seen, self._stand(), self._lab.calibration
         if now == before or job is None:
             return
@@ -116,13 +130,11 @@ class _Page:
         share = job.n_done / max(job.n_trials, 1)
         ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % of the trials"')
         ui.label(f"{job.n_done} of {job.n_trials} trials" if job.n_trials else "Getting ready ...")
-        may = not job.has_robot or self._lab.may_operate(self._visitor)
+        may = self._may(job)
         if not may:
             with ui.row().classes("lab-row"):
                 ui.label(f"{self._lab.operator_name} has the robot; you are watching.")
                 ui.button("Take the robot over", on_click=self._take_over).props("outline no-caps")
-        if job.ask is not None and may:
-            _show_question(job)
         if not job.is_over:
             ui.button("Stop for now", on_click=job.ask_to_end).props("outline no-caps").set_enabled(may)
 
@@ -142,17 +154,22 @@ class _Page:
             _show_fit(job.made)
 
 
-def _show_question(job: CalibrationJob) -> None:
-    ask = job.ask or {}
+def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
+    if asked is None:
+        return
+    job, ask = asked
+
+    def answer(**values: Any) -> None:
+        if not job.answer(ask["number"], **values):
+            ui.notify("That has been answered already.")
+
     with ui.card().classes("lab-card lab-question").props('role="status"'):
         if ask["question"] == "place":
             ui.label(f"Trial {ask['trial'] + 1} of {ask['n']}").classes("lab-section")
             ui.label(ask["text"][:1].upper() + ask["text"][1:])
             with ui.row().classes("lab-row"):
-                ui.button("It stands there", on_click=lambda: job.answer(answer="go")).props(
-                    "unelevated no-caps"
-                )
-                ui.button("Take the one before back", on_click=lambda: job.answer(answer="redo")).props(
+                ui.button("It stands there", on_click=lambda: answer(answer="go")).props("unelevated no-caps")
+                ui.button("Take the one before back", on_click=lambda: answer(answer="redo")).props(
                     "outline no-caps"
                 ).set_enabled(ask["trial"] > 0)
         elif ask["question"] == "measure":
@@ -160,21 +177,20 @@ def _show_question(job: CalibrationJob) -> None:
             ui.label(ask["said"]).classes("lab-problem")
             with ui.row().classes("lab-row"):
                 ui.button(
-                    "Enter",
-                    on_click=lambda: job.answer(**{key: text_of(each) for key, each in fields.items()}),
+                    "Enter", on_click=lambda: answer(**{key: text_of(each) for key, each in fields.items()})
                 ).props("unelevated no-caps")
-                ui.button("Drive it again", on_click=lambda: job.answer(redo=True)).props("outline no-caps")
+                ui.button("Drive it again", on_click=lambda: answer(redo=True)).props("outline no-caps")
         else:
-            _ask_cells(job)
+            _ask_cells(answer)
 
 
-def _ask_cells(job: CalibrationJob) -> None:
+def _ask_cells(answer: Callable[..., None]) -> None:
     found: list[int] = []
     ui.label("Which cells does its line cross?").classes("lab-section")
     CellGrid(
         load_arena("paper"), name="Cells crossed", change=lambda cells: found.__setitem__(slice(None), cells)
     )
-    ui.button("Enter this count", on_click=lambda: job.answer(cells=list(found))).props("unelevated no-caps")
+    ui.button("Enter this count", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
 
 
 def _grow(chart: ui.echart, job: CalibrationJob) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 from nicegui import ui
 
 from realitygap.lab._counts import Counts
-from realitygap.lab._lab import Lab
 from realitygap.lab._study_job import StudyJob
 
 from ._frame import hint
@@ -18,16 +17,22 @@ LIVE_S = 0.05
 
 
 class Driving:
-    """Shows a trial while it is driven; the abort is for everyone."""
+    """Shows a trial while it is driven; the abort is for everyone.
 
-    def __init__(self, lab: Lab, job: StudyJob, counts: Counts) -> None:
-        self._lab, self._job, self._counts = lab, job, counts
+    Args:
+        job: The study at work.
+        card: Of the trial.
+        counts: The study's trials.
+    """
+
+    def __init__(self, job: StudyJob, card: dict[str, Any], counts: Counts) -> None:
+        self._job, self._card, self._counts = job, card, counts
         self._n_shown = -1
         self._n_points = 0
 
     def show(self) -> None:
         """Show it."""
-        card: dict[str, Any] = self._job.card or {}
+        card = self._card
         arena = self._counts.arena(self._counts.trial(card["trial"]).trial.condition)
         with ui.card().classes("lab-card lab-question"):
             ui.label(f"Trial {card['trial']} is being driven").classes("lab-section").props('role="status"')
@@ -42,7 +47,7 @@ class Driving:
 
     def _look(self) -> None:
         job = self._job
-        if job.n_live == self._n_shown or job.card is None:
+        if job.n_live == self._n_shown or job.card is not self._card:
             return
         self._n_shown = job.n_live
         step = job.step

@@ -15,18 +15,18 @@ from ._frame import hint
 from ._grid import CellGrid, ink_of
 
 
-def show_question(job: StudyJob, counts: Counts, *, may: bool, jump: Callable[[int], Any]) -> None:
+def show_question(
+    job: StudyJob, ask: dict[str, Any], counts: Counts, *, may: bool, jump: Callable[[int], Any]
+) -> None:
     """Show what a study waits for.
 
     Args:
         job: The study at work.
+        ask: What it asks.
         counts: Its trials.
         may: Whether this visitor may answer.
         jump: Shows a trial to be counted.
     """
-    ask = job.ask
-    if ask is None:
-        return
     with ui.card().classes("lab-card lab-question").props(f'role="status" data-asked="{ask["number"]}"'):
         show = {
             "meet": _meet,
@@ -54,14 +54,14 @@ class _Asked:
         found: dict[str, Any] = self.ask["card"]
         return found
 
+    def answer(self, **values: Any) -> None:
+        """Answer it."""
+        if not self.job.answer(self.ask["number"], **values):
+            ui.notify("That has been answered already.")
+
     def button(self, text: str, *, is_main: bool = True, **values: Any) -> None:
         """One that answers."""
-
-        def answer() -> None:
-            if not self.job.answer(**values):
-                ui.notify("Somebody else has answered.")
-
-        ui.button(text, on_click=answer).props(
+        ui.button(text, on_click=lambda: self.answer(**values)).props(
             ("unelevated" if is_main else "outline") + " no-caps"
         ).set_enabled(self.may)
 
@@ -135,7 +135,7 @@ def _close(asked: _Asked) -> None:
         each = asked.counts.trial(number)
         with ui.row().classes("lab-row"):
             ui.label(f"Trial {number}, {each.pen}: {len(each.trial.cells or ())} cells by {each.first}")
-            ui.button("Take back", on_click=lambda number=number: asked.job.answer(undo=number)).props(
+            ui.button("Take back", on_click=lambda number=number: asked.answer(undo=number)).props(
                 f'flat dense no-caps aria-label="Take back the score of trial {number}"'
             ).set_enabled(asked.may)
     asked.button("Close the generation")

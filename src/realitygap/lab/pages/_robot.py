@@ -45,10 +45,10 @@ class _Page:
         self._n_points = 0
 
     def show(self) -> None:
+        self._seen = self._stand()
         self._part = ui.refreshable(self._show)
         with ui.column().classes("lab-cards"):
             self._part()
-        self._seen = self._stand()
         watching(self._lab, self._look)
         ui.timer(LIVE_S, self._live)
 

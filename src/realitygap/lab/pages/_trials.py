@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from nicegui import ui
@@ -17,6 +18,7 @@ from realitygap.robots.scribbler import find_ports
 from ._counting import Counting
 from ._driving import Driving
 from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, told, visitor_of, watching
+from ._part import Part
 from ._photos import SheetPhotos
 from ._questions import show_question
 from ._videos import Videos
@@ -66,9 +68,13 @@ class _Page:
         hint(
             "It stands in the ledger with whatever you enter. Two people who count the same trials have two names."
         )
-        self._robot = ui.refreshable(self._show_robot)
+        self._robot = Part(self._robot_stand, self._show_robot)
+        self._asked = Part(self._asked_stand, self._show_asked)
+        self._ending = Part(self._may_end, self._show_ending)
         with ui.element("section").props('aria-label="Robot"').classes("lab-part"):
-            self._robot()
+            section("Robot")
+            for part in (self._robot, self._asked, self._ending):
+                part.show()
         self._photos = ui.refreshable(self._sheets.show)
         self._photo_part = ui.element("section").props('aria-label="Photos of sheets"').classes("lab-part")
         with self._photo_part:
@@ -84,27 +90,15 @@ class _Page:
         with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
             self._table()
             self._show_note()
-        self._seen: Any = self._stand()
         self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
         self._listed = self._counts.trials()
         watching(self._lab, self._look)
         ui.timer(1.0, self._look)  # another program may write to the ledger
 
-    def _stand(self) -> Any:
-        job = self._lab.jobs.get(self._name)
-        shown = (
-            None
-            if job is None
-            else (id(job), job.ask, job.card, job.outcome, job.label, job.preflight, job.said)
-        )
-        return shown, self._lab.operator, self._lab.has_robot
-
     def _look(self) -> None:
         """Show anew what has changed; what somebody is tapping stays as it is."""
-        now = self._stand()
-        if now != self._seen:
-            self._seen = now
-            self._robot.refresh()
+        for part in (self._robot, self._asked, self._ending):
+            part.look()
         if self._counts.trials() is not self._listed:
             self._listed = self._counts.trials()
             self._counting.refresh()
@@ -133,40 +127,69 @@ class _Page:
 
     # the robot
 
-    def _show_robot(self) -> None:
-        job = self._lab.jobs.get(self._name)
-        section("Robot")
-        if job is not None and job.outcome is not None:
-            ui.label(job.outcome).classes("lab-problem" if job.is_failed else "").props('role="status"')
-        if job is None or job.is_over or not job.port:
+    def _job(self) -> StudyJob | None:
+        """The job of this study that a robot is in use for."""
+        job = self._lab.job(self._name)
+        return job if job is not None and job.port else None
+
+    def _may(self) -> bool:
+        return self._lab.may_operate(self._visitor)
+
+    def _robot_stand(self) -> _RobotStand:
+        job, last = self._job(), self._lab.jobs.get(self._name)
+        return _RobotStand(
+            job,
+            outcome="" if last is None else last.outcome or "",
+            is_failed=last is not None and last.is_failed,
+            label="" if job is None else job.label,
+            preflight=None if job is None else job.preflight,
+            said="" if job is None else job.said,
+            operator="" if job is None or self._may() else self._lab.operator_name,
+        )
+
+    def _show_robot(self, now: _RobotStand) -> None:
+        """Which robot drives, for whom; before, how to begin."""
+        job = now.job
+        if job is None:
+            if now.outcome:
+                ui.label(now.outcome).classes("lab-problem" if now.is_failed else "").props('role="status"')
             self._show_beginning()
             return
-        ui.label(f"{job.label or 'Connecting to the robot'} at {job.port}")
-        if job.preflight is not None:
-            self._show_preflight(job)
-        if job.said:
-            ui.label(job.said).classes("lab-problem").props('role="status"')
-        may = self._lab.may_operate(self._visitor)
-        if not may:
+        ui.label(f"{now.label or 'Connecting to the robot'} at {job.port}")
+        if now.preflight is not None:
+            _show_preflight(now.preflight)
+        if now.said:
+            ui.label(now.said).classes("lab-problem").props('role="status"')
+        if now.operator:
             with ui.row().classes("lab-row"):
-                ui.label(f"{self._lab.operator_name} has the robot; you are watching.")
+                ui.label(f"{now.operator} has the robot; you are watching.")
                 ui.button("Take the robot over", on_click=self._take_over).props("outline no-caps")
-        if job.ask is not None:
-            show_question(job, self._counts, may=may, jump=self._counting.choose)
-        elif job.is_driving:
-            Driving(self._lab, job, self._counts).show()
+
+    def _asked_stand(self) -> _AskedStand:
+        job = self._job()
+        if job is None:
+            return _AskedStand(None)
+        return _AskedStand(job, job.ask, job.card, self._may())
+
+    def _show_asked(self, now: _AskedStand) -> None:
+        """What it waits for; else the trial that goes on."""
+        if now.job is None:
+            return
+        if now.ask is not None:
+            show_question(now.job, now.ask, self._counts, may=now.may, jump=self._counting.choose)
+        elif now.card is not None:
+            Driving(now.job, now.card, self._counts).show()
         else:
             ui.label("Getting ready ...").props('role="status"')
-        ui.button("End the sitting", on_click=job.ask_to_end).props("flat no-caps").set_enabled(may)
 
-    def _show_preflight(self, job: StudyJob) -> None:
-        found = job.preflight or {}
-        n_problems = len(found["problems"])
-        with ui.expansion(f"Pre-flight: {n_problems or 'nothing'} against driving").classes("lab-expansion"):
-            for name, value in found["facts"].items():
-                ui.label(f"{name}: {value}")
-            for problem in found["problems"]:
-                ui.label(problem).classes("lab-problem")
+    def _may_end(self) -> _AskedStand:
+        return _AskedStand(self._job(), may=self._may())
+
+    def _show_ending(self, now: _AskedStand) -> None:
+        if now.job is not None:
+            ui.button("End the sitting", on_click=now.job.ask_to_end).props("flat no-caps").set_enabled(
+                now.may
+            )
 
     def _show_beginning(self) -> None:
         """What to say before a robot drives."""
@@ -303,3 +326,35 @@ class _Page:
         if told(lambda: self._counts.note(None, text_of(field), self._visitor.who)):
             field.value = ""
             ui.notify("Noted.")
+
+
+@dataclass(frozen=True)
+class _RobotStand:
+    """What is to be said of a robot, or of the last sitting."""
+
+    job: StudyJob | None
+    outcome: str
+    is_failed: bool
+    label: str
+    preflight: dict[str, Any] | None
+    said: str
+    operator: str
+
+
+@dataclass(frozen=True)
+class _AskedStand:
+    """What a study asks, or the trial that goes on, and whether this visitor may answer."""
+
+    job: StudyJob | None
+    ask: dict[str, Any] | None = None
+    card: dict[str, Any] | None = None
+    may: bool = False
+
+
+def _show_preflight(found: dict[str, Any]) -> None:
+    n_problems = len(found["problems"])
+    with ui.expansion(f"Pre-flight: {n_problems or 'nothing'} against driving").classes("lab-expansion"):
+        for name, value in found["facts"].items():
+            ui.label(f"{name}: {value}")
+        for problem in found["problems"]:
+            ui.label(problem).classes("lab-problem")

@@ -16,6 +16,7 @@ from realitygap.lab._study_job import StudyJob
 
 from ._driving import Driving
 from ._frame import framed, hint, section, text_of, told, watching, whole_of
+from ._part import Part
 from ._player import LivePlayer, Player
 
 LOOK_S = 1.0
@@ -86,8 +87,9 @@ class _Page:
         self._bar = ui.linear_progress(0, show_value=False)
         self._said = ui.label("").props('role="status"')
         self._show_progress()
-        self._drive = ui.refreshable(self._show_driving)
-        self._drive()
+        self._n_drawn, self._lived = self._watcher.n_drawn, self._live_stand()
+        self._drive = Part(self._driven, self._show_driving)
+        self._drive.show()
         self._figures = ui.refreshable(self._show_figures)
         with ui.column().classes("lab-cards"):
             self._figures()
@@ -96,8 +98,6 @@ class _Page:
             ui.button("Write the report", on_click=self._watcher.write_report).props("outline no-caps")
             self._report = ui.refreshable(self._show_report)
             self._report()
-        self._n_drawn, self._card = self._watcher.n_drawn, self._job_card()
-        self._lived = self._live_stand()
         self._look_at_figures()
         watching(self._lab, self._look)
         ui.timer(LOOK_S, self._look_at_disk)
@@ -107,15 +107,15 @@ class _Page:
     def _job(self) -> StudyJob | None:
         return self._lab.jobs.get(self._name)
 
-    def _job_card(self) -> Any:
+    def _driven(self) -> tuple[StudyJob, dict[str, Any]] | None:
+        """The trial that is being driven."""
         job = self._job()
-        return None if job is None or not job.is_driving else job.card
+        card = None if job is None or job.is_over else job.card
+        return None if job is None or card is None else (job, card)
 
     def _look(self) -> None:
         self._show_progress()
-        if self._card != self._job_card():
-            self._card = self._job_card()
-            self._drive.refresh()
+        self._drive.look()
         if self._n_drawn != self._watcher.n_drawn:
             self._n_drawn = self._watcher.n_drawn
             self._figures.refresh()
@@ -161,10 +161,9 @@ class _Page:
             said.append(f"{rate:,.0f} runs/s, {(state.n_runs - n_done) / rate:,.0f} s left")
         self._said.text = "; ".join(said) or "Nothing yet."
 
-    def _show_driving(self) -> None:
-        job = self._job()
-        if job is not None and job.is_driving:
-            Driving(self._lab, job, self._lab.counts(self._name)).show()
+    def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:
+        if driven is not None:
+            Driving(*driven, self._lab.counts(self._name)).show()
 
     # figures
 

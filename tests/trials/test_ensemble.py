@@ -90,6 +90,22 @@ def test_sets_that_do_not_fit_are_refused(ensemble):
         ensemble.replay([START] * 2, np.ones((1, 5, 2)), {}, 1)
 
 
+def test_each_robot_does_what_sim_does_with_its_numbers_beside_all_others() -> None:
+    """Pressed at a wall, where the parts show into which a step is cut."""
+    values = {"drive.gain_left": [0.4, 1.0, 1.6, 0.4], "drive.lag": [0.0, 0.1, 0.1, 0.0]}
+    starts, commands = np.array([[0.3, 0.3, 0.8]]), np.tile([0.7, 0.3], (1, 30, 1))
+    ranges = {"drive.gain_left": (0.2, 2.0), "drive.gain_right": (0.2, 2.0)}
+    together = SimEnsemble(SimPlatform(noise=False), paper_arena(), ranges=ranges, threads=2).replay(
+        starts, commands, values, 0
+    )
+    for m in range(4):
+        own = {name: value[m] for name, value in values.items()}
+        alone = SimEnsemble(SimPlatform(noise=False, set=own), paper_arena()).replay(starts, commands, {}, 0)
+        assert np.array_equal(together.poses[m], alone.poses[0])
+        assert np.array_equal(together.cells[m], alone.cells[0])
+    assert together.stalled[1:3].any(axis=(1, 2)).all()
+
+
 def test_numbers_that_no_set_names_are_the_robots_whatever_ranges_are_given() -> None:
     wide = {"drive.gain_left": (0.5, 1.5), "drive.track": (0.1, 0.2), "contact.friction": (0.0, 1.0)}
     starts, commands = np.array([[0.5, 0.3, 0.0]]), np.tile([0.5, 0.3], (1, 8, 1))
@@ -99,5 +115,4 @@ def test_numbers_that_no_set_names_are_the_robots_whatever_ranges_are_given() ->
         )
         for ranges in (None, wide)
     )
-    # A step is cut into other parts, which shows where a wall is met.
-    assert ranged.poses == pytest.approx(plain.poses, abs=1e-2)
+    assert np.array_equal(ranged.poses, plain.poses)

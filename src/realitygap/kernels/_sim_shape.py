@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 # What a body does that meets a wall.
 FREEZE, STOP, SLIDE = 0, 1, 2
@@ -447,7 +447,9 @@ def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:
     return bool((at_start != 0).all() and gaps.min() >= -1e-9)
 
 
-def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: float) -> int:
+def substeps_for(
+    travel: ArrayLike, corners: Sequence[tuple[float, float]], radius: float
+) -> NDArray[np.int64]:
     """Parts of a step in which contact must be looked for, so that nothing thin is passed through.
 
     In each part the body moves less than a quarter of its half width: what it meets is always pushed back out to the
@@ -455,7 +457,7 @@ def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: 
     the sake of exactness.
 
     Args:
-        travel: The farthest that a wheel drives in a step [m].
+        travel: The farthest that a wheel drives in a step [m], of any number of robots.
         corners, radius: Of a part of the body, the smallest [m].
     """
     points = np.array(corners, np.float64).reshape(-1, 2)
@@ -465,4 +467,6 @@ def substeps_for(travel: float, corners: Sequence[tuple[float, float]], radius: 
     heights = normals @ points.T
     widths = heights.max(1) - heights.min(1) if len(normals) else np.zeros(1)
     half = float(widths.min()) / 2 + radius
-    return max(2, math.ceil(4 * abs(travel) / half)) if half > 0 else 64
+    if half <= 0:
+        return np.full(np.shape(travel), 64)
+    return np.maximum(2, np.ceil(4 * np.abs(travel) / half)).astype(np.int64)

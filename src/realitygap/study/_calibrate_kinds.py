@@ -216,7 +216,7 @@ def _fit_motion(
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
     fit = fit_motion(
-        moving, _replay(moving, robot, arena, "drive."), robot, arena, observe=observe, seed=seed
+        moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed
     )
     return _parts_of(fit)
 
@@ -229,7 +229,7 @@ def _fit_contact(
     trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     met = _of_purpose(trials, "contact")
-    simulate = _replay(met, robot, arena, "contact.")
+    simulate = _replay(met, robot, arena)
     return _parts_of(fit_contact(met, simulate, robot, arena, observe=observe, seed=seed))
 
 
@@ -240,10 +240,10 @@ def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedT
     ]
 
 
-def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, group: str) -> Simulate:
-    """Trials in `sim` with other numbers of a group; how finely it looks for contact is the robot's own otherwise."""
+def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
+    """Trials in `sim` with other numbers."""
     step_s = step_of(trials) if trials else robot.step_s
-    ranges = ranges_of([each for each in scribbler_prior(robot) if each.name.startswith(group)], robot)
+    ranges = ranges_of(scribbler_prior(robot), robot)
     return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges).replay
 
 

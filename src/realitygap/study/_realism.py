@@ -108,8 +108,8 @@ class RealisticTrials:
         self.shape = make_sim_shape(
             parts=[len(_outline(numbers))],
             contact="slide",
-            substeps=substeps_for(
-                numbers["drive.speed"] * STEP_S, _outline(numbers), numbers["body.0.radius"]
+            substeps=int(
+                substeps_for(numbers["drive.speed"] * STEP_S, _outline(numbers), numbers["body.0.radius"])
             ),
             range_response=["ir"] * len(SENSORS),
             n_walls=4,

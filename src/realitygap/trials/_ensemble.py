@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -24,7 +24,7 @@ from realitygap.world import Arena, Distribution
 from ._batch import check_genomes, paper_inputs
 from ._draws import Draws
 from ._sim import sim_rules
-from ._sim_scene import SimScene, sim_scene
+from ._sim_scene import IN_PARTS, SimScene, largest, parts_of_step, sim_scene
 
 CHUNK_BYTES = 32_000_000  # of what a thread keeps at once
 START = ("arena.start.x", "arena.start.y", "arena.start.heading")
@@ -34,6 +34,8 @@ KEPT = ("poses", "readings", "stalled", "wheels", "commands")
 Values = Mapping[str, ArrayLike]
 T = TypeVar("T")
 F = TypeVar("F", bound=np.generic)
+Finely = tuple[int, int]
+"""Parts of a step, and of its beginning while the command before goes on."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +112,15 @@ class Play:
 class SimEnsemble:
     """The platform `sim` in an arena, ready to be tried with many sets of its numbers.
 
+    A step of each robot is cut into as many parts, in which contact is looked for, as `sim` cuts it for a robot of
+    these numbers.
+
     Args:
         platform: The robot as simulated, with what no set says otherwise; of what it draws for each trial, each trial
             draws its own.
         arena: Where.
-        ranges: Least and most of the numbers that sets will give, by dotted name: so that the time is cut into the
-            same parts, and queues of commands have the same length, in every call. Numbers outside extend them.
+        ranges: Least and most of the numbers that sets will give, by dotted name: so that queues of commands have the
+            same length, and what a number can switch on is on, in every call. Numbers outside extend them.
         threads: At work at once; all processors that may be used when not given.
 
     Raises:
@@ -136,6 +141,8 @@ class SimEnsemble:
         self._ranges = {name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()}
         self._scenes: dict[tuple[object, ...], SimScene] = {}
         self._own = self._make_scene(("stall",), {})
+        numbers = self._own.robot.numbers()
+        self._most = {name: largest(numbers[name]) for name in IN_PARTS}
         self._no_genome = Population(3, 2, NeatSettings.named("default"), bias=False).ask()[0]
         self._scene(("stall",))
 
@@ -171,7 +178,7 @@ class SimEnsemble:
             given,
             anchors=np.empty((0, 0, 3)) if anchors is None else np.asarray(anchors, np.float64),
         )
-        return _joined(self._parts(play, values, key, keep, same_noise, _as_it_is))
+        return _joined(*self._parts(play, values, key, keep, same_noise, _as_it_is))
 
     def drive(
         self,
@@ -193,7 +200,7 @@ class SimEnsemble:
             whole_number("n_steps", n_steps, 1),
             genomes=tuple(genomes),
         )
-        return _joined(self._parts(play, values, key, keep, same_noise, _as_it_is))
+        return _joined(*self._parts(play, values, key, keep, same_noise, _as_it_is))
 
     def summarize(
         self,
@@ -211,7 +218,8 @@ class SimEnsemble:
             play: The trials.
             of: Called from several threads with some of the robots; must answer a row for each of them.
         """
-        return np.concatenate(self._parts(play, values, key, keep, same_noise, of))
+        place, parts = self._parts(play, values, key, keep, same_noise, of)
+        return np.concatenate(parts)[place]
 
     def _parts(
         self,
@@ -221,7 +229,8 @@ class SimEnsemble:
         keep: Sequence[str],
         same_noise: bool,
         of: Callable[[Rehearsal], T],
-    ) -> list[T]:
+    ) -> tuple[NDArray[np.int64], list[T]]:
+        """What `of` makes of some robots after the other, and where among all of those each robot is."""
         if unknown := sorted(set(keep) - set(KEPT)):
             raise ValueError(f"Cannot keep {', '.join(unknown)}, expected some of {', '.join(KEPT)}.")
         if play.genomes:
@@ -236,16 +245,35 @@ class SimEnsemble:
         )
         size = max(1, CHUNK_BYTES // (work.bytes_of_trial * len(play.starts)))
         size = max(1, min(size, -(-m // self.threads)))
-        chunks = [range(at, min(at + size, m)) for at in range(0, m, size)]
+        chunks = [
+            (finely, robots[at : at + size])
+            for finely, robots in self._cut_alike(given, m)
+            for at in range(0, len(robots), size)
+        ]
+        place = np.argsort(np.concatenate([robots for _, robots in chunks]))
 
-        def compute(chunk: range) -> T:
-            part = {name: value[chunk.start : chunk.stop] for name, value in given.items()}
-            return of(work.carry_out(part, chunk))
+        def compute(chunk: tuple[Finely, NDArray[np.int64]]) -> T:
+            finely, robots = chunk
+            part = {name: value[robots] for name, value in given.items()}
+            return of(work.carry_out(part, robots, finely))
 
         if self.threads == 1 or len(chunks) == 1:
-            return [compute(chunk) for chunk in chunks]
+            return place, [compute(chunk) for chunk in chunks]
         with ThreadPoolExecutor(self.threads, thread_name_prefix="ensemble") as pool:
-            return list(pool.map(compute, chunks))
+            return place, list(pool.map(compute, chunks))
+
+    def _cut_alike(
+        self, given: Mapping[str, NDArray[np.float64]], m: int
+    ) -> list[tuple[Finely, NDArray[np.int64]]]:
+        """The m robots by the parts of their steps: robots that differ in them have different scenes."""
+        most = {name: np.full(m, value) for name, value in self._most.items()}
+        most |= {name: np.abs(given[name]).max(axis=1) for name in most if name in given}
+        parts = np.stack(parts_of_step(self._own.robot, most, self.platform.command_s), axis=1)
+        kinds, which = np.unique(parts, axis=0, return_inverse=True)
+        return [
+            ((int(substeps), int(late)), np.flatnonzero(which.reshape(-1) == k))
+            for k, (substeps, late) in enumerate(kinds)
+        ]
 
     def _scene(
         self, inputs: tuple[str, ...], given: Mapping[str, NDArray[np.float64]] | None = None
@@ -293,14 +321,17 @@ class _Work:
     def _n_sensors(self) -> int:
         return int(self.scene.shape.row_range.size)
 
-    def carry_out(self, given: Mapping[str, NDArray[np.float64]], robots: range) -> Rehearsal:
+    def carry_out(
+        self, given: Mapping[str, NDArray[np.float64]], robots: NDArray[np.int64], finely: Finely
+    ) -> Rehearsal:
         """The trials of some of the robots; `given` has (m, k) or (m, 1) of each number."""
         scene, play = self.scene, self.play
+        shape = scene.shape._replace(substeps=finely[0], late_substeps=finely[1])
         m, k = len(robots), len(play.starts)
         counters = self._counters(robots)
         kept = self._room_for(m * k)
         rehearse(
-            scene.shape,
+            shape,
             self._table(given, m, k, counters),
             sim_rules(scene, self.bias_value)._replace(n_steps=play.n_steps),
             self.neat,
@@ -311,16 +342,16 @@ class _Work:
             self._anchors(),
             np.uint64(self.key),
             counters,
-            make_sim_room(scene.shape, self.neat, self.networks.place.shape[1], np.float32),
+            make_sim_room(shape, self.neat, self.networks.place.shape[1], np.float32),
             kept,
         )
         return self._named(kept, m, k)
 
-    def _counters(self, robots: range) -> NDArray[np.uint32]:
+    def _counters(self, robots: NDArray[np.int64]) -> NDArray[np.uint32]:
         k = len(self.play.starts)
         counters = np.zeros((len(robots) * k, 3), np.uint32)
         counters[:, 0] = np.tile(np.arange(k) << 8 | int(PURPOSE_NOISE), len(robots))
-        counters[:, 2] = 0 if self.same_noise else np.repeat(np.asarray(robots), k)
+        counters[:, 2] = 0 if self.same_noise else np.repeat(robots, k)
         return counters
 
     def _table(
@@ -393,12 +424,11 @@ def _as_it_is(rehearsal: Rehearsal) -> Rehearsal:
     return rehearsal
 
 
-def _joined(parts: Iterable[Rehearsal]) -> Rehearsal:
-    parts = list(parts)
+def _joined(place: NDArray[np.int64], parts: Sequence[Rehearsal]) -> Rehearsal:
     if len(parts) == 1:
         return parts[0]
     names = ("poses", "readings", "stalled", "wheels", "commands", "cells")
-    return Rehearsal(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return Rehearsal(*(np.concatenate([getattr(part, name) for part in parts])[place] for name in names))
 
 
 def _processors() -> int:

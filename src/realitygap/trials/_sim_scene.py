@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from realitygap.kernels._sim_shape import (
     INPUT_KINDS,
@@ -145,6 +145,22 @@ N_SECTORS = 4
 MOST_PARTS = 1_000
 """Of a step, in which contact is looked for: a body that goes hundreds of its own sizes in a step is a mistake."""
 
+IN_PARTS = tuple(
+    f"drive.{name}"
+    for name in (
+        "speed",
+        "gain_left",
+        "gain_right",
+        "bias_left",
+        "bias_right",
+        "travel_noise_per_m",
+        "travel_noise_per_s",
+        "delay",
+        "delay_jitter",
+    )
+)
+"""Numbers on which the parts of a step depend."""
+
 _DRAWN_IN_STEPS = (
     "delay_jitter",
     "travel_noise_per_m",
@@ -155,26 +171,15 @@ _DRAWN_IN_STEPS = (
 
 
 def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
-    latest = highest(numbers["drive.delay"]) + highest(numbers["drive.delay_jitter"])
+    most = {name: largest(numbers[name]) for name in IN_PARTS}
+    latest = float(_latest(most))
     if latest > MOST_DELAY_STEPS * step_s:
         raise ValueError(
             f"drive.delay and drive.delay_jitter come to {latest:g} s, expected at most {MOST_DELAY_STEPS} steps of "
             f"{step_s:g} s."
         )
     drive = robot.drive
-    way = _farthest(numbers, step_s)
-    substeps = max(
-        substeps_for(way, [(corner.x, corner.y) for corner in part.corner], part.radius)
-        for part in robot.body
-    )
-    if robot.contact.model == "freeze":
-        # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
-        substeps = math.ceil(substeps / 6)
-    if substeps > MOST_PARTS:
-        raise ValueError(
-            f"the robot drives up to {way:,.4g} m in a step, which takes {substeps:,} parts to look for contact in; "
-            f"expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
-        )
+    substeps, late_substeps = parts_of_step(robot, most, step_s)
     return {
         "parts": [len(part.corner) for part in robot.body],
         "contact": robot.contact.model,
@@ -185,22 +190,61 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
         "delay_steps": math.ceil(latest / step_s),
         "late": latest > 0,
         "noisy": any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
-        "substeps": substeps,
-        "late_substeps": max(1, math.ceil(substeps * min(latest / step_s, 1.0))),
+        "substeps": int(substeps),
+        "late_substeps": int(late_substeps),
     }
 
 
-def _farthest(numbers: Numbers, step_s: float) -> float:
+def parts_of_step(
+    robot: RobotModel, most: Mapping[str, ArrayLike], step_s: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Parts in which contact is looked for: of a step, and of its beginning while the command before still goes on.
+
+    Args:
+        robot: Its bodies.
+        most: The largest magnitude of each of the numbers `IN_PARTS`; of any number of robots.
+        step_s: Between commands [s].
+
+    Raises:
+        ValueError: A robot drives so far in a step that there are more than `MOST_PARTS`.
+    """
+    way = _farthest(most, step_s)
+    parts = [
+        substeps_for(way, [(corner.x, corner.y) for corner in part.corner], part.radius)
+        for part in robot.body
+    ]
+    substeps = np.max(parts, axis=0)
+    if robot.contact.model == "freeze":
+        # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
+        substeps = -(-substeps // 6)
+    if substeps.max() > MOST_PARTS:
+        raise ValueError(
+            f"the robot drives up to {way.max():,.4g} m in a step, which takes {substeps.max():,} parts to look for "
+            f"contact in; expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
+        )
+    while_late = np.ceil(substeps * np.minimum(_latest(most) / step_s, 1.0)).astype(np.int64)
+    return substeps, np.maximum(1, while_late)
+
+
+def _latest(most: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+    """How late a command may be [s]."""
+    return np.add(most["drive.delay"], most["drive.delay_jitter"])
+
+
+def _farthest(most: Mapping[str, ArrayLike], step_s: float) -> NDArray[np.float64]:
     """What a wheel drives in a step at most [m]: at any gain and bias, and with noise of six standard deviations."""
+    gain, bias = (
+        np.maximum(most[f"drive.{name}_left"], most[f"drive.{name}_right"]) for name in ("gain", "bias")
+    )
+    way = (np.multiply(most["drive.speed"], gain) + bias) * step_s
+    per_m, per_s = (np.square(most[f"drive.travel_noise_per_{each}"]) for each in ("m", "s"))
+    variance = per_m * way + per_s * step_s
+    return np.asarray(way + 6.0 * np.sqrt(variance))
 
-    def most(name: str) -> float:
-        value = numbers[f"drive.{name}"]
-        return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
 
-    gain, bias = (max(most(f"{name}_left"), most(f"{name}_right")) for name in ("gain", "bias"))
-    way = (most("speed") * gain + bias) * step_s
-    variance = most("travel_noise_per_m") ** 2 * way + most("travel_noise_per_s") ** 2 * step_s
-    return way + 6.0 * math.sqrt(variance)
+def largest(value: float | Distribution) -> float:
+    """The largest magnitude that a number can have."""
+    return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
 
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def x(hand: Hand) -> float:
 
 def test_a_word_moves_the_robot_and_silence_stops_it(hand):
     began = x(hand)
-    hand.drive(1.0, 0.0, "press")
+    hand.drive(1.0, 0.0, 0)
     wait_for(lambda: hand.senses["moves"])
     wait_for(lambda: not hand.senses["moves"])  # nothing more was said
     stood = x(hand)
@@ -46,14 +46,14 @@ def test_a_word_moves_the_robot_and_silence_stops_it(hand):
 
 
 def test_stop_is_heard_while_it_drives(hand):
-    hand.drive(1.0, 0.0, "press")
+    hand.drive(1.0, 0.0, 0)
     wait_for(lambda: hand.senses["moves"])
     hand.stop()
     wait_for(lambda: not hand.senses["moves"])
 
 
 def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
-    hand.drive(1.0, 0.0, "first")
+    hand.drive(1.0, 0.0, 0)
     wait_for(lambda: hand.senses["moves"])
     hand.stop()
     wait_for(lambda: not hand.senses["moves"])
@@ -64,17 +64,25 @@ def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
         1.2,
     ):  # ten times a second, as the page says it, and over a network that holds words back
         time.sleep(pause)
-        hand.drive(1.0, 0.0, "first")
+        hand.drive(1.0, 0.0, 0)
+        assert not hand.senses["moves"]
     time.sleep(0.3)
     assert not hand.senses["moves"]
     hand.release()
-    hand.drive(1.0, 0.0, "second")
+    hand.drive(1.0, 0.0, hand.n_stops)
     wait_for(lambda: hand.senses["moves"])
 
 
+def test_a_press_that_began_before_a_stop_and_whose_first_word_comes_after_it_drives_nowhere(hand):
+    hand.stop()
+    hand.drive(1.0, 0.0, 0)
+    time.sleep(0.5)
+    assert not hand.senses["moves"]
+
+
 def test_what_is_no_number_drives_nowhere(hand):
-    hand.drive("fast", float("nan"), "press")  # type: ignore[arg-type]
-    hand.drive([], {}, "press")  # type: ignore[arg-type]
+    hand.drive("fast", float("nan"), 0)  # type: ignore[arg-type]
+    hand.drive([], {}, 0)  # type: ignore[arg-type]
     began = x(hand)
     time.sleep(0.5)
     assert x(hand) == pytest.approx(began, abs=1e-6)

@@ -25,6 +25,7 @@ class Hand(Job):
         arena: Where an emulated robot drives; None where nobody sees it.
         line: (x, y) [m] where it has been.
         said: What it refused last; empty where nothing.
+        n_stops: How often somebody pressed stop.
 
     Args:
         order: What the process is told first.
@@ -48,16 +49,19 @@ class Hand(Job):
         self.line: list[list[float]] = []
         self.said = ""
         self.n_live = 0
+        self.n_stops = 0
         super().__init__({"work": "robot", **order}, root, changed)
 
-    def drive(self, move: float, turn: float, press: str) -> None:
+    def drive(self, move: float, turn: float, stops: int) -> None:
         """Drive so for the next moment; said again and again, or it stops.
 
         Args:
             move, turn: -1..1.
-            press: Which press of the handle this is: a stop ends the press that drove, however late its words come.
+            stops: How many stops the page knew of when the handle was taken: a stop since then ends the press, however
+                late its words come.
         """
-        self._child.tell({"do": "drive", "move": move, "turn": turn, "press": press})
+        if stops == self.n_stops:
+            self._child.tell({"do": "drive", "move": move, "turn": turn})
 
     def release(self) -> None:
         """The handle was let go: stop, until it is pulled again."""
@@ -65,7 +69,9 @@ class Hand(Job):
 
     def stop(self) -> None:
         """Stop the motors; a handle that is held has to be let go before it drives again."""
+        self.n_stops += 1
         self._child.tell({"do": "stop"})
+        self._changed()
 
     def want(self, what: str) -> None:
         """Ask for preflight, picture, or place."""

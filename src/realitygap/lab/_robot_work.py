@@ -61,14 +61,12 @@ class _Hand:
         self._channel, self._robot, self._witness = channel, robot, witness
         self._wheels = (0.0, 0.0)
         self._told_s = 0.0
-        self._press: str | None = None
-        self._stopped: str | None = None
         self._moves = False
         self._lock = threading.Lock()
         self._wanted: queue.Queue[Message] = queue.Queue()
         self._battery_s = -BATTERY_S
         channel.at_once("drive", self._drive)
-        channel.at_once("release", self._release)
+        channel.at_once("release", self._stop)
         channel.at_once("stop", self._stop)
         channel.at_once("want", self._wanted.put)
 
@@ -90,21 +88,12 @@ class _Hand:
         """From the thread that listens."""
         move, turn = (_share(message.get(name)) for name in ("move", "turn"))
         with self._lock:
-            press = str(message.get("press"))
-            if press == self._stopped:
-                return  # the handle that was held when somebody pressed stop is held still
-            self._press = press
             self._wheels = (_share(move - turn), _share(move + turn))
             self._told_s = time.monotonic()
 
-    def _release(self, message: Message) -> None:
-        """The handle was let go."""
-        self._stop(message)
-
     def _stop(self, message: Message) -> None:
-        """From the thread that listens, whatever the loop is at; nothing moves until the handle was let go."""
+        """From the thread that listens, whatever the loop is at."""
         with self._lock:
-            self._stopped = self._press
             self._told_s = 0.0
             self._moves = False
             self._robot.stop()

@@ -215,9 +215,7 @@ def _fit_motion(
     trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
-    fit = fit_motion(
-        moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed
-    )
+    fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
     return _parts_of(fit)
 
 

@@ -23,9 +23,15 @@ EMULATED = "emulator://s2?fluke=2"
 class DrivePad(Element, component="drive_pad.js"):
     """A handle that drives while it is held."""
 
-    def __init__(self, *, name: str, is_off: bool) -> None:
+    def __init__(self, *, name: str, is_off: bool, stops: int) -> None:
         super().__init__()
-        self._props |= {"name": name, "disabled": is_off}
+        self._props |= {"name": name, "disabled": is_off, "stops": stops}
+
+    def know(self, stops: int) -> None:
+        """Tell it how often somebody pressed stop: a press from now on is one after all of them."""
+        if self._props["stops"] != stops:
+            self._props["stops"] = stops
+            self.update()
 
 
 def add_robot(lab: Lab) -> None:
@@ -136,9 +142,11 @@ class _Page:
         with ui.element("div").classes("lab-two"):
             with ui.column().classes("lab-cards"):
                 section("Drive")
-                pad = DrivePad(name="Drive: hold and pull, or the arrow keys", is_off=not may)
-                pad.on("drive", self._drive)
-                pad.on("release", self._release)
+                self._pad = DrivePad(
+                    name="Drive: hold and pull, or the arrow keys", is_off=not may, stops=hand.n_stops
+                )
+                self._pad.on("drive", self._drive)
+                self._pad.on("release", self._release)
                 hint(
                     "Hold it and pull, or use the arrow keys. Let go, or close the page, and the robot stops."
                 )
@@ -197,6 +205,7 @@ class _Page:
         if hand is None or hand.senses is None or hand.n_live == self._n_shown or not hasattr(self, "_bars"):
             return
         self._n_shown = hand.n_live
+        self._pad.know(hand.n_stops)
         senses = hand.senses
         for bar, reading in zip(self._bars, senses["readings"], strict=False):
             bar.value = round(reading, 3)
@@ -216,7 +225,7 @@ class _Page:
         hand = self._lab.hand
         given = event.args if isinstance(event.args, dict) else {}
         if hand is not None and self._lab.may_operate(self._visitor):
-            hand.drive(given.get("move", 0), given.get("turn", 0), str(given.get("press"))[:64])
+            hand.drive(given.get("move", 0), given.get("turn", 0), given.get("stops", -1))
 
     def _release(self, event: events.GenericEventArguments) -> None:
         hand = self._lab.hand

@@ -1,16 +1,16 @@
 // A dead man's handle: while it is held, where to is said ten times a second; let go, it says so once.
 export default {
-  props: { disabled: Boolean, name: String },
+  props: { disabled: Boolean, name: String, stops: Number },
   template: `
     <svg viewBox="-1.4 -1.4 2.8 2.8" class="lab-pad" :class="{'lab-pad-off': disabled}" role="application" tabindex="0"
-         :aria-label="name" :aria-disabled="String(disabled)" ref="pad" @pointerdown="down" @pointermove="move"
+         :aria-label="name" :aria-disabled="String(disabled)" :data-stops="stops" ref="pad" @pointerdown="down" @pointermove="move"
          @pointerup="release" @pointercancel="release" @keydown="key" @keyup="keyUp" @blur="release">
       <circle r="1.1" class="lab-pad-rim" />
       <path d="M 0 -1 L 0.14 -0.78 L -0.14 -0.78 Z M 0 1 L 0.14 0.78 L -0.14 0.78 Z" class="lab-pad-way" />
       <path d="M -1 0 L -0.78 0.14 L -0.78 -0.14 Z M 1 0 L 0.78 0.14 L 0.78 -0.14 Z" class="lab-pad-way" />
       <circle :cx="-turn" :cy="-ahead" r="0.3" class="lab-pad-knob" />
     </svg>`,
-  data() { return { ahead: 0, turn: 0, timer: null, press: "", keys: new Set() }; },
+  data() { return { ahead: 0, turn: 0, timer: null, knows: 0, keys: new Set() }; },
   mounted() {
     this.away = () => this.release();
     document.addEventListener("visibilitychange", this.away);
@@ -26,12 +26,12 @@ export default {
       this.ahead = ahead;
       this.turn = turn;
       if (this.timer === null) {
-        this.press = `${Date.now()} ${Math.random()}`; // a name that no other press of any page has
+        this.knows = this.stops; // a stop that comes after it ends this press
         this.tell();
         this.timer = setInterval(this.tell, 100);
       }
     },
-    tell() { this.$emit("drive", { move: this.ahead, turn: this.turn, press: this.press }); },
+    tell() { this.$emit("drive", { move: this.ahead, turn: this.turn, stops: this.knows }); },
     release() {
       this.keys.clear();
       if (this.timer === null) return;

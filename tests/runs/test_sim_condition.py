@@ -83,8 +83,9 @@ def test_figures_of_a_trial_show_the_arena_that_was_drawn_for_it() -> None:
     assert condition.arena_of(trial).obstacles[0].x == x + 0.02
 
 
-def test_a_robot_that_is_far_too_fast_is_a_mistake_and_not_a_long_wait() -> None:
+@pytest.mark.parametrize("speed", [1e6, 1e300])
+def test_a_robot_that_is_far_too_fast_is_a_mistake_and_not_a_long_wait(speed: float) -> None:
     with pytest.raises(
         ValueError, match=r"parts to look for contact in; expected at most 1,000\. Is drive\.speed"
     ):
-        Condition(name="a", platform="sim", noise=0.0, sim={"set": {"drive.speed": 1e6}})
+        Condition(name="a", platform="sim", noise=0.0, sim={"set": {"drive.speed": speed}})

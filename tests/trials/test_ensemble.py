@@ -8,6 +8,7 @@ from realitygap.trials import _ensemble as module
 from realitygap.world import paper_arena
 
 START = [0.1905, 0.1905, 0.0]
+ROBOT = SimPlatform().robot
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def test_commands_of_a_controller_replayed_give_its_trial(ensemble, genomes):
 
 
 def test_how_robots_are_parted_among_threads_changes_nothing(genomes, monkeypatch):
-    values = {"drive.gain_left": np.linspace(0.9, 1.1, 40)}
+    values = {"drive.gain_left": np.random.default_rng(0).uniform(0.4, 1.6, 40)}
     play = Play(np.array([START] * 3), 30, genomes=tuple(genomes))
     one = SimEnsemble(SimPlatform(), paper_arena(), threads=1)
     whole = one.summarize(play, values, 3, lambda r: r.coverage)
@@ -92,9 +93,14 @@ def test_sets_that_do_not_fit_are_refused(ensemble):
 
 def test_each_robot_does_what_sim_does_with_its_numbers_beside_all_others() -> None:
     """Pressed at a wall, where the parts show into which a step is cut."""
-    values = {"drive.gain_left": [0.4, 1.0, 1.6, 0.4], "drive.lag": [0.0, 0.1, 0.1, 0.0]}
+    wide = {f"body.0.corner.{k}.y": y for k, y in enumerate(corner.y for corner in ROBOT.body[0].corner)}
+    values = {
+        "drive.gain_left": [0.4, 1.0, 1.6, 0.4],
+        "drive.delay": [0.0, 0.1, 0.3, 0.0],
+        **{name: [y, y, 0.6 * y, 0.8 * y] for name, y in wide.items()},
+    }
     starts, commands = np.array([[0.3, 0.3, 0.8]]), np.tile([0.7, 0.3], (1, 30, 1))
-    ranges = {"drive.gain_left": (0.2, 2.0), "drive.gain_right": (0.2, 2.0)}
+    ranges = {"drive.gain_left": (0.2, 2.0), "drive.delay_jitter": (0.0, 0.2)}
     together = SimEnsemble(SimPlatform(noise=False), paper_arena(), ranges=ranges, threads=2).replay(
         starts, commands, values, 0
     )
@@ -107,7 +113,7 @@ def test_each_robot_does_what_sim_does_with_its_numbers_beside_all_others() -> N
 
 
 def test_numbers_that_no_set_names_are_the_robots_whatever_ranges_are_given() -> None:
-    wide = {"drive.gain_left": (0.5, 1.5), "drive.track": (0.1, 0.2), "contact.friction": (0.0, 1.0)}
+    wide = {"drive.gain_left": (0.5, 1.5), "drive.delay": (0.0, 0.3), "contact.friction": (0.0, 1.0)}
     starts, commands = np.array([[0.5, 0.3, 0.0]]), np.tile([0.5, 0.3], (1, 8, 1))
     plain, ranged = (
         SimEnsemble(SimPlatform(noise=False), paper_arena(), ranges=ranges).replay(

@@ -112,6 +112,8 @@ NEUTRAL = {
     "encoder.gain_left": 1.0,
     "encoder.gain_right": 1.0,
 }
+_ENDLESS = 10**9
+"""Parts of a step, at most: of a robot that goes as far as numbers do."""
 ANGLES = ("heading", "direction", "cone", "turn_rate", "heading_noise_per_m", "heading_noise_per_s")
 AXES = {"x": 0, "y": 1, "x1": 0, "y1": 1, "x2": 0, "y2": 1}
 
@@ -447,9 +449,23 @@ def encloses(walls: NDArray[np.float64], start: Sequence[float]) -> bool:
     return bool((at_start != 0).all() and gaps.min() >= -1e-9)
 
 
-def substeps_for(
-    travel: ArrayLike, corners: Sequence[tuple[float, float]], radius: float
-) -> NDArray[np.int64]:
+def half_width(corners: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
+    """Half of what a part of a body measures where it is narrowest [m].
+
+    Args:
+        corners: (..., n, 2) [m], around.
+        radius: (...) by which it is rounded [m].
+    """
+    points = np.asarray(corners, np.float64)
+    along = np.roll(points, -1, axis=-2) - points
+    size = np.hypot(along[..., 0], along[..., 1])
+    normals = np.stack([along[..., 1], -along[..., 0]], axis=-1) / np.where(size > 0, size, 1.0)[..., None]
+    widths = np.ptp(normals @ np.swapaxes(points, -1, -2), axis=-1)
+    narrowest = np.where(size > 0, widths, np.inf).min(axis=-1)
+    return np.asarray(np.where(np.isfinite(narrowest), narrowest, 0.0) / 2 + radius)
+
+
+def substeps_for(travel: ArrayLike, half: ArrayLike) -> NDArray[np.int64]:
     """Parts of a step in which contact must be looked for, so that nothing thin is passed through.
 
     In each part the body moves less than a quarter of its half width: what it meets is always pushed back out to the
@@ -458,15 +474,8 @@ def substeps_for(
 
     Args:
         travel: The farthest that a wheel drives in a step [m], of any number of robots.
-        corners, radius: Of a part of the body, the smallest [m].
+        half: Of a part of the body, the smallest, its `half_width` [m]; of as many.
     """
-    points = np.array(corners, np.float64).reshape(-1, 2)
-    along = np.roll(points, -1, axis=0) - points
-    size = np.hypot(*along.T)
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)[size > 0] / size[size > 0, None]
-    heights = normals @ points.T
-    widths = heights.max(1) - heights.min(1) if len(normals) else np.zeros(1)
-    half = float(widths.min()) / 2 + radius
-    if half <= 0:
-        return np.full(np.shape(travel), 64)
-    return np.maximum(2, np.ceil(4 * np.abs(travel) / half)).astype(np.int64)
+    way, half = np.abs(travel), np.asarray(half, np.float64)
+    parts = np.ceil(4 * way / np.where(half > 0, half, 1.0))
+    return np.where(half > 0, np.clip(parts, 2, _ENDLESS), 64).astype(np.int64)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,45 +70,18 @@ class Counts:
         self.is_blind = bool(trials.get("blind"))
         self._pens = list(trials.get("pens") or ["black"])
         self._arenas: dict[str, Arena] = {}
-        self._lock = threading.RLock()
-        self._kept_open: Ledger | None = None
-        self._file: tuple[int, int] | None = None
-        self._version: int | None = None
+        self._stamp: tuple[Any, ...] = ()
         self._found: list[CountedTrial] = []
 
     def trials(self) -> list[CountedTrial]:
         """All trials; read anew only when the ledger has changed."""
-        with self._lock:
-            try:
-                ledger = self._ledger_now()
-                if ledger is not None and (version := ledger.version) != self._version:
-                    self._found = self._read(ledger)
-                    self._version = version
-            except LedgerError:
-                self.close()  # it is looked at as a whole once it is opened anew
-                raise
-            return self._found
-
-    def close(self) -> None:
-        """Let go of the ledger; it is opened again when needed."""
-        with self._lock:
-            ledger, self._kept_open, self._version = self._kept_open, None, None
-            if ledger is not None:
-                ledger.close()
-
-    def _ledger_now(self) -> Ledger | None:
-        """The ledger, kept open so that it tells of changes; None before there is one.
-
-        Where it can be written it is opened for that: the last to let go of it then leaves one file.
-        """
         path = self._folder / LEDGER_NAME
-        file = _file_at(path)
-        if file != self._file:
-            self.close()
-            self._file = file
-        if self._kept_open is None and file is not None:
-            self._kept_open = Ledger.open(path, writable=os.access(path, os.W_OK))
-        return self._kept_open
+        stamp = _stamp(path)
+        if stamp and stamp != self._stamp:
+            with Ledger.open(path, writable=False) as ledger:
+                self._found = self._read(ledger)
+            self._stamp = stamp
+        return self._found
 
     def trial(self, number: int) -> CountedTrial:
         """A trial by its number.
@@ -234,10 +205,13 @@ def _named(who: str) -> str:
     return who.strip()
 
 
-def _file_at(path: Path) -> tuple[int, int] | None:
-    """Which file that is; None while there is none."""
-    try:
-        status = path.stat()
-    except OSError:
-        return None
-    return status.st_dev, status.st_ino
+def _stamp(path: Path) -> tuple[Any, ...]:
+    """Changes whenever the ledger does; empty while there is none."""
+    found: list[Any] = []
+    for each in (path, path.with_name(path.name + "-wal")):
+        try:
+            status = each.stat()
+        except OSError:
+            continue
+        found.append((each.name, status.st_mtime_ns, status.st_size))
+    return tuple(found)

@@ -193,11 +193,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         raise LedgerError(f"There is no ledger at {path}. A study begins one when it first drives a robot.")
     with speaking(path):
         connection = sqlite3.connect(
-            _address(path, writable=writable),
-            uri=True,
-            isolation_level=None,
-            timeout=_PATIENCE_S,
-            check_same_thread=False,  # it may be closed by another than opened it; one at a time is the caller's part
+            _address(path, writable=writable), uri=True, isolation_level=None, timeout=_PATIENCE_S
         )
         try:
             connection.row_factory = sqlite3.Row

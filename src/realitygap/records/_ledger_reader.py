@@ -26,7 +26,7 @@ FROM trials JOIN generations USING (condition, replicate, generation)
 
 
 class LedgerReader:
-    """What a ledger of physical trials says; used by one thread at a time.
+    """What a ledger of physical trials says.
 
     Raises:
         LedgerError: from any method: the file is torn, foreign, locked, or has no such trial.
@@ -44,17 +44,6 @@ class LedgerReader:
     def close(self) -> None:
         """Let go of the file."""
         self._connection.close()
-
-    @property
-    def version(self) -> int:
-        """Changes whenever something else has written to the ledger since it was opened here.
-
-        What is read afterwards is at least as new. Times and sizes of the files are no such sign: they change before
-        what was written can be read, by as long as the disk takes to keep it.
-        """
-        with speaking(self.path):
-            (version,) = self._connection.execute("PRAGMA data_version").fetchone()
-        return int(version)
 
     def __enter__(self) -> Self:
         return self

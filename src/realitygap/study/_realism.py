@@ -15,7 +15,7 @@ from realitygap.evolution import NeatSettings
 from realitygap.kernels._network import Networks, make_networks
 from realitygap.kernels._sim import run_sim_trials
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
-from realitygap.kernels._sim_shape import make_sim_shape, sim_table, substeps_for
+from realitygap.kernels._sim_shape import half_width, make_sim_shape, sim_table, substeps_for
 from realitygap.world import Arena, load_arena, load_robot, paper_arena
 
 from ._bench import MOST_SECONDS
@@ -109,7 +109,9 @@ class RealisticTrials:
             parts=[len(_outline(numbers))],
             contact="slide",
             substeps=int(
-                substeps_for(numbers["drive.speed"] * STEP_S, _outline(numbers), numbers["body.0.radius"])
+                substeps_for(
+                    numbers["drive.speed"] * STEP_S, half_width(_outline(numbers), numbers["body.0.radius"])
+                )
             ),
             range_response=["ir"] * len(SENSORS),
             n_walls=4,

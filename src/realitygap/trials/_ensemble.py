@@ -18,13 +18,14 @@ from realitygap.kernels._network import Networks
 from realitygap.kernels._philox import PURPOSE_NOISE
 from realitygap.kernels._replay import Rehearsed, rehearse
 from realitygap.kernels._sim_lanes import make_sim_room
+from realitygap.kernels._sim_shape import half_width
 from realitygap.robots import SimPlatform
 from realitygap.world import Arena, Distribution
 
 from ._batch import check_genomes, paper_inputs
 from ._draws import Draws
 from ._sim import sim_rules
-from ._sim_scene import IN_PARTS, SimScene, largest, parts_of_step, sim_scene
+from ._sim_scene import IN_PARTS, SimScene, largest, own_half, parts_of_step, sim_scene
 
 CHUNK_BYTES = 32_000_000  # of what a thread keeps at once
 START = ("arena.start.x", "arena.start.y", "arena.start.heading")
@@ -268,12 +269,26 @@ class SimEnsemble:
         """The m robots by the parts of their steps: robots that differ in them have different scenes."""
         most = {name: np.full(m, value) for name, value in self._most.items()}
         most |= {name: np.abs(given[name]).max(axis=1) for name in most if name in given}
-        parts = np.stack(parts_of_step(self._own.robot, most, self.platform.command_s), axis=1)
+        halves = [self._half(given, number) for number in range(len(self._own.robot.body))]
+        parts = np.stack(parts_of_step(self._own.robot, most, self.platform.command_s, halves), axis=1)
         kinds, which = np.unique(parts, axis=0, return_inverse=True)
         return [
             ((int(substeps), int(late)), np.flatnonzero(which.reshape(-1) == k))
             for k, (substeps, late) in enumerate(kinds)
         ]
+
+    def _half(self, given: Mapping[str, NDArray[np.float64]], number: int) -> NDArray[np.float64]:
+        """(m,) or (1,) half width of a part of the body [m]; where trials differ the smallest."""
+        body = self._own.robot.body[number]
+        names = [f"body.{number}.corner.{k}.{axis}" for k in range(len(body.corner)) for axis in "xy"]
+        own = [value for corner in body.corner for value in (corner.x, corner.y)]
+        if given.keys().isdisjoint([*names, f"body.{number}.radius"]):
+            return own_half(self._own.robot, number).reshape(1)
+        each = [given.get(name, np.full((1, 1), value)) for name, value in zip(names, own, strict=True)]
+        corners = np.stack(np.broadcast_arrays(*each), axis=-1)
+        radius = given.get(f"body.{number}.radius", np.full((1, 1), body.radius))
+        half: NDArray[np.float64] = half_width(corners.reshape(*corners.shape[:-1], -1, 2), radius)
+        return np.asarray(half.min(axis=1))
 
     def _scene(
         self, inputs: tuple[str, ...], given: Mapping[str, NDArray[np.float64]] | None = None
@@ -428,7 +443,10 @@ def _joined(place: NDArray[np.int64], parts: Sequence[Rehearsal]) -> Rehearsal:
     if len(parts) == 1:
         return parts[0]
     names = ("poses", "readings", "stalled", "wheels", "commands", "cells")
-    return Rehearsal(*(np.concatenate([getattr(part, name) for part in parts])[place] for name in names))
+    found = Rehearsal(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    if np.array_equal(place, np.arange(len(place))):
+        return found
+    return Rehearsal(*(getattr(found, name)[place] for name in names))
 
 
 def _processors() -> int:

@@ -14,6 +14,7 @@ from realitygap.kernels._sim_shape import (
     INPUT_KINDS,
     SimShape,
     encloses,
+    half_width,
     in_table,
     make_sim_shape,
     sim_rows,
@@ -196,24 +197,27 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
 
 
 def parts_of_step(
-    robot: RobotModel, most: Mapping[str, ArrayLike], step_s: float
+    robot: RobotModel,
+    most: Mapping[str, ArrayLike],
+    step_s: float,
+    halves: Sequence[ArrayLike] = (),
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Parts in which contact is looked for: of a step, and of its beginning while the command before still goes on.
 
     Args:
-        robot: Its bodies.
+        robot: Whose bodies they are.
         most: The largest magnitude of each of the numbers `IN_PARTS`; of any number of robots.
         step_s: Between commands [s].
+        halves: The half width of each body, of as many robots [m]; the robot's own when not given.
 
     Raises:
         ValueError: A robot drives so far in a step that there are more than `MOST_PARTS`.
     """
-    way = _farthest(most, step_s)
-    parts = [
-        substeps_for(way, [(corner.x, corner.y) for corner in part.corner], part.radius)
-        for part in robot.body
-    ]
-    substeps = np.max(parts, axis=0)
+    way, latest = _farthest(most, step_s), _latest(most)
+    if not halves:
+        halves = [own_half(robot, number) for number in range(len(robot.body))]
+    parts = [substeps_for(way, half) for half in halves]
+    substeps = np.max(np.broadcast_arrays(*parts), axis=0)
     if robot.contact.model == "freeze":
         # Nothing is pushed out, so that a part may be nearly as long as the body is wide; Jyro looks once.
         substeps = -(-substeps // 6)
@@ -222,8 +226,14 @@ def parts_of_step(
             f"the robot drives up to {way.max():,.4g} m in a step, which takes {substeps.max():,} parts to look for "
             f"contact in; expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
         )
-    while_late = np.ceil(substeps * np.minimum(_latest(most) / step_s, 1.0)).astype(np.int64)
-    return substeps, np.maximum(1, while_late)
+    while_late = np.maximum(1.0, np.ceil(substeps * np.minimum(latest / step_s, 1.0)))
+    return substeps, np.where(latest > 0, while_late, 0.0).astype(np.int64)
+
+
+def own_half(robot: RobotModel, number: int) -> NDArray[np.float64]:
+    """The half width of a part of its body as the robot's file has it [m]."""
+    body = robot.body[number]
+    return half_width([(corner.x, corner.y) for corner in body.corner], body.radius)
 
 
 def _latest(most: Mapping[str, ArrayLike]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ from ._drawn import Draft, forget_draft, keep_draft, read_draft
 from ._proposals import Proposal, read_proposals
 
 LONGEST_NOTE = 2000
+_INDEX_HEAD = 48
+"""Bytes at the beginning of the index of what was written lately, which differ after each change."""
 
 
 @dataclass(frozen=True)
@@ -206,12 +209,17 @@ def _named(who: str) -> str:
 
 
 def _stamp(path: Path) -> tuple[Any, ...]:
-    """Changes whenever the ledger does; empty while there is none."""
+    """Changes whenever what can be read of the ledger does; empty while there is none.
+
+    Files change before what was written to them can be read, by as long as the disk takes to keep it: so the head of
+    the index is looked at, which SQLite writes last, and by which it knows itself that there is something new
+    (sqlite.org/walformat.html, section 2.1).
+    """
     found: list[Any] = []
-    for each in (path, path.with_name(path.name + "-wal")):
-        try:
-            status = each.stat()
-        except OSError:
-            continue
-        found.append((each.name, status.st_mtime_ns, status.st_size))
+    for ending in ("", "-wal"):
+        with contextlib.suppress(OSError):
+            status = path.with_name(path.name + ending).stat()
+            found.append((ending, status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size))
+    with contextlib.suppress(OSError), path.with_name(path.name + "-shm").open("rb") as index:
+        found.append(index.read(_INDEX_HEAD))
     return tuple(found)

@@ -71,7 +71,6 @@ class Hand(Job):
         """Stop the motors; a handle that is held has to be let go before it drives again."""
         self.n_stops += 1
         self._child.tell({"do": "stop"})
-        self._changed()
 
     def want(self, what: str) -> None:
         """Ask for preflight, picture, or place."""

@@ -86,8 +86,6 @@ class Lab:
         path, description = self.studies.path(name), self.studies.results(name).description
         known = self._counts.get(name)
         if known is None or known.description != description:
-            if known is not None:
-                known.close()
             known = self._counts[name] = Counts(path, description)
         return known
 
@@ -379,8 +377,6 @@ class Lab:
             watcher.end()
         for photos in self._photos.values():
             photos.end()
-        for counts in self._counts.values():
-            counts.close()
 
 
 def check_study(root: Path, text: str) -> str:

@@ -14,7 +14,7 @@ class Part(Generic[T]):
     """A part of a page.
 
     What is under a finger stays: a tap on a button that is taken away in that moment is lost. So each part has its own
-    state, and shows the state that it was compared by, not what has become of it since.
+    state, and is drawn from a single look at it, by which the next look is compared.
 
     Args:
         stand: What there is to show: something that can be compared.
@@ -25,19 +25,21 @@ class Part(Generic[T]):
         self._stand = stand
         self._show = show
         self._shown: T
+        self._is_due = False
 
     def show(self) -> None:
         """Show it, for the first time."""
-        now = self._stand()
-        self._refreshable = ui.refreshable(self._show)
-        self._refreshable(now)
-        self._shown = now
+        self._refreshable = ui.refreshable(self._draw)
+        self._refreshable()
 
-    def look(self) -> bool:
-        """Show it anew where it has changed; whether it has."""
+    def look(self) -> None:
+        """Have it shown anew where it has changed."""
+        if not self._is_due and self._stand() != self._shown:
+            self._is_due = True
+            self._refreshable.refresh()
+
+    def _draw(self) -> None:
+        self._is_due = False
         now = self._stand()
-        if now == self._shown:
-            return False
-        self._refreshable.refresh(now)
+        self._show(now)
         self._shown = now  # only once it is shown: where that failed the next look tries again
-        return True

@@ -49,6 +49,7 @@ class _Page:
         self._visitor = visitor
         self._n_shown = -1
         self._n_points = 0
+        self._pad: DrivePad | None = None
 
     def show(self) -> None:
         self._seen = self._stand()
@@ -89,6 +90,7 @@ class _Page:
         return one is not None and other is not None and one[:3] == other[:3] and before[1:] == now[1:]
 
     def _show(self) -> None:
+        self._pad = None
         hand, job = self._lab.hand, self._lab.robot_job
         if job is not None:
             ui.label(f"The study {job.name!r} has the robot.")
@@ -202,10 +204,11 @@ class _Page:
 
     def _live(self) -> None:
         hand = self._lab.hand
+        if hand is not None and self._pad is not None:
+            self._pad.know(hand.n_stops)
         if hand is None or hand.senses is None or hand.n_live == self._n_shown or not hasattr(self, "_bars"):
             return
         self._n_shown = hand.n_live
-        self._pad.know(hand.n_stops)
         senses = hand.senses
         for bar, reading in zip(self._bars, senses["readings"], strict=False):
             bar.value = round(reading, 3)

@@ -75,6 +75,8 @@ class _Page:
             section("Robot")
             for part in (self._robot, self._asked, self._ending):
                 part.show()
+        self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
+        self._listed = self._counts.trials()
         self._photos = ui.refreshable(self._sheets.show)
         self._photo_part = ui.element("section").props('aria-label="Photos of sheets"').classes("lab-part")
         with self._photo_part:
@@ -90,8 +92,6 @@ class _Page:
         with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
             self._table()
             self._show_note()
-        self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
-        self._listed = self._counts.trials()
         watching(self._lab, self._look)
         ui.timer(1.0, self._look)  # another program may write to the ledger
 
@@ -169,7 +169,8 @@ class _Page:
         job = self._job()
         if job is None:
             return _AskedStand(None)
-        return _AskedStand(job, job.ask, job.card, self._may())
+        ask = job.ask
+        return _AskedStand(job, ask, None if ask is not None else job.card, self._may())
 
     def _show_asked(self, now: _AskedStand) -> None:
         """What it waits for; else the trial that goes on."""

@@ -17,8 +17,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
+from realitygap import _special as special
 from realitygap.world import RobotModel
 
 from ._evidence import Evidence, Vectors
@@ -134,7 +134,15 @@ def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats
     """(n, p) from the prior within a box; evenly spread along each parameter (Latin hypercube)."""
     ranks = np.argsort(rng.uniform(size=(len(low), n)), axis=1).T
     u = (ranks + rng.uniform(size=ranks.shape)) / n
-    return np.asarray(ndtri(np.clip(ndtr(low) + u * (ndtr(high) - ndtr(low)), ndtr(-END), ndtr(END))))
+    return np.asarray(
+        special.ndtri(
+            np.clip(
+                special.ndtr(low) + u * (special.ndtr(high) - special.ndtr(low)),
+                special.ndtr(-END),
+                special.ndtr(END),
+            )
+        )
+    )
 
 
 def _adjusted(

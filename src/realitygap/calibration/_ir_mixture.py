@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+
+from realitygap import _special as special
 
 from ._ir_readings import Array, Placement, Places, logistic
 from ._ir_scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column
@@ -89,7 +90,7 @@ class MixtureReadings:
     def _at(self, places: Places, values: Array) -> Array:
         back, spread, drop, out = _parts(places, self.scales, values)
         edges = self._edges
-        below = ndtr((edges - back[..., None]) / spread[..., None])
+        below = special.ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
         normal = np.diff(below, axis=2)
         even = np.concatenate([[0.0], np.diff(edges), [0.0]])
@@ -105,7 +106,7 @@ class MixtureReadings:
         half = self.step / 2
         upper = np.where(readings >= 1.0, np.inf, readings + half)
         lower = np.where(readings <= 0.0, -np.inf, readings - half)
-        normal = ndtr((upper - back) / spread) - ndtr((lower - back) / spread)
+        normal = special.ndtr((upper - back) / spread) - special.ndtr((lower - back) / spread)
         inside = (readings > 0.0) & (readings < 1.0)
         chance = (1.0 - drop - out) * normal + out * np.where(inside, self.step, half)
         chance = chance + drop * (readings <= 0.0)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
+
+from realitygap import _special as special
 
 from ._ir_readings import Array, Placement, Places, logistic
 from ._ir_scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column
@@ -83,4 +84,8 @@ def _ways(pulses: int) -> Array:
     """(e, k) in how many ways k of e pulses can be seen; 0 for more than e."""
     e, k = np.mgrid[: pulses + 1, : pulses + 1]
     left = np.maximum(e - k, 0)
-    return np.asarray(np.where(k <= e, np.exp(gammaln(e + 1) - gammaln(k + 1) - gammaln(left + 1)), 0.0))
+    return np.asarray(
+        np.where(
+            k <= e, np.exp(special.gammaln(e + 1) - special.gammaln(k + 1) - special.gammaln(left + 1)), 0.0
+        )
+    )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import ndtr, ndtri, stdtrit
+
+from realitygap import _special as special
 
 from ._scatter import NoisePrior
 from ._simulate import Floats, Ints
@@ -62,10 +63,10 @@ def _cut_normal(rng: np.random.Generator, slope: float, scale: float, room: tupl
 
 
 def _between(rng: np.random.Generator, a: float, b: float) -> float:
-    lower, upper = ndtr(a), ndtr(b)
+    lower, upper = special.ndtr(a), special.ndtr(b)
     if upper - lower < 1e-290:
         return b
-    return float(np.clip(ndtri(rng.uniform(lower, upper)), a, b))
+    return float(np.clip(special.ndtri(rng.uniform(lower, upper)), a, b))
 
 
 def walk(
@@ -154,7 +155,7 @@ def _shares(rng: np.random.Generator, n: int, k: int) -> Floats:
 
 def _few(k: int) -> float:
     """By how much k clusters that are weighed anew spread too little: Student's interval over the normal one."""
-    return float(stdtrit(k - 1, 0.95) / ndtri(0.95) * np.sqrt(k / (k - 1)))
+    return float(special.stdtrit(k - 1, 0.95) / special.ndtri(0.95) * np.sqrt(k / (k - 1)))
 
 
 def _weighed_anew(rng: np.random.Generator, logs: Floats, proposed: Floats, n: int) -> Ints:

@@ -10,7 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+
+from realitygap import _special as special
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ def _step(values: Array, most: float) -> float:
 
     def kept(step: float) -> float:
         logs = step * values
-        return float(np.exp(2 * logsumexp(logs) - logsumexp(2 * logs))) / len(values)
+        return float(np.exp(2 * special.logsumexp(logs) - special.logsumexp(2 * logs))) / len(values)
 
     if kept(most) >= KEPT:
         return most

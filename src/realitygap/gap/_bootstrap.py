@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+
+from realitygap import _special as special
 
 from ._estimate import CONFIDENCE
 from ._side import GapSide, Values

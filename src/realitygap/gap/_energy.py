@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from ._side import Values
 
@@ -59,6 +58,8 @@ def smallest_energy_p(n: int, r: int, q: int) -> float:
 
 
 def _matrices(source: Values, target: Values) -> Values:
+    from scipy.spatial.distance import cdist  # which takes a while to import, and nothing else needs
+
     if min(source.shape[1], target.shape[1]) < 2:
         raise ValueError("An energy distance needs at least 2 trials of each controller on both sides.")
     both = np.concatenate([source, target], axis=1).astype(float)

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
+
+from realitygap import _special as special
 
 from ._side import Values
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy import special
+from realitygap import _special as special
 
 from ._bootstrap import SMALLEST_N
 from ._estimate import CONFIDENCE, Estimate

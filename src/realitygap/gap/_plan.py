@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+
+from realitygap import _special as special
 
 from ._correlation import spearman
 from ._equivalence import controllers_for_margin

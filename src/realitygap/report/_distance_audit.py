@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
-from scipy import special
 
+from realitygap import _special as special
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, behavior_distance
 from realitygap.evolution._distances import Sort, measure_of, pack_behaviors

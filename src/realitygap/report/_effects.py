@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
+from realitygap import _special as special
 from realitygap.kernels._resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
 from realitygap.report._statistics import CONFIDENCE

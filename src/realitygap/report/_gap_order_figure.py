@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import special
 
+from realitygap import _special as special
 from realitygap.drawing import Ink
 from realitygap.gap import GapSide
 from realitygap.report._drawing import (

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
-from scipy import special
 
+from realitygap import _special as special
 from realitygap.evolution import largest_cell_distance
 from realitygap.records import ResultsFolder
 from realitygap.report._champions import MOST_RUNS

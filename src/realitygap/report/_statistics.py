@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
+
+from realitygap import _special as special
 
 CONFIDENCE = 0.95
 """The least that an interval of ours covers, unless it says otherwise."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import special
 
+from realitygap import _special as special
 from realitygap._version import __version__
 
 from ._closing_plan import ClosingPlan, TwinName, read_plan

@@ -43,7 +43,7 @@ class Peer(NamedTuple):
         return HERE / (f"{self.name}_peer.py" if self.requirements else f"{self.name}.py")
 
 
-# --- in the environment that runs the benchmark -------------------------------------------------------------
+# in the environment that runs the benchmark
 
 
 def environment_folder(peer: Peer) -> Path:
@@ -127,7 +127,7 @@ def versions_of(packages: Sequence[str]) -> dict[str, str]:
     return found
 
 
-# --- in a peer's environment --------------------------------------------------------------------------------
+# in a peer's environment
 
 
 def spread(values: Sequence[float]) -> dict[str, float]:

@@ -65,7 +65,7 @@ def make(folder: Path, replicates: int | None = None) -> tuple[dict[str, str], d
     return tables, figures
 
 
-# --- audits -------------------------------------------------------------------------------------------------
+# audits
 
 
 def weights(audits: dict[str, DistanceAudit]) -> str:
@@ -112,7 +112,7 @@ def on_trials(study: ResultsFolder) -> str:
     return _csv(["Distance", "random walks", f"trials of “{AUDITED}”"], rows)
 
 
-# --- the study ----------------------------------------------------------------------------------------------
+# the study
 
 
 def coverage(study: ResultsFolder) -> str:
@@ -195,7 +195,7 @@ def _per_run(study: ResultsFolder, condition: str) -> pl.DataFrame:
     )
 
 
-# --- times --------------------------------------------------------------------------------------------------
+# times
 
 
 def times(n: int = 200, seconds: float = 0.3) -> str:
@@ -221,7 +221,7 @@ def times(n: int = 200, seconds: float = 0.3) -> str:
     return _csv(["Distance", "steps", "one distance [ns]"], rows)
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _signed(value: float, form: str = "+.2f") -> str:

@@ -41,7 +41,7 @@ PER_DISTANCE = 6
 WALL = 0.3  # the farthest distance that is drawn [m]
 
 
-# --- the table ------------------------------------------------------------------------------------------------------
+# the table
 
 
 def shown(value: Any) -> str:
@@ -78,7 +78,7 @@ def page_parts() -> dict[str, str]:
     return {"parts/sensors.md": "\n".join(lines).replace("## ", "### ")}
 
 
-# --- the figure -----------------------------------------------------------------------------------------------------
+# the figure
 
 
 def read(robot: RobotModel, distances: np.ndarray, n: int) -> np.ndarray:

@@ -94,7 +94,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
             path.write_text(text, "utf-8")
 
 
-# --- Myro ---------------------------------------------------------------------------------------------------
+# Myro
 
 
 def myro_functions() -> str:
@@ -137,7 +137,7 @@ def meaning(name: str) -> str:
     return " ".join((first + more).split())
 
 
-# --- Jyro ---------------------------------------------------------------------------------------------------
+# Jyro
 
 
 def jyro_features() -> str:
@@ -168,7 +168,7 @@ def feature_test(entry: Mapping[str, Any]) -> str:
     return f"`tests/{file}`" + ("" if name == "*" else f": {name.removeprefix('test_').replace('_', ' ')}")
 
 
-# --- settings -----------------------------------------------------------------------------------------------
+# settings
 
 
 def settings_page() -> str:
@@ -289,7 +289,7 @@ def value_text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-# --- columns ------------------------------------------------------------------------------------------------
+# columns
 
 
 def columns() -> str:
@@ -319,7 +319,7 @@ def ledger() -> str:
     return "\n\n".join(parts) + "\n"
 
 
-# --- commands -----------------------------------------------------------------------------------------------
+# commands
 
 
 def commands() -> dict[str, Any]:
@@ -364,7 +364,7 @@ def option_text(option: Any) -> str:
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
 
 
-# --- distances ----------------------------------------------------------------------------------------------
+# distances
 
 
 def distances() -> str:
@@ -385,7 +385,7 @@ def distances() -> str:
     return "\n".join(lines) + "\n\n" + "\n\n".join(told) + "\n"
 
 
-# --- choices ------------------------------------------------------------------------------------------------
+# choices
 
 # What the paper leaves open; what we do; the alternatives, each with the conditions of `paper-choices` that try it.
 CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [

@@ -33,7 +33,7 @@ def task_parts() -> dict[str, str]:
     }
 
 
-# --- mazes --------------------------------------------------------------------------------------------------
+# mazes
 
 
 def maze_runs(maze: str, reward: str) -> tuple[int, NDArray[np.float64]]:
@@ -102,7 +102,7 @@ def mazes() -> str:
     return "\n".join([*lines, "", text]) + "\n"
 
 
-# --- tasks beside coverage ----------------------------------------------------------------------------------
+# tasks beside coverage
 
 
 def task_studies() -> str:
@@ -122,7 +122,7 @@ def task_studies() -> str:
     return "\n".join(lines) + "\n"
 
 
-# --- classical tasks ----------------------------------------------------------------------------------------
+# classical tasks
 
 # Evaluations and failures [%] of the paper's ablations (EC02, table 3).
 PUBLISHED_ABLATIONS = {

@@ -253,7 +253,7 @@ def test_a_file_that_is_no_video_is_told_of(command, tmp_path):
     assert (status, "is no video that can be read" in err) == (1, True)
 
 
-# --- lenses -----------------------------------------------------------------------------------------------------------
+# lenses
 
 
 def _board(lens, number):

@@ -26,7 +26,7 @@ class Myro:
             self._restart()
             self.trim = [self.get(81, 8)[k] for k in range(4)]
 
-    # -- the opening conversation --
+    # the opening conversation
 
     def get_info(self):
         self.flush()
@@ -79,7 +79,7 @@ class Myro:
             self.beep(0.03, frequency)
         self.name = self.text(78, 64)
 
-    # -- how it writes and reads --
+    # how it writes and reads
 
     def bytewise(self, *values):
         """A command of the Fluke: one write for each byte."""
@@ -130,7 +130,7 @@ class Myro:
     def motors(self, left, right):
         return self.set(109, int((right + 1) * 100), int((left + 1) * 100))
 
-    # -- the Fluke --
+    # the Fluke
 
     def number(self, n, *values):
         self.bytewise(*values)

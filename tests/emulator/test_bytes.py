@@ -173,7 +173,7 @@ def test_the_center_led_toggles_after_every_command_and_once_a_second():
     assert robot.robot.leds(robot.now_ns)[1] == first
 
 
-# -- behind a Fluke --
+# behind a Fluke
 
 
 @pytest.mark.parametrize("fluke", ["1", "2"])
@@ -324,7 +324,7 @@ def test_passthrough_hands_everything_on():
     assert say(robot, sent) == sent
 
 
-# -- the S2 alone --
+# the S2 alone
 
 
 def test_position_and_angle_are_what_was_set():

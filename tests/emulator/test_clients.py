@@ -28,7 +28,7 @@ def myro(model, fluke, extra=""):
     return Myro(open_port(model, fluke, extra))
 
 
-# -- Myro --
+# Myro
 
 
 @each(MYRO_SET_UPS)
@@ -214,7 +214,7 @@ def test_myro_identifies_and_restarts_the_robot(model, fluke):
     assert client.text(78, 64) == "Scribby"
 
 
-# -- Scribbler2-Python --
+# Scribbler2-Python
 
 
 @pytest.fixture(params=["none", "2"])

@@ -126,7 +126,7 @@ def test_the_box_turns_freely_only_where_its_corners_do():
     assert ask(robot, 79) == b"\x01"
 
 
-# -- motions by distance --
+# motions by distance
 
 
 def test_move_by_faces_the_target_and_drives_there(robot):
@@ -252,7 +252,7 @@ def test_placing_the_robot_drops_motions_that_waited(robot):
     assert robot.wheel_speeds() == (0.0, 0.0)
 
 
-# -- time --
+# time
 
 
 def drive(cuts, seed=3):

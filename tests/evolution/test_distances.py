@@ -127,7 +127,7 @@ def test_a_distance_says_what_it_is(name: str) -> None:
     assert found.cost
 
 
-# --- archives with any distance ---------------------------------------------------------------------------------
+# archives with any distance
 
 
 def behaviors_of(rng: random.Random, name: str, n: int) -> list[Any]:

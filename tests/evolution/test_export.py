@@ -46,7 +46,7 @@ def session(network: Network, **options: object) -> onnxruntime.InferenceSession
     return onnxruntime.InferenceSession(to_onnx(network, **options).SerializeToString())
 
 
-# --- JSON ---------------------------------------------------------------------------------------------------
+# JSON
 
 
 @pytest.mark.parametrize("bias", [False, True])
@@ -171,7 +171,7 @@ def test_torn_and_missing_files_are_said(tmp_path):
         Genome.from_json("[1, 2]")
 
 
-# --- networkx -----------------------------------------------------------------------------------------------
+# networkx
 
 
 @pytest.mark.parametrize("changes", KINDS, ids=IDS)
@@ -202,7 +202,7 @@ def test_a_graph_survives_graphml_with_its_names(tmp_path):
         to_networkx(genome, ["a"])
 
 
-# --- ONNX ---------------------------------------------------------------------------------------------------
+# ONNX
 
 
 @pytest.mark.parametrize("bias", [False, True])

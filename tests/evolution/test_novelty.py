@@ -80,7 +80,7 @@ def test_a_cell_outside_the_grid_is_refused(cell: int) -> None:
         PaperArchive().update([[3], [cell]])
 
 
-# --- the paper's archive ----------------------------------------------------------------------------------------
+# the paper's archive
 
 
 @pytest.mark.parametrize("enter", ["above-all", "above-least"])
@@ -106,7 +106,7 @@ def test_an_individual_that_visits_nothing_has_a_behavior_too() -> None:
     assert PaperArchive().update([[], [0]]).tolist() == [LARGEST, LARGEST]
 
 
-# --- nearest neighbors ------------------------------------------------------------------------------------------
+# nearest neighbors
 
 
 def test_the_nearest_archive_equals_the_reference() -> None:

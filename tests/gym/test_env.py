@@ -300,7 +300,7 @@ def test_gymnasium_finds_the_environment_by_module_and_name():
     assert done.stdout == "(3,)\n"
 
 
-# --- the platform sim -----------------------------------------------------------------------------------------
+# the platform sim
 
 SLOW_AND_DRAWN = {"drive.speed": {"uniform": [0.08, 0.14]}, "arena.start.x": {"uniform": [0.18, 0.3]}}
 SIMS = [

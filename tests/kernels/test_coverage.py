@@ -98,7 +98,7 @@ def test_a_grid_of_256_cells_fits_a_byte() -> None:
     assert sorted(kernel_cells(points, 16, 16)) == list(range(256))
 
 
-# --- hand-made --------------------------------------------------------------------------------------------------
+# hand-made
 
 
 def test_a_line_up_the_diagonal_visits_the_diagonal_alone() -> None:
@@ -154,7 +154,7 @@ def test_standing_still_visits_nothing_more() -> None:
     assert kernel_cells([(2.0, 2.0), (2.0, 2.0)]) == numbered((2, 2))
 
 
-# --- grid units -------------------------------------------------------------------------------------------------
+# grid units
 
 
 @pytest.mark.parametrize(("name", "cell"), [("corner", (1, 1)), ("center", (6, 3)), ("left", (1, 3))])

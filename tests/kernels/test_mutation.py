@@ -89,7 +89,7 @@ def test_mutation_equals_the_reference() -> None:
             assert genomes[k % 2] == expected
 
 
-# --- innovation numbers -----------------------------------------------------------------------------------------
+# innovation numbers
 
 
 def test_the_same_link_gets_the_same_number_in_one_generation_and_a_new_one_later() -> None:
@@ -132,7 +132,7 @@ def test_links_found_by_two_genomes_line_up() -> None:
     assert len(set(made.values())) == len(made)
 
 
-# --- adding a node ----------------------------------------------------------------------------------------------
+# adding a node
 
 
 def test_a_split_keeps_what_the_link_carried() -> None:
@@ -190,7 +190,7 @@ def test_nothing_is_split_where_all_is_disabled() -> None:
     assert Mutator(neat)("add_node", genome, 1) == (genome, False)
 
 
-# --- adding a link ----------------------------------------------------------------------------------------------
+# adding a link
 
 
 @pytest.mark.parametrize("recurrent", [False, True])
@@ -240,7 +240,7 @@ def test_the_weight_of_a_new_link_is_within_the_initial_ones() -> None:
     assert min(weights) < -0.4
 
 
-# --- weights ----------------------------------------------------------------------------------------------------
+# weights
 
 
 def test_weights_are_replaced_and_moved_as_often_and_as_far_as_said() -> None:
@@ -294,7 +294,7 @@ def test_mutated_weights_and_biases_stay_within_the_limit() -> None:
     assert len(set(values)) > 50
 
 
-# --- which of them ----------------------------------------------------------------------------------------------
+# which of them
 
 
 def what_changed(before: Genome, after: Genome) -> str:

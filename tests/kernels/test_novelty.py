@@ -85,7 +85,7 @@ def test_the_distance_equals_the_reference(by_column: bool) -> None:
         assert _distances.pointwise_distance(a, len(a), a, len(a), table.span) == 0.0
 
 
-# --- the paper's archive ----------------------------------------------------------------------------------------
+# the paper's archive
 
 
 class KernelPaperArchive:
@@ -183,7 +183,7 @@ def test_the_oldest_is_replaced_each_time_and_the_bar_is_that_of_the_archive_the
     assert archive.behaviors() == [[(5, 0)], [(9, 0)]]
 
 
-# --- nearest neighbors ------------------------------------------------------------------------------------------
+# nearest neighbors
 
 
 def test_nearest_novelty_equals_the_reference() -> None:

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered")
 FEW = hypothesis_settings(max_examples=cases(300, 50), deadline=None, derandomize=True)
 
 
-# --- whole numbers in proportion --------------------------------------------------------------------------------
+# whole numbers in proportion
 
 
 def rounded(share: list[float], total: int) -> list[int]:
@@ -76,7 +76,7 @@ def test_of_equal_remainders_the_earlier_is_rounded_up() -> None:
     assert rounded([0.0, 2.0, 0.0], 7) == [0, 7, 0]
 
 
-# --- shares of offspring ----------------------------------------------------------------------------------------
+# shares of offspring
 
 
 def offspring(
@@ -202,7 +202,7 @@ def test_the_population_keeps_its_size_whatever_the_fitness(
     assert min(count) >= 0
 
 
-# --- ranks and improvement --------------------------------------------------------------------------------------
+# ranks and improvement
 
 
 def test_members_are_ranked_by_fitness_equal_ones_in_their_order() -> None:
@@ -227,7 +227,7 @@ def test_only_a_better_best_fitness_is_an_improvement() -> None:
     assert (table.floats[1], table.improved_at[0]) == (4.0, 0)
 
 
-# --- children ---------------------------------------------------------------------------------------------------
+# children
 
 
 class Brood:

@@ -48,7 +48,7 @@ def assert_equals_reference(case: Case) -> None:
         np.testing.assert_allclose(readings, row.readings, rtol=0, atol=LAST_BITS, err_msg=str(at))
 
 
-# --- random scenes ------------------------------------------------------------------------------------------
+# random scenes
 
 
 def random_case(seed: int) -> Case:
@@ -127,7 +127,7 @@ def test_random_scenes_hold_what_they_should_hold() -> None:
     assert 0.1 < np.mean(stalls) < 0.9
 
 
-# --- rounding and lines -------------------------------------------------------------------------------------
+# rounding and lines
 
 
 def test_round7_is_pythons_round() -> None:
@@ -170,7 +170,7 @@ def test_a_line_on_top_of_another_does_not_cross_it() -> None:
         assert not _scene.crossing(line, line)[0]
 
 
-# --- moving -------------------------------------------------------------------------------------------------
+# moving
 
 
 def test_forward_is_plus_y_at_heading_0_and_turns_are_counter_clockwise() -> None:
@@ -234,7 +234,7 @@ def test_a_body_inside_a_big_closed_shape_is_free() -> None:
     assert run(one_robot(1.0, 0.5, 0.7), boxes=[BOX]).stalls[1, 0] == 0
 
 
-# --- several robots -----------------------------------------------------------------------------------------
+# several robots
 
 
 def test_the_first_robot_moves_first() -> None:
@@ -277,7 +277,7 @@ def test_a_blimp_collides_with_nothing_and_is_seen_by_nobody() -> None:
     np.testing.assert_allclose(track.readings[1], 0.31, atol=1e-7)
 
 
-# --- sensors ------------------------------------------------------------------------------------------------
+# sensors
 
 
 def test_a_ray_reads_the_distance_from_its_mount() -> None:

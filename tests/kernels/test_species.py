@@ -30,7 +30,7 @@ def genome(*genes: tuple[int, float], disabled: int = -1) -> Genome:
     return Genome({number: Gene(0, 1, weight, number != disabled) for number, weight in genes}, {1: 0.0})
 
 
-# --- distance ---------------------------------------------------------------------------------------------------
+# distance
 
 COEFFICIENTS = {"excess_coefficient": 2.0, "disjoint_coefficient": 3.0, "weight_coefficient": 0.5}
 
@@ -105,7 +105,7 @@ def test_random_distances_equal_the_reference() -> None:
         assert distance(neat, one, other) == pytest.approx(neat.distance(one, other), rel=1e-13)
 
 
-# --- speciation -------------------------------------------------------------------------------------------------
+# speciation
 
 
 class Speciation:

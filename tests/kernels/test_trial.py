@@ -52,7 +52,7 @@ def controller(neat: Neat, genome: Genome) -> Callable[[Sequence[float]], list[f
     return lambda inputs: feed_forward(neat, genome, inputs)
 
 
-# --- random trials ----------------------------------------------------------------------------------------------
+# random trials
 
 
 def random_arena(rng: random.Random) -> Arena:
@@ -157,7 +157,7 @@ def test_whole_trials_equal_the_reference_with_its_own_network() -> None:
         assert apart(found.poses, expected.poses) < 1e-9
 
 
-# --- Jyro's scene -----------------------------------------------------------------------------------------------
+# Jyro's scene
 
 
 def jyro_case(platform: JyroPlatform, start: Pose, **driven_by: Any) -> Case:
@@ -230,7 +230,7 @@ def test_with_the_same_network_most_paths_stay_on_jyros() -> None:
     assert np.quantile(apart, 0.9) < 1e-5
 
 
-# --- symmetry, repetition ---------------------------------------------------------------------------------------
+# symmetry, repetition
 
 
 def test_a_mirrored_arena_gives_the_mirrored_path() -> None:
@@ -268,7 +268,7 @@ def test_a_trial_is_the_same_alone_among_others_and_with_its_steps_kept() -> Non
     assert len({tuple(batch.behavior(k)) for k in range(10)}) > 2
 
 
-# --- roads and precisions ------------------------------------------------------------------------------------
+# roads and precisions
 
 
 def random_room(rng: random.Random) -> Arena:
@@ -395,7 +395,7 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
     assert len({row.tobytes() for row in cells}) > 30
 
 
-# --- noise ------------------------------------------------------------------------------------------------------
+# noise
 
 
 @pytest.mark.parametrize(
@@ -436,7 +436,7 @@ def test_a_reading_is_inverted_before_noise_and_clipped_after_it_where_that_is_s
     assert largest_noisy([1.0], 0.5, 200, clip=True).tolist() == [max(value, 0.0) for value in low]
 
 
-# --- hand-made --------------------------------------------------------------------------------------------------
+# hand-made
 
 
 def test_full_speed_is_a_tenth_of_a_meter_a_step_until_the_wall_is_nearer() -> None:

@@ -33,7 +33,7 @@ def is_s2(robot):
     return robot.driver.info.model == "s2"
 
 
-# --- opening -------------------------------------------------------------------------------------------------
+# opening
 
 
 def test_the_robot_greets_and_is_known_as_robot(setup, capsys):
@@ -100,7 +100,7 @@ def test_options_of_the_simulator_are_refused_for_other_ports():
         myro.initialize("emulator://s2?speed=off", seed=3)
 
 
-# --- moving --------------------------------------------------------------------------------------------------
+# moving
 
 MOVES = [
     (lambda: myro.forward(0.5), (1, 1)),
@@ -197,7 +197,7 @@ def test_wrong_moves_are_refused_and_the_robot_is_not_told(full, witness, act, m
     assert witness().motors() == (0, 0)
 
 
-# --- senses --------------------------------------------------------------------------------------------------
+# senses
 
 
 def test_senses_of_the_robot_have_myros_shapes(robot):
@@ -317,7 +317,7 @@ def test_wrong_positions_are_refused_with_the_right_ones(full, act, message):
         act()
 
 
-# --- sound and lights ----------------------------------------------------------------------------------------
+# sound and lights
 
 
 def test_a_tone_lasts_as_long_as_it_should(robot):
@@ -384,7 +384,7 @@ def test_lights(robot):
         myro.setLED("top", 1)
 
 
-# --- camera --------------------------------------------------------------------------------------------------
+# camera
 
 
 @pytest.mark.parametrize("mode", [None, "jpeg", "jpeg-fast", "color", "gray", "grey", "grayjpeg", "grayjpeg-fast",
@@ -437,7 +437,7 @@ def test_the_color_of_a_rectangle_becomes_the_color_to_look_for(full):
     assert myro.getBlob()[0] > 0
 
 
-# --- identity ------------------------------------------------------------------------------------------------
+# identity
 
 
 def test_names_passwords_and_data_are_kept(robot):
@@ -510,7 +510,7 @@ def test_wrong_items_to_set_are_refused(full):
         myro.set(1, 2, 3, 4)
 
 
-# --- a Scribbler 2's places, a Fluke's extras ----------------------------------------------------------------
+# a Scribbler 2's places, a Fluke's extras
 
 
 @pytest.fixture(params=["none", "2"])
@@ -614,7 +614,7 @@ def test_what_only_a_fluke_2_has(robot, capsys):
         myro.servo(4, 0)
 
 
-# --- all of them ---------------------------------------------------------------------------------------------
+# all of them
 
 ARGUMENTS = {
     "forward": (0, 0.1), "backward": (0, 0.1), "turnLeft": (0, 0.1), "turnRight": (0, 0.1), "turn": ("left", 0.1, 0.1),

@@ -112,7 +112,7 @@ def test_lamps_and_tape_of_an_arena_of_ones_own(tmp_path):
     assert simulation.pose().x == pytest.approx(1.25, abs=0.06)
 
 
-# --- shown ---------------------------------------------------------------------------------------------------
+# shown
 
 
 def test_a_map_of_letters():

@@ -238,7 +238,7 @@ def test_the_label_is_that_of_the_first_trial(ledger):
     assert ledger.trial(2).state == "planned"
 
 
-# --- files --------------------------------------------------------------------------------------------------
+# files
 
 
 def test_a_ledger_is_never_replaced(ledger):
@@ -355,7 +355,7 @@ def test_what_was_committed_survives_a_copy_of_the_files_at_any_moment(tmp_path)
     ledger.close()
 
 
-# --- anything, in any order ---------------------------------------------------------------------------------
+# anything, in any order
 
 
 class AnyOrder(RuleBasedStateMachine):

@@ -151,7 +151,7 @@ class Neat:
             genome.biases[node] = stream.signed(reach) if settings.node_bias else 0.0
         return genome
 
-    # --- mutation -------------------------------------------------------------------------------------------
+    # mutation
 
     def mutate(self, genome: Genome, history: History, stream: Stream) -> None:
         """Draws: node, link, weights, re-enabling; each first whether, then what."""
@@ -222,7 +222,7 @@ class Neat:
         limit = self.settings.weight_limit
         return max(-limit, min(limit, weight))
 
-    # --- crossover ------------------------------------------------------------------------------------------
+    # crossover
 
     def crossover(self, a: Genome, b: Genome, fitness_a: float, fitness_b: float, stream: Stream) -> Genome:
         """Draws: whether to average; by gene: which parent or whether at all, whether off; biases."""
@@ -268,7 +268,7 @@ class Neat:
                     child.biases[node] = found[0]
         return child
 
-    # --- species --------------------------------------------------------------------------------------------
+    # species
 
     def distance(self, a: Genome, b: Genome) -> float:
         matching = sorted(a.genes.keys() & b.genes.keys())
@@ -450,7 +450,7 @@ class Evolution:
         return child
 
 
-# --- networks -----------------------------------------------------------------------------------------------
+# networks
 
 
 def squash(settings: NeatSettings, total: float) -> float:

@@ -163,7 +163,7 @@ def test_files_that_are_no_tables(tmp_path):
         audit_results(EXAMPLE, denominator=0)
 
 
-# --- the paper ----------------------------------------------------------------------------------------------
+# the paper
 
 
 def test_70_steps_and_the_count_that_gives_87():

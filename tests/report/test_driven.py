@@ -152,7 +152,7 @@ def test_no_complete_run_is_said(tmp_path):
         summarize(tmp_path / "small")
 
 
-# --- agreement ----------------------------------------------------------------------------------------------
+# agreement
 
 
 def counted_twice(tmp_path, n, second):

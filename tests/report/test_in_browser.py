@@ -136,7 +136,7 @@ def check_numbers(shown: list[float | str], trajectory: Trajectory, step: int) -
     assert shown[9] == ("yes" if trajectory.stalled[step] else "no")
 
 
-# --- time ---------------------------------------------------------------------------------------------------
+# time
 
 
 def test_nothing_moves_by_itself_and_the_first_picture_is_a_whole_trial(show):
@@ -200,7 +200,7 @@ def test_dragging_over_the_curve_goes_through_time(show):
     page.mouse.up()
 
 
-# --- numbers ------------------------------------------------------------------------------------------------
+# numbers
 
 
 @pytest.mark.parametrize("name", ["coverage", "novelty", "turn", "ends"])
@@ -252,7 +252,7 @@ def test_visited_cells_fill_up_to_those_of_the_trial(show, trials):
     assert page.locator(".visited").get_attribute("d").count("z") == 1
 
 
-# --- several trials -----------------------------------------------------------------------------------------
+# several trials
 
 
 def test_several_at_once_differ_without_color(show):
@@ -305,7 +305,7 @@ def test_conditions_can_be_compared(show):
     assert [re.sub(r"/\d+/(\d+)/\d+", r" \1", name) for name in names] == ["turn 0", "turn 1", "turn 2"]
 
 
-# --- links --------------------------------------------------------------------------------------------------
+# links
 
 
 def test_a_link_leads_to_what_was_seen(show, trials):
@@ -331,7 +331,7 @@ def test_a_link_that_leads_nowhere_leaves_the_page_as_it_is(show, fragment):
         assert "Not on this page: nothing/0/0/0" in page.locator("#replay-status").text_content()
 
 
-# --- keyboard and accessibility -----------------------------------------------------------------------------
+# keyboard and accessibility
 
 
 def test_everything_works_by_keyboard(show):
@@ -446,7 +446,7 @@ def test_contrast(show, scheme):
         assert contrast(f"ink-pen{pen}", "page") >= 3.0, pen
 
 
-# --- sizes, schemes, print, motion, names -------------------------------------------------------------------
+# sizes, schemes, print, motion, names
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE, (320, 640)])

@@ -355,7 +355,7 @@ def test_an_answer_of_something_else_is_no_scribbler():
         Scribbler(port)
 
 
-# --- ways out ---------------------------------------------------------------------------------------------------
+# ways out
 
 
 def test_motors_stop_when_an_exception_leaves_the_block():
@@ -431,7 +431,7 @@ def test_a_handler_of_ones_own_is_left_alone():
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
-# --- the watchdog -----------------------------------------------------------------------------------------------
+# the watchdog
 
 
 def test_a_silent_program_is_stopped_by_the_watchdog_at_the_very_moment():
@@ -502,7 +502,7 @@ def test_a_watchdog_in_real_time_is_a_thread_that_stops_the_motors():
         assert robot.faults.watchdog_stops == 1
 
 
-# --- anything at all ----------------------------------------------------------------------------------------------
+# anything at all
 
 
 @given(st.lists(st.binary(max_size=40), max_size=30), st.sampled_from(list(INFOS)))

@@ -48,7 +48,7 @@ def room(width: float = 3.0, height: float = 2.0) -> JyroWorld:
     return world
 
 
-# --- several robots ------------------------------------------------------------------------------------------
+# several robots
 
 
 def test_the_first_robot_takes_the_gap_and_the_second_meets_it_there() -> None:
@@ -132,7 +132,7 @@ def test_an_arena_brings_its_obstacles_and_lights() -> None:
         world.add_polygon([(0.0, 0.0), (1.0, 1.0)])
 
 
-# --- robots --------------------------------------------------------------------------------------------------
+# robots
 
 
 def test_a_robot_that_moves_sideways_knows_where_it_is() -> None:
@@ -204,7 +204,7 @@ def test_real_time_takes_as_long() -> None:
     assert 0.1 <= time.perf_counter() - began < 5
 
 
-# --- devices -------------------------------------------------------------------------------------------------
+# devices
 
 
 def test_an_arc_reads_the_nearest_over_its_width() -> None:
@@ -397,7 +397,7 @@ def test_a_device_of_ones_own() -> None:
     assert compass.heading == pytest.approx(0.8)
 
 
-# --- what it is driven and shown by --------------------------------------------------------------------------
+# what it is driven and shown by
 
 
 def test_a_robot_of_it_keeps_the_contract() -> None:
@@ -491,7 +491,7 @@ def test_an_empty_world_has_a_picture() -> None:
     assert world.picture().left == pytest.approx(49.47)
 
 
-# --- what it refuses -----------------------------------------------------------------------------------------
+# what it refuses
 
 
 def test_mistakes_are_named() -> None:

@@ -54,7 +54,7 @@ AHEAD = [(1.0, 0.0)] * 6
 SPIN = [(0.0, 1.0)] * 6
 
 
-# --- the contract ---------------------------------------------------------------------------------------------
+# the contract
 
 
 @pytest.mark.parametrize("family", ["close", "alien", "same"])
@@ -137,7 +137,7 @@ def test_time_passes_only_in_commands_and_while_somebody_waits():
     assert math.dist(robot.pose[:2], stopped[:2]) < 1e-4
 
 
-# --- motion ---------------------------------------------------------------------------------------------------
+# motion
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
@@ -261,7 +261,7 @@ def test_encoders_tell_what_they_count():
     assert np.std(told) == pytest.approx(0.01 * math.sqrt(0.15), rel=0.45)
 
 
-# --- walls ----------------------------------------------------------------------------------------------------
+# walls
 
 
 @pytest.mark.parametrize("degrees", [5, 40, 60, 80, 90])
@@ -327,7 +327,7 @@ def test_it_stays_within_every_arena_that_comes_with_realitygap():
         assert all(obstacle.distance(x, y) > 0.05 for obstacle in arena.obstacles), name
 
 
-# --- infrared -------------------------------------------------------------------------------------------------
+# infrared
 
 
 def mean_reading(distance, *, turned_by=0.0, n=12, **changes):
@@ -395,7 +395,7 @@ def test_readings_are_missed_and_remember():
         assert low < np.corrcoef(one[1:], one[:-1])[0, 1] < high
 
 
-# --- what sim cannot ------------------------------------------------------------------------------------------
+# what sim cannot
 
 
 def test_oddities_are_seen_in_what_a_twin_does():
@@ -426,7 +426,7 @@ def test_readings_can_latch_and_be_inverted():
     assert far.observe().readings == (1.0, 1.0, 1.0)
 
 
-# --- families -------------------------------------------------------------------------------------------------
+# families
 
 
 @pytest.mark.parametrize("family", [family for family in FAMILIES if family != "same"])

@@ -57,7 +57,7 @@ def sim(key=1, **settings):
     return SimTarget(SimPlatform(set=settings), ARENA, key=key, name="sim")
 
 
-# --- controllers --------------------------------------------------------------------------------------------
+# controllers
 
 
 def test_random_controllers_are_a_function_of_the_seed_and_those_of_fewer_are_the_first():
@@ -89,7 +89,7 @@ def test_a_study_that_is_not_there_is_refused():
         sample_controllers("papper", 3)
 
 
-# --- trials -------------------------------------------------------------------------------------------------
+# trials
 
 
 def test_two_sims_show_no_gap_and_never_draw_the_same_noise(some):
@@ -192,7 +192,7 @@ def test_why_without_a_calibration_says_how_to_make_one():
         gap_between("sim", "jyro", why=True)
 
 
-# --- why ----------------------------------------------------------------------------------------------------
+# why
 
 
 def test_every_number_of_the_robot_is_of_one_part():

@@ -131,7 +131,7 @@ def test_a_mirrored_scene_gives_mirrored_paths() -> None:
     np.testing.assert_allclose(one.readings[0], other.readings[0], atol=1e-6)  # rounding is not symmetric
 
 
-# --- the file -----------------------------------------------------------------------------------------------
+# the file
 
 
 def test_a_result_replaces_an_older_one(tmp_path: Path) -> None:

@@ -154,7 +154,7 @@ def test_corner_tags_lie_where_a_printed_sheet_has_them():
         corner_tags(paper_arena(), 0.4, 0.01)
 
 
-# --- tracks -----------------------------------------------------------------------------------------------------------
+# tracks
 
 
 def _straight_above(poses, tag, seen=None):

@@ -195,7 +195,7 @@ def test_a_large_floor_image_is_refused(write, tmp_path):
         load_arena(write(ROOM + "[floor.image]\nfile = 'floor.png'\nwidth = 0.8\n"))
 
 
-# --- the start ----------------------------------------------------------------------------------------------
+# the start
 
 
 def test_inner_walls_do_not_change_what_is_inside():
@@ -230,7 +230,7 @@ def test_a_wall_through_the_body_is_refused():
         check_start(Arena("x", room.walls, room.grid, Pose(0.75, 0.32, 0.0)), load_robot("jyro"))
 
 
-# --- obstacles ----------------------------------------------------------------------------------------------
+# obstacles
 
 SHAPES = [
     Obstacle(0.3, -0.2, 0.7, ((0.1, 0.05), (-0.1, 0.05), (-0.1, -0.05), (0.1, -0.05)), 0.03),
@@ -260,7 +260,7 @@ def test_sides_of_an_obstacle_lie_on_its_outline(obstacle):
             )
 
 
-# --- in studies ---------------------------------------------------------------------------------------------
+# in studies
 
 
 def test_conditions_in_the_paper_s_arena_say_what_they_said_before_there_were_files():

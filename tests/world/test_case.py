@@ -57,7 +57,7 @@ def complaint(data: object) -> list[str]:
     return [mistake.strip() for mistake in mistakes] or [first]
 
 
-# --- what is right ------------------------------------------------------------------------------------------
+# what is right
 
 
 def test_defaults_are_jyros() -> None:
@@ -147,7 +147,7 @@ def test_a_case_survives_json(path: Path) -> None:
     assert Case.from_dict(json.loads(json.dumps(case.to_dict()))) == case
 
 
-# --- what is wrong ------------------------------------------------------------------------------------------
+# what is wrong
 
 
 def put(*where: Any) -> Callable[[dict[str, Any]], None]:

@@ -224,7 +224,7 @@ def lens(
     typer.echo(f"The board's corners are off by {made.rms:.2f} pixels.\nWritten: {out}")
 
 
-# --- what was asked for -----------------------------------------------------------------------------------------------
+# what was asked for
 
 
 def _wanted(
@@ -296,7 +296,7 @@ def _refuse_toml(path: Path) -> None:
     _refuse_folder(path)
 
 
-# --- what is done -----------------------------------------------------------------------------------------------------
+# what is done
 
 
 def _tracked(source: Source, marks: Marks, seconds: float | None) -> Tracked:

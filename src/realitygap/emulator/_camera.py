@@ -98,7 +98,7 @@ class Camera:
         """Choose what belongs to the blob: how many in a row, and limits of Y, U and V, both inside."""
         self._thresh, self._colors = thresh, limits
 
-    # -- pictures --
+    # pictures
 
     def raw(self) -> Bytes:
         """The picture, (rows, columns), V Y U Y; the same array until the robot or a register changes."""
@@ -165,7 +165,7 @@ class Camera:
             return 0, 0, 0
         return len(rows), int(4 * columns.sum()) // len(rows), int(rows.sum()) // len(rows)
 
-    # -- JPEG --
+    # JPEG
 
     def jpeg_header(self, *, in_color: bool) -> bytes:
         """All of a JPEG file before the compressed data."""
@@ -187,7 +187,7 @@ class Camera:
             y, u, v = _whole(picture)
         return _jpeg(y, u if in_color else None, v)[1]
 
-    # -- drawing --
+    # drawing
 
     def _take(self) -> Bytes:
         width, height = self._size

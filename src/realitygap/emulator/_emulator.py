@@ -140,7 +140,7 @@ class Emulator:
         own = [f"{self.model}, Fluke {self.fluke_model}", moves, *goes_wrong]
         return ", ".join(own if self.timing else [*own, "no timing"])
 
-    # -- time --
+    # time
 
     @property
     def now(self) -> float:
@@ -207,7 +207,7 @@ class Emulator:
         """Whether bytes are on their way, to it or from it."""
         return bool(self._incoming) or self._line.due(1) is not None
 
-    # -- bytes --
+    # bytes
 
     def receive(self, data: bytes) -> None:
         """Take bytes that a client sends from now on."""
@@ -274,7 +274,7 @@ class Emulator:
         """Whether too much current has stopped it."""
         return isinstance(self.table.motors, S2Motors) and self.table.motors.tripped
 
-    # -- what an observer sees --
+    # what an observer sees
 
     @property
     def fluke_ahead(self) -> bool:

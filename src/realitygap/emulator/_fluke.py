@@ -123,7 +123,7 @@ class Fluke:
         self.log = b""
         self._camera.restart()
 
-    # -- receiving --
+    # receiving
 
     def receive(self, byte: int, at: int) -> None:
         """Take a byte that has arrived at a time; while the board works, it waits."""
@@ -196,7 +196,7 @@ class Fluke:
             self.log = (self.log + b"scribbler: no answer to %d\n" % self._packet[0])[-LOG_BYTES:]
             self._go_on(now)
 
-    # -- what the robot sends --
+    # what the robot sends
 
     def relay(self, data: bytes, ready: int, is_echo: bool) -> None:
         """Pass on what the robot sends; its info line gets the board's version in front."""
@@ -227,7 +227,7 @@ class Fluke:
             self._info = ""
             self._answer(b"\n", now, self._link_byte_ns)
 
-    # -- its own commands --
+    # its own commands
 
     def _dispatch_if_complete(self, at: int) -> None:
         op = self._op
@@ -375,7 +375,7 @@ class Fluke:
         self.servos[given[0] & 3] = given[1]
         return b""
 
-    # -- pictures --
+    # pictures
 
     def _camera_acts(self) -> dict[Op, Callable[[bytes, int], bytes]]:
         camera = self._camera

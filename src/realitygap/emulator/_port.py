@@ -70,7 +70,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._dtr_was_high = False
         super().__init__(*args, **kwargs)
 
-    # -- opening --
+    # opening
 
     def open(self) -> None:
         """Open the port; the first time the robot is made, afterwards it is the same one."""
@@ -117,7 +117,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
     def _reconfigure_port(self) -> None:
         """The rate set by a client has no effect here."""
 
-    # -- time --
+    # time
 
     def _sync(self) -> None:
         """Let the emulator's time come up to the real one."""
@@ -138,7 +138,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         else:
             time.sleep(max(0.0, seconds) / self._speed)
 
-    # -- bytes --
+    # bytes
 
     def _fetch(self) -> None:
         self._sync()
@@ -215,7 +215,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
     def reset_output_buffer(self) -> None:
         """Nothing waits to be sent."""
 
-    # -- lines --
+    # lines
 
     def _update_dtr_state(self) -> None:
         """DTR going low restarts a cabled S2, as on its socket."""

@@ -146,7 +146,7 @@ class Scribbler:
         """Whether a command is being carried out."""
         return self._busy
 
-    # -- receiving --
+    # receiving
 
     def receive(self, byte: int, at: int) -> None:
         """Take a byte that has arrived at a time, not before the byte before."""
@@ -250,7 +250,7 @@ class Scribbler:
         self._busy_until = now + len(data) * BYTE_NS if self._timing and self.model == "s1" else now
         self._take_next(now)
 
-    # -- reading --
+    # reading
 
     def _all_readers(self) -> dict[int, tuple[int, Callable[[bytes], bytes]]]:
         """How long each reading takes, and what answers."""
@@ -351,7 +351,7 @@ class Scribbler:
         side = packet[1] & 1
         return self._line()[side : side + 1]
 
-    # -- setting --
+    # setting
 
     def _all_setters(self) -> dict[int, Callable[[bytes, int], int | list[Segment]]]:
         """What each command does; it returns how long that takes [ns], or motions to be handed on."""

@@ -128,7 +128,7 @@ class _Work:
         # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
         return Estimate(value, min(low, value), max(high, value), self.n)
 
-    # --- level ----------------------------------------------------------------------------------------------
+    # level
 
     def level(self) -> Estimate:
         return self._estimate(float(mean_difference(*self.pair)[0]), self.drawn["level"])
@@ -153,7 +153,7 @@ class _Work:
             return Estimate(value, low, high, self.n)
         return self._estimate(value, bootstrap_mean(shares, self.n_resamples, self.rng))
 
-    # --- order ----------------------------------------------------------------------------------------------
+    # order
 
     def _no_order(self) -> Estimate | None:
         if self.n < SMALLEST_N:
@@ -220,7 +220,7 @@ class _Work:
             float(rank_violation_floor(self.target.values[None], self.rng)[0]), self.drawn["floor"]
         )
 
-    # --- behavior -------------------------------------------------------------------------------------------
+    # behavior
 
     def energy(self, one: Values, other: Values, what: str) -> Estimate:
         if not (len(one) and len(other)):
@@ -237,7 +237,7 @@ class _Work:
         why = "" if p is not None else f"So few trials give no p below {smallest:.2f}; twice as many would. "
         return Estimate(found.estimate, found.low, found.high, self.n, (why + found.refused).strip(), more)
 
-    # --- equivalence ----------------------------------------------------------------------------------------
+    # equivalence
 
     def equivalence(self, margin: float | None) -> Estimate:
         if self.n < 2:

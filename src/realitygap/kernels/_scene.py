@@ -115,7 +115,7 @@ class Scene(NamedTuple):
     scales: FLOATS
 
 
-# --- lines -------------------------------------------------------------------------------------------------
+# lines
 
 
 @kernel
@@ -211,7 +211,7 @@ def any_crossing(some, others):
     return False
 
 
-# --- bodies ------------------------------------------------------------------------------------------------
+# bodies
 
 
 @kernel
@@ -267,7 +267,7 @@ def move_robot(standing, robot, edges, pose, speed, sideways, turn_rate, dt):
     return 0, cost
 
 
-# --- sensors -----------------------------------------------------------------------------------------------
+# sensors
 
 
 @maker
@@ -370,7 +370,7 @@ def read_lights(standing, lights, robot, pose, mounts, sensor, reach, stops, rea
         readings[i] = light_at(standing, lights, robot, pose, mounts[i], sensor, reach, stops)
 
 
-# --- controllers -------------------------------------------------------------------------------------------
+# controllers
 
 
 @maker
@@ -425,7 +425,7 @@ def first_weights(scene):
     return starts
 
 
-# --- the scene ---------------------------------------------------------------------------------------------
+# the scene
 
 
 @maker

@@ -107,7 +107,7 @@ class WatchedRobot:
             page.scene, page.trials, page.live = scene, self._packed(), True
         self.widget.on_msg(self._asked)
 
-    # --- the contract -------------------------------------------------------------------------------------
+    # the contract
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial; see `Robot`."""
@@ -179,7 +179,7 @@ class WatchedRobot:
             raise AttributeError(name)
         return getattr(self.robot, name)
 
-    # --- what is shown ------------------------------------------------------------------------------------
+    # what is shown
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         return self.widget._repr_mimebundle_(**options)
@@ -263,7 +263,7 @@ class WatchedRobot:
                 self.widget.trials = pack_trials([self.trial], placed=self._where is not None)
                 self.widget.live = False
 
-    # --- a robot that moves while its program waits ---------------------------------------------------------
+    # a robot that moves while its program waits
 
     def _poll(self) -> None:
         if not self._is_polled:

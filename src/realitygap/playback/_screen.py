@@ -153,7 +153,7 @@ class Screen:
             axes.draw_artist(artist)
         return Image.fromarray(np.asarray(self._canvas.buffer_rgba())[..., :3].copy())
 
-    # --- what stands still --------------------------------------------------------------------------------
+    # what stands still
 
     def _draw_arena(self, arena: Arena) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
@@ -254,7 +254,7 @@ class Screen:
         self._bar_y = y
         self._add(self._all, self._progress)
 
-    # --- what moves ---------------------------------------------------------------------------------------
+    # what moves
 
     def _add(self, axes: Any, artist: Any) -> Any:
         artist.set_animated(True)

@@ -44,7 +44,7 @@ class Derived:
         return self.of(rows).select(pl.col(name).cast(dtype) for name, dtype in self.schema.items())
 
 
-# --- species ------------------------------------------------------------------------------------------------
+# species
 
 
 def _species(rows: pl.DataFrame) -> pl.DataFrame:
@@ -63,7 +63,7 @@ def _species(rows: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-# --- innovations --------------------------------------------------------------------------------------------
+# innovations
 
 
 def _innovations(rows: pl.DataFrame) -> pl.DataFrame:
@@ -88,7 +88,7 @@ def _innovations(rows: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-# --- lineage ------------------------------------------------------------------------------------------------
+# lineage
 
 _GENES = ("hidden", "biases", "innovation", "source", "target", "weight", "enabled")
 

@@ -197,7 +197,7 @@ def _n_runs(tally: Tally, novelty: dict[str, Any]) -> int:
     return tally.runs.filter(pl.col("condition").is_in(list(novelty))).height
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _draw(

@@ -313,7 +313,7 @@ def doubt(text: str, denominator: int) -> tuple[str, int] | None:
     return "impossible", nearest
 
 
-# --- reading ------------------------------------------------------------------------------------------------
+# reading
 
 
 def _read(path: Path) -> list[_Row]:
@@ -402,7 +402,7 @@ def _doubles(rows: Sequence[_Row]) -> list[str]:
     return mistakes
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def audit_notes(audit: Audit) -> list[str]:

@@ -151,7 +151,7 @@ def draw_tally_choices(
     return drawings
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 @dataclass(frozen=True)
@@ -433,7 +433,7 @@ def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout:
     )
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _alt(groups: list[list[Choice]]) -> str:

@@ -240,7 +240,7 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
-# --- parts --------------------------------------------------------------------------------------------------
+# parts
 
 
 def _of(summary: Summary, family: str) -> list[Summary]:

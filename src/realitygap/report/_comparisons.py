@@ -293,7 +293,7 @@ def _comparison(
     )
 
 
-# --- on the page --------------------------------------------------------------------------------------------
+# on the page
 
 _REASONS: dict[Reason, str] = {
     "noise": "Noise levels, with one selection",

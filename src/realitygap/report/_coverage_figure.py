@@ -141,7 +141,7 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
     return found
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _draw(panels: list[_Panel], width: float) -> Figure:
@@ -346,7 +346,7 @@ def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, 
     )
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _caption(tally: Tally, panels: list[_Panel], points: Points) -> str:

@@ -218,7 +218,7 @@ def audit_distance(
 _BEYOND = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
 
 
-# --- random walks -------------------------------------------------------------------------------------------
+# random walks
 
 _WAYS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
@@ -245,7 +245,7 @@ def _as_behavior(distance: BehaviorDistance, walk: Sequence[int], columns: int) 
     return ((column + 0.5) * CELL_M, (row + 0.5) * CELL_M)
 
 
-# --- leverage -----------------------------------------------------------------------------------------------
+# leverage
 
 
 def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
@@ -306,7 +306,7 @@ def _trend(means: Values) -> Values:
     return found
 
 
-# --- the relation with length -------------------------------------------------------------------------------
+# the relation with length
 
 
 def _confound(
@@ -400,7 +400,7 @@ def _pairs_of_runs(rows: pl.DataFrame, rng: np.random.Generator, n_pairs: int) -
     return behaviors
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def distance_notes(audit: DistanceAudit) -> list[str]:

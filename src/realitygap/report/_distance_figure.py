@@ -103,7 +103,7 @@ def _title(axes: Axes, title: str, text: str = "") -> None:
     )
 
 
-# --- the map ------------------------------------------------------------------------------------------------
+# the map
 
 
 def _draw_map(axes: Axes, audit: DistanceAudit, *, wide: bool) -> None:
@@ -144,7 +144,7 @@ def _draw_map(axes: Axes, audit: DistanceAudit, *, wide: bool) -> None:
     )
 
 
-# --- the relation with length -------------------------------------------------------------------------------
+# the relation with length
 
 
 def _draw_pairs(axes: Axes, confound: Confound, audit: DistanceAudit, *, wide: bool) -> None:
@@ -222,7 +222,7 @@ def _draw_correlations(axes: Axes, confounds: list[Confound], names: float, *, w
     )
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _caption(audit: DistanceAudit) -> str:

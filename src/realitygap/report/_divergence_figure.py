@@ -211,7 +211,7 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
     return Side(name, tuple(trials))
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE) -> Drawing:

@@ -139,7 +139,7 @@ def _csv(rows: list[list[str]]) -> bytes:
     return buffer.getvalue().encode("utf-8", "replace")
 
 
-# --- tables of the page -------------------------------------------------------------------------------------
+# tables of the page
 
 
 def tables_of(page: str) -> list[tuple[str, str, list[list[str]]]]:

@@ -224,7 +224,7 @@ def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:
     return rows
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _panels(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
@@ -412,7 +412,7 @@ def _draw_pen_legend(axes: Axes, n_pens: int, *, small: bool) -> None:
     )
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _individuals_caption(

@@ -138,7 +138,7 @@ def draw_chosen_lineage(
     return drawings
 
 
-# --- who they are -------------------------------------------------------------------------------------------
+# who they are
 
 
 def _ancestors(trial: ChosenTrial, rows: pl.DataFrame, lineage: pl.DataFrame) -> list[Ancestor]:
@@ -188,7 +188,7 @@ def _brought(
     return ", ".join([*(f"node h{node}" for node in nodes), *links])
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], width: float) -> Figure:

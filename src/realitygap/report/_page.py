@@ -195,7 +195,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
     }
 
 
-# --- figures ------------------------------------------------------------------------------------------------
+# figures
 
 
 def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> FigureOnPage:
@@ -245,7 +245,7 @@ def _choices_figure(tally: Tally) -> FigureOnPage | None:
     return _on_page("figure-10", "Figure 10", *draw_tally_choices(tally, widths=(WIDE, NARROW)))
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _banners(tally: Tally) -> list[tuple[str, str]]:

@@ -227,7 +227,7 @@ def _words() -> list[Finding]:
     ]
 
 
-# --- on the page --------------------------------------------------------------------------------------------
+# on the page
 
 
 def paper_audit_content(tally: Tally) -> dict[str, Any] | None:

@@ -204,7 +204,7 @@ def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], proble
     return "The paths were recomputed from the records and visit the cells recorded."
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _draw(paths: list[TracedPath], arena: Arena, body: Body, label: str, width: float) -> Figure:
@@ -437,7 +437,7 @@ def draw_path_legend(axes: Axes, paths: list[TracedPath], *, small: bool) -> Non
     )
 
 
-# --- words --------------------------------------------------------------------------------------------------
+# words
 
 
 def _caption(

@@ -61,7 +61,7 @@ class Share:
         return float(low), float(high)
 
 
-# --- plateaus -----------------------------------------------------------------------------------------------
+# plateaus
 
 
 def plateau_length(n_generations: int) -> int:
@@ -84,7 +84,7 @@ def plateaus(tally: Tally, condition: str) -> Share | None:
     return Share(int((so_far[:, -1] == so_far[:, -1 - k]).sum()), n)
 
 
-# --- spread -------------------------------------------------------------------------------------------------
+# spread
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _spread(tally: Tally, condition: str, reference: str) -> Spread:
     )
 
 
-# --- variety ------------------------------------------------------------------------------------------------
+# variety
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def mean_jaccard_distance(visited: npt.NDArray[np.bool_]) -> float:
     return float(distance[np.triu_indices(len(visited), 1)].mean())
 
 
-# --- chance -------------------------------------------------------------------------------------------------
+# chance
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ def _as_json(values: Mapping[str, Any]) -> Markup:
     return Markup(text)
 
 
-# --- one run ------------------------------------------------------------------------------------------------
+# one run
 
 
 def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:

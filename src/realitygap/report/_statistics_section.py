@@ -52,7 +52,7 @@ def statistics_content(tally: Tally) -> dict[str, Any]:
     }
 
 
-# --- deceptiveness ------------------------------------------------------------------------------------------
+# deceptiveness
 
 
 def _deception(
@@ -155,7 +155,7 @@ def _percent_span(share: Share) -> str:
     return f"{100 * low:.0f}–{100 * high:.0f} %"
 
 
-# --- champions ----------------------------------------------------------------------------------------------
+# champions
 
 
 def _champions(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -235,7 +235,7 @@ def _champion_row(champions: Champions, reference: Champions | None) -> dict[str
     }
 
 
-# --- spread -------------------------------------------------------------------------------------------------
+# spread
 
 
 def _spread(tally: Tally) -> dict[str, Any]:
@@ -262,7 +262,7 @@ def _number(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
 
 
-# --- variety ------------------------------------------------------------------------------------------------
+# variety
 
 
 def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
@@ -302,7 +302,7 @@ def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], di
     return f"{signed(float(one.mean() - other.mean()), digits)}{within}"
 
 
-# --- chance -------------------------------------------------------------------------------------------------
+# chance
 
 
 def _chance(tally: Tally) -> dict[str, Any] | None:

@@ -171,7 +171,7 @@ def _replayed(trial: ChosenTrial) -> Trajectory:
     return replay(trial.condition, trial.row)
 
 
-# --- drawing ------------------------------------------------------------------------------------------------
+# drawing
 
 
 def _traced(trial: ChosenTrial, trajectory: Trajectory) -> TracedPath:

@@ -82,7 +82,7 @@ def _goal_budget(plan: ClosingPlan) -> int:
     return plan.transfer_budget if plan.transfer_budget in plan.budgets else max(plan.budgets)
 
 
-# --- a twin -------------------------------------------------------------------------------------------------
+# a twin
 
 
 def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | None:
@@ -158,7 +158,7 @@ def _measures(unit: Row) -> Row:
     return found
 
 
-# --- families and strategies --------------------------------------------------------------------------------
+# families and strategies
 
 
 def _families(plan: ClosingPlan, twins: Sequence[Row]) -> list[Row]:
@@ -216,7 +216,7 @@ def _strategies(twins: Sequence[Row]) -> list[Row]:
     return [{"strategy": name, "n": len(values), **_mean_interval(values)} for name, values in found.items()]
 
 
-# --- goals --------------------------------------------------------------------------------------------------
+# goals
 
 
 def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row]:
@@ -345,7 +345,7 @@ def _why(twin: Row, after: Row, value: float) -> Row:
     }
 
 
-# --- intervals ----------------------------------------------------------------------------------------------
+# intervals
 
 
 def median_interval(values: Sequence[float]) -> Row:

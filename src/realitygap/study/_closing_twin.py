@@ -88,7 +88,7 @@ class ClosingTwin:
         """The held-out controllers."""
         return held_out(self.plan.controllers)
 
-    # --- the same controllers on both sides -----------------------------------------------------------------
+    # the same controllers on both sides
 
     def _judge(self, target: Target) -> dict[str, Any]:
         """The held-out controllers on the twin: crossed cells of each trial."""
@@ -160,7 +160,7 @@ class ClosingTwin:
             write_whole(path, found.to_toml().encode())
         return load_calibration(path)
 
-    # --- transfer -------------------------------------------------------------------------------------------
+    # transfer
 
     def _transfer(self, target: Target) -> dict[str, Any]:
         """Each strategy at equal budget; `posterior` for each way to observe, calibrated by its share of the budget."""

@@ -200,7 +200,7 @@ def _paced(
     return source.lasting(step_s), (said,)
 
 
-# --- trials -------------------------------------------------------------------------------------------------
+# trials
 
 
 def plans_of(genomes: Sequence[Genome], trials: int, first: int, steps: int = STEPS) -> list[TrialPlan]:
@@ -296,7 +296,7 @@ def _replay(source: Target, observed: Sequence[ObservedTrial], tell: Tell | None
     )
 
 
-# --- what is kept apart from the transfer gap ---------------------------------------------------------------
+# what is kept apart from the transfer gap
 
 
 def _luck(controllers: Sequence[Controller]) -> Estimate:

@@ -68,7 +68,7 @@ class SimWorldRobot(ProgramRobot):
         self.n_sensors = len(self.model.range)
         self.command = Command(0.0, 0.0)
 
-    # -- what it is told --------------------------------------------------------------------------------------
+    # what it is told
 
     def move(self, move: float, turn: float) -> None:
         """The command of this and all further steps, each part -1..1.
@@ -78,7 +78,7 @@ class SimWorldRobot(ProgramRobot):
         """
         self.command = check_command(Command(move, turn))
 
-    # -- what it knows ----------------------------------------------------------------------------------------
+    # what it knows
 
     @property
     def pose(self) -> Pose:
@@ -118,7 +118,7 @@ class SimWorldRobot(ProgramRobot):
         left, right = self._room.lanes.wheels[:, 0].tolist()
         return left, right
 
-    # -- the contract -----------------------------------------------------------------------------------------
+    # the contract
 
     @property
     def step_s(self) -> float:
@@ -148,7 +148,7 @@ class SimWorldRobot(ProgramRobot):
         """Tell it to stand from the next step on."""
         self.command = Command(0.0, 0.0)
 
-    # -- what the world asks ----------------------------------------------------------------------------------
+    # what the world asks
 
     def _parts(self) -> list[Obstacle]:
         """What the others meet of it, where it starts."""

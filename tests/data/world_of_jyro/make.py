@@ -28,7 +28,7 @@ RANGES += ["Pioneer16Sonars", "Pioneer4Sonars", "RangeSensor"]
 LIGHTS = ["PioneerFrontLightSensors", "Pioneer4FrontLightSensors", "LightSensor"]
 
 
-# --- set-ups -------------------------------------------------------------------------------------------------
+# set-ups
 
 
 def random_world(rng, width=3.0, height=2.0, n_boxes=2, n_walls=2, n_lights=2):
@@ -213,7 +213,7 @@ SETUPS |= {f"lights-{k}": lights(k) for k in range(3)}
 SETUPS["motion"] = motion()
 
 
-# --- carrying them out ---------------------------------------------------------------------------------------
+# carrying them out
 
 
 def build(setup):

@@ -80,7 +80,7 @@ class SceneRobot:
         self._world: JyroWorld | None = None
         self.reset()
 
-    # -- where it is ------------------------------------------------------------------------------------------
+    # where it is
 
     @property
     def world(self) -> JyroWorld:
@@ -119,7 +119,7 @@ class SceneRobot:
         """Set the odometry: x ahead [m], y to the left [m], heading [rad] in a frame of the robot's own."""
         self._odometry = Pose(x, y, heading)
 
-    # -- driving ----------------------------------------------------------------------------------------------
+    # driving
 
     def move(self, speed: float, turn_rate: float) -> None:
         """Drive at a speed [m/s] and turn to the left at a rate [rad/s] from now on, without any limit."""
@@ -156,7 +156,7 @@ class SceneRobot:
         if self._world is not None:
             self._world._is_placed(self)
 
-    # -- devices ----------------------------------------------------------------------------------------------
+    # devices
 
     def add(self, device: AnyDevice) -> AnyDevice:
         """Give it a device, and get that device back.
@@ -184,7 +184,7 @@ class SceneRobot:
         kinds = sorted({device.kind for device in self.devices})
         raise KeyError(f"{self.name} has no device {kind!r}; it has: {', '.join(kinds) or 'none'}.")
 
-    # -- what the world asks ----------------------------------------------------------------------------------
+    # what the world asks
 
     def edges(self, *, ahead: bool = False) -> NDArray[np.float64]:
         """(e, 4) all edges of body and devices, forward and left of both ends [m].
@@ -211,7 +211,7 @@ class SceneRobot:
         if self.keep_trail and self.trail[-1:] != [self.pose]:
             self.trail.append(self.pose)
 
-    # -- showing ----------------------------------------------------------------------------------------------
+    # showing
 
     def outlines(self) -> list[Shape]:
         """The body as it is drawn."""

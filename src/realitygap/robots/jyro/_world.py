@@ -97,7 +97,7 @@ class JyroWorld:
         self.time, self.n_steps = 0.0, 0
         self.random = np.random.default_rng(self.seed)
 
-    # -- what stands ------------------------------------------------------------------------------------------
+    # what stands
 
     def add_wall(self, x1: float, y1: float, x2: float, y2: float, color: str = "black") -> None:
         """Put up a wall from one point to another [m]."""
@@ -205,7 +205,7 @@ class JyroWorld:
         names = ", ".join(str(robot.name) for robot in self.robots)
         raise KeyError(f"No robot {name!r}; there are: {names or 'none'}.")
 
-    # -- going on ---------------------------------------------------------------------------------------------
+    # going on
 
     def step(self, n_steps: int = 1, *, brains: bool = True) -> None:
         """Go on by some steps.
@@ -265,7 +265,7 @@ class JyroWorld:
         if not stall:
             robot._has_stepped(before)
 
-    # -- what devices ask -------------------------------------------------------------------------------------
+    # what devices ask
 
     def look(
         self, robot: SceneRobot, mounts: NDArray[np.float64], reach: float
@@ -305,7 +305,7 @@ class JyroWorld:
         kernel.read_lights(self._standing, lights, number, robot._row, mounts, mode, reach, stops, readings)
         return readings
 
-    # -- keeping the arrays -----------------------------------------------------------------------------------
+    # keeping the arrays
 
     def _has_changed(self) -> None:
         """Something was added: the arrays are made anew, and all devices are read."""
@@ -353,7 +353,7 @@ class JyroWorld:
             if device.active:
                 device.read()
 
-    # -- showing ----------------------------------------------------------------------------------------------
+    # showing
 
     def picture(self, hide: Collection[str] = ()) -> Picture:
         """The world from above, without the parts to hide: "rays", "trails", "devices" and so on."""

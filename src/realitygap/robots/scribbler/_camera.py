@@ -40,7 +40,7 @@ class Camera(Device):
     # of JPEG files, gray or not, which a Fluke gives once for all pictures of a size
     _headers: Mapping[bool, bytes] = MappingProxyType({})
 
-    # --- setting up -------------------------------------------------------------------------------------------
+    # setting up
 
     def _prepare(self, what: str) -> None:
         """At the first use: automatic colors and exposure, the three windows of `bright`, the color of blobs."""
@@ -144,7 +144,7 @@ class Camera(Device):
         for register, value in zip((0x00, 0x06, 0x10), values, strict=True):
             self._set_register(register, value)
 
-    # --- seeing -----------------------------------------------------------------------------------------------
+    # seeing
 
     def picture(self, kind: Kind = "jpeg") -> Pixels:
         """A picture, (h, w, 3) uint8 red, green, blue, or (h, w) uint8 in gray; rows from the top.

@@ -209,7 +209,7 @@ class Link:
         """Whether it may be used."""
         return self._is_open
 
-    # --- one command ------------------------------------------------------------------------------------------
+    # one command
 
     def ask(self, request: Request, decode: Callable[[bytes], T]) -> T:
         """Send a command and decode its answer.
@@ -319,7 +319,7 @@ class Link:
         self.faults.strays += n_bytes
         return n_bytes
 
-    # --- finding the same step again --------------------------------------------------------------------------
+    # finding the same step again
 
     def _find_step_for(self, request: Request) -> None:
         """Make both sides agree before a command.
@@ -443,7 +443,7 @@ class Link:
         if self._motors is not None and self.motors_off and request.data[0] not in _STEERING:
             self._exchange(self._motors, codec.sensor_block)
 
-    # --- beginning and end ------------------------------------------------------------------------------------
+    # beginning and end
 
     def greet(self) -> codec.InfoLine:
         """Find out who is there, switch the echo mode off and stop the motors.

@@ -130,7 +130,7 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
         """The time that this robot lives in; whoever waits by it is watched, too."""
         return self.link.clock if self._watchdog is None else WatchedClock(self.link.clock, self._watchdog)
 
-    # --- the contract -----------------------------------------------------------------------------------------
+    # the contract
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: motors stopped, steps counted from 0; somebody has put the robot where it starts."""

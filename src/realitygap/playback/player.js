@@ -23,7 +23,7 @@ const tag = (name, attributes = {}, text = "") => {
 const short = (value) => value.toFixed(1);
 const share = (value) => value.toFixed(3).replace(/^0/, "");
 
-// --- colors ---------------------------------------------------------------------------------------------------
+// colors
 
 const parse = (color) => [1, 3, 5].map((place) => parseInt(color.slice(place, place + 2), 16));
 const mixed = (one, other, part) => {
@@ -35,7 +35,7 @@ function rayColor(colors, near) {
   return near < 0.5 ? mixed(colors.far, colors.middle, 2 * near) : mixed(colors.middle, colors.near, 2 * near - 1);
 }
 
-// --- where a robot is -----------------------------------------------------------------------------------------
+// where a robot is
 
 // how many entries of a rising list are <= row
 function reached(rows, row) {
@@ -64,7 +64,7 @@ function momentOf(trial, time, smooth) {
   };
 }
 
-// --- the view -------------------------------------------------------------------------------------------------
+// the view
 
 function render({ model, el }) {
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
@@ -101,7 +101,7 @@ function render({ model, el }) {
   const status = tag("div", { class: "rg-status", role: "status" });
   root.append(head, svg, names, bar, status);
 
-  // --- what stands still ---
+  // what stands still
 
   function toX(x) { return (x - scene.extent[0]) * MM; }
   function toY(y) { return (scene.extent[3] - y) * MM; }
@@ -174,7 +174,7 @@ function render({ model, el }) {
     return { trial, trail, blocked, robot, rays, hits, letter, line, words, points: { row: -1, text: "", crosses: "" } };
   }
 
-  // --- what moves ---
+  // what moves
 
   function draw() {
     if (!scene || !scene.extent || closed) return;
@@ -267,7 +267,7 @@ function render({ model, el }) {
     });
   }
 
-  // --- time ---
+  // time
 
   function setPlaying(wanted) {
     if (live) return;
@@ -323,7 +323,7 @@ function render({ model, el }) {
     does();
   });
 
-  // --- a robot that runs ---
+  // a robot that runs
 
   function liveMoment() {
     const { now, shown } = live, trial = trials[0];

@@ -8,7 +8,7 @@
   const DASHES = ["", "9 3", "2 3", "8 3 2 3", "5 3", "11 3 2 3 2 3", "3 2", "14 4"];
   const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
-  // --- trials ---------------------------------------------------------------------------------------------
+  // trials
 
   const conditions = data.conditions.map((condition) => {
     // trials can stand on one arena where walls, cells and the length of a step are the same
@@ -69,7 +69,7 @@
     return low;
   }
 
-  // --- state ----------------------------------------------------------------------------------------------
+  // state
 
   const pens = new Array(data.pens).fill(null);
   let shown = 0; // the condition whose trials can be chosen
@@ -82,7 +82,7 @@
   const stepS = () => (inUse()[0] || { trial: conditions[0].trials[0] }).trial.stepS;
   const seconds = (step) => (step * stepS()).toFixed(stepS() < 0.1 ? 2 : 1);
 
-  // --- drawing --------------------------------------------------------------------------------------------
+  // drawing
 
   const make = (name, attributes = {}, parent = null) => {
     const element = document.createElementNS(byId("arena").namespaceURI, name);
@@ -257,7 +257,7 @@
     });
   }
 
-  // --- coverage over time ---------------------------------------------------------------------------------
+  // coverage over time
 
   const THUMB = 8; // half a slider's thumb, so that the curves stand above it [px]
   let plot = null;
@@ -303,7 +303,7 @@
     }
   }
 
-  // --- numbers --------------------------------------------------------------------------------------------
+  // numbers
 
   let rows = [];
 
@@ -416,7 +416,7 @@
 
   const tell = (text) => { byId("status").textContent = text; };
 
-  // --- choosing trials ------------------------------------------------------------------------------------
+  // choosing trials
 
   let matrix = []; // rows of buttons
   let focus = [0, 1]; // the one that Tab comes to
@@ -554,7 +554,7 @@
     drawMatrix();
   });
 
-  // --- time -----------------------------------------------------------------------------------------------
+  // time
 
   function showPlaying() {
     byId("icon").setAttribute("d", playing ? "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z" : "M4 2.5v11L13 8z");
@@ -643,7 +643,7 @@
   chart.addEventListener("pointermove", (event) => dragging && drag(event));
   for (const end of ["pointerup", "pointercancel"]) chart.addEventListener(end, () => { dragging = false; });
 
-  // --- links and start ------------------------------------------------------------------------------------
+  // links and start
 
   // #replay=CONDITION/RUN/GENERATION/INDIVIDUAL,...@STEP
   function follow() {

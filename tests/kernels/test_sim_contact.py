@@ -45,9 +45,13 @@ def put(
 
 
 def body(
-    model: str = "slide", friction: float = 0.3, corners: Any = OUTLINE, radius: float = 0.01
+    model: str = "slide",
+    friction: float = 0.3,
+    corners: Any = OUTLINE,
+    radius: float = 0.01,
+    slip: float = math.inf,
 ) -> reference.Body:
-    return reference.Body(list(corners), radius, friction, (1.0, 1.0, 171.0), model)
+    return reference.Body(list(corners), radius, friction, (1.0, 1.0, 171.0), model, slip)
 
 
 def free_starts(
@@ -127,6 +131,17 @@ def test_steps_among_obstacles_equal_the_reference(model: str) -> None:
         "enclosed": False,
     }
     driven = drive_robots({**numbers_of(starts), **numbers}, commands, contact=model, **structure)
+    assert compare(driven, starts, commands, like, world) > cases(40, 4)
+
+
+@pytest.mark.parametrize("saturation", [10.0, 200.0])
+def test_steps_of_wheels_whose_grip_gives_out_equal_the_reference(saturation: float) -> None:
+    rng = np.random.default_rng(8)
+    like = body(slip=0.5 / reference.SUBSTEPS / saturation)
+    world = reference.World(planes())
+    starts = free_starts(rng, cases(40, 6), like, world)
+    commands = np.column_stack([rng.uniform(-0.2, 1, 12), rng.uniform(-0.9, 0.9, 12)])
+    driven = drive_robots({**numbers_of(starts), **room(), "contact.saturation": saturation}, commands)
     assert compare(driven, starts, commands, like, world) > cases(40, 4)
 
 
@@ -276,8 +291,8 @@ def test_finer_steps_lead_to_one_path() -> None:
     assert order[1:].min() > 0.7, (errors, order)
 
 
-@pytest.mark.parametrize("boxes", [False, True])
-def test_finer_parts_lead_to_one_place_for_robots_that_are_pressed(boxes: bool) -> None:
+@pytest.mark.parametrize(("boxes", "saturation"), [(False, 0.0), (True, 0.0), (False, 30.0)])
+def test_finer_parts_lead_to_one_place_for_robots_that_are_pressed(boxes: bool, saturation: float) -> None:
     """Eight steps of 0.5 s by robots that a wall, or two boxes, hold up: the error falls about in proportion.
 
     Stated: nine of ten robots within 10 mm and 0.15 rad of the finest.
@@ -294,7 +309,7 @@ def test_finer_parts_lead_to_one_place_for_robots_that_are_pressed(boxes: bool) 
         starts = free_starts(rng, n, body(), reference.World(planes(), polygons))
     else:
         starts = [(WIDTH - 0.11, 0.3 + rng.uniform(-0.1, 0.1), rng.uniform(-1.3, 1.3)) for _ in range(n)]
-    numbers = {**numbers_of(starts), **numbers}
+    numbers = {**numbers_of(starts), **numbers, "contact.saturation": saturation}
     commands = np.stack([rng.uniform(0.3, 1, n), rng.uniform(-0.6, 0.6, n)])[None].repeat(8, 0)
     structure: dict[str, Any] = {"obstacles": [4, 4]} if boxes else {}
 

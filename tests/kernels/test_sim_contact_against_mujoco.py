@@ -1,4 +1,4 @@
-"""The contact `slide` ends where MuJoCo has the same push end, once friction and compliance are fitted."""
+"""The contact `slide` ends where MuJoCo has the same push end: fitted to a servo, and as it is for wheels that slip."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from realitygap.kernels._sim_shape import make_sim_shape, sim_table
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'realitygap[twin]'")
 
-from tests.reference.pushed_body import Push, PushedBody
+from tests.reference.pushed_body import Push, PushedBody, Wheels
 
 CORNERS = [(0.079, -0.05), (0.079, 0.05), (0.06, 0.0695), (-0.06, 0.0695),
            (-0.079, 0.05), (-0.079, -0.05), (-0.06, -0.0695), (0.06, -0.0695)]  # fmt: skip
@@ -38,7 +38,7 @@ def _aligns_by(push: Push) -> float:
     return abs(math.atan2(x, abs(y)) - abs(push.heading) - math.atan(FRICTION))
 
 
-def _pushes(n: int, seed: int) -> list[Push]:
+def _pushes(n: int, seed: int, turn: float = 4.0) -> list[Push]:
     rng = np.random.default_rng(seed)
     pushes = []
     while len(pushes) < n:
@@ -47,7 +47,7 @@ def _pushes(n: int, seed: int) -> list[Push]:
             y=-rng.uniform(0.11, 0.14),
             heading=math.radians(rng.uniform(3, 87)),
             speed=speed,
-            turn=rng.uniform(-4, 4) * speed,
+            turn=rng.uniform(-turn, turn) * speed,
             seconds=STEP_S * int(rng.integers(50, 125)),
         )
         if _aligns_by(push) > NEAR_THE_BOUNDARY:
@@ -55,12 +55,13 @@ def _pushes(n: int, seed: int) -> list[Push]:
     return pushes
 
 
-def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.ndarray:
+def _ends(pushes: list[Push], friction: float, lat: float, ang: float, saturation: float = 0.0) -> np.ndarray:
     """(n, 3) where `slide` has them end: x, y [m], heading [rad]; at most LANES of them."""
     shape = make_sim_shape(parts=[8], contact="slide", n_walls=4, enclosed=True)
     walls = [(-5, -9, 5, -9), (5, -9, 5, 0), (5, 0, -5, 0), (-5, 0, -5, -9)]
     numbers = {"body.0.radius": RADIUS, "drive.speed": SPEED, "drive.track": TRACK}
     numbers |= {"contact.friction": friction, "contact.long": 1.0, "contact.lat": lat, "contact.ang": ang}
+    numbers["contact.saturation"] = saturation
     for k, (x, y) in enumerate(CORNERS):
         numbers |= {f"body.0.corner.{k}.x": x, f"body.0.corner.{k}.y": y}
     for k, ends in enumerate(walls):
@@ -95,9 +96,11 @@ def _ends(pushes: list[Push], friction: float, lat: float, ang: float) -> np.nda
 
 
 def _errors(
-    pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float
+    pushes: list[Push], truth: np.ndarray, friction: float, lat: float, ang: float, saturation: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    parts = [_ends(pushes[k : k + LANES], friction, lat, ang) for k in range(0, len(pushes), LANES)]
+    parts = [
+        _ends(pushes[k : k + LANES], friction, lat, ang, saturation) for k in range(0, len(pushes), LANES)
+    ]
     off = np.concatenate(parts) - truth
     return np.hypot(off[:, 0], off[:, 1]), np.abs(np.remainder(off[:, 2] + math.pi, math.tau) - math.pi)
 
@@ -121,3 +124,19 @@ def test_a_pushed_body_ends_where_mujoco_has_it_end() -> None:
     ends = np.array([body.end_of(push) for push in unseen])
     places, turns = _errors(unseen, ends, abs(fitted[0]), math.exp(fitted[1]), math.exp(fitted[2]))
     assert int(((places < 0.01) & (turns < math.radians(3))).sum()) >= 95
+
+
+def test_wheels_whose_grip_gives_out_leave_a_body_where_mujoco_has_it() -> None:
+    """Nothing is fitted: `sim` is told the wheels' arm and slip. Seeds are fixed, and nothing else is random."""
+    wheels = Wheels()
+    body = PushedBody(CORNERS, RADIUS, FRICTION, wheels)
+    pushes = _pushes(100, seed=3, turn=12.0)
+    ends = np.array([body.end_of(push) for push in pushes])
+
+    def n_right(saturation: float) -> int:
+        places, turns = _errors(pushes, ends, FRICTION, 1.0, 1 / wheels.arm**2, saturation)
+        return int(((places < 0.01) & (turns < math.radians(3))).sum())
+
+    found = {saturation: n_right(saturation) for saturation in (0.0, 1 / wheels.slip)}
+    assert found[1 / wheels.slip] >= 95, found
+    assert found[0.0] < 70, found

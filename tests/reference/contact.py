@@ -15,6 +15,7 @@ Pose = tuple[float, float, float]
 CLEAR = 2e-6  # how far a body that was pushed is free [m]
 SUBSTEPS, RESCUES = 4, 4
 LEAST_GIVE, MOST_TURN = 0.05, 0.25
+SECANTS = 4
 
 
 class Touch(NamedTuple):
@@ -32,6 +33,7 @@ class Body:
     friction: float = 0.0
     give: tuple[float, float, float] = (1.0, 1.0, 1.0)  # along, across, around
     model: str = "slide"
+    slip: float = math.inf  # of a wheel in a part of a step, from which on its grip hardly grows [m]
 
 
 @dataclass
@@ -138,9 +140,42 @@ def dot(f: Vector, g: Vector) -> float:
     return sum(one * two for one, two in zip(f, g, strict=True))
 
 
-def gives(body: Body, wrench: Vector) -> Vector:
-    along, across, around = (give * part for give, part in zip(body.give, wrench, strict=True))
-    return along, across, around
+@dataclass
+class Give:
+    """How a body moves by a wrench: a force of 1 ahead moves it `along`, and turns it by `both`."""
+
+    along: float
+    across: float
+    around: float
+    both: float = 0.0
+
+    def __call__(self, wrench: Vector) -> Vector:
+        ahead, aside, torque = wrench
+        return (
+            self.along * ahead + self.both * torque,
+            self.across * aside,
+            self.around * torque + self.both * ahead,
+        )
+
+
+def softened(body: Body, move: Vector) -> Give:
+    """What a body gives whose wheels slipped by a motion: two springs beside each other, each the secant to its grip.
+
+    A wheel of stiffness 1 / (2 long) along and 1 / (2 lat) across, r to its side of the axle's middle, holds with
+    1 / softness of that.
+    """
+    long, lat, ang = body.give
+    arm = math.sqrt(long / ang)
+    stiff_along = stiff_across = stiff_around = stiff_both = 0.0
+    for side in (1.0, -1.0):  # left, right
+        ahead, aside = move[0] - side * arm * move[2], move[1]
+        softness = math.sqrt(1 + (ahead**2 / long + aside**2 / lat) / body.slip**2)
+        stiff_along += 1 / (2 * long * softness)
+        stiff_across += 1 / (2 * lat * softness)
+        stiff_around += arm**2 / (2 * long * softness)
+        stiff_both -= side * arm / (2 * long * softness)
+    whole = stiff_along * stiff_around - stiff_both**2
+    return Give(stiff_around / whole, 1 / stiff_across, stiff_along / whole, -stiff_both / whole)
 
 
 def held_at(body: Body, pose: Pose, before: Pose, heading: float, touch: Touch) -> Held:
@@ -157,9 +192,9 @@ def held_at(body: Body, pose: Pose, before: Pose, heading: float, touch: Touch) 
     return Held(n, t, CLEAR - touch.gap, dot(moved, t))
 
 
-def push(body: Body, held: Held, others: Vector = (0.0, 0.0, 0.0)) -> Vector:
+def push(body: Body, give: Give, held: Held, others: Vector = (0.0, 0.0, 0.0)) -> Vector:
     """The motion by one contact, beside that of others: free by a push, and by friction as far as mu allows."""
-    nn, tt, nt = (dot(gives(body, f), g) for f, g in ((held.n, held.n), (held.t, held.t), (held.n, held.t)))
+    nn, tt, nt = (dot(give(f), g) for f, g in ((held.n, held.n), (held.t, held.t), (held.n, held.t)))
     deep, slip = held.deep - dot(others, held.n), held.slip + dot(others, held.t)
     if deep <= 0:
         return 0.0, 0.0, 0.0
@@ -172,30 +207,39 @@ def push(body: Body, held: Held, others: Vector = (0.0, 0.0, 0.0)) -> Vector:
         press = deep / max(nn + side * body.friction * nt, LEAST_GIVE * nn)
         rub = side * body.friction * press
     n, t = held.n, held.t
-    return gives(body, (press * n[0] + rub * t[0], press * n[1] + rub * t[1], press * n[2] + rub * t[2]))
+    return give((press * n[0] + rub * t[0], press * n[1] + rub * t[1], press * n[2] + rub * t[2]))
 
 
-def pushed(body: Body, pose: Pose, before: Pose, world: World) -> Pose:
-    """Free of the deepest two contacts, as they are with the body halfway through its turn."""
-    contacts = touched(body, pose, world)[:2]
+def clipped(angle: float) -> float:
+    return min(max(angle, -MOST_TURN), MOST_TURN)
+
+
+def pushed_by(
+    body: Body, give: Give, pose: Pose, before: Pose, contacts: list[Touch]
+) -> tuple[Vector, float]:
+    """How it moves free of contacts, as they are with the body halfway through its turn, and its heading there."""
     turned = math.remainder(pose[2] - before[2], math.tau)
-
-    def clipped(angle: float) -> float:
-        return min(max(angle, -MOST_TURN), MOST_TURN)
-
-    around = push(body, held_at(body, pose, before, pose[2] + clipped(-turned / 2), contacts[0]))[2]
+    around = push(body, give, held_at(body, pose, before, pose[2] + clipped(-turned / 2), contacts[0]))[2]
     heading = pose[2] + clipped((around - turned) / 2)
     held = [held_at(body, pose, before, heading, contact) for contact in contacts]
     moves: list[Vector] = [(0.0, 0.0, 0.0)] * len(held)
     for _ in range(2):
         for k in range(len(held)):
-            moves[k] = push(body, held[k], moves[1 - k] if len(held) == 2 else (0.0, 0.0, 0.0))
+            moves[k] = push(body, give, held[k], moves[1 - k] if len(held) == 2 else (0.0, 0.0, 0.0))
     along, across, around = (sum(parts) for parts in zip(*moves, strict=True))
     limit = MOST_TURN / max(abs(around), MOST_TURN)
+    return (limit * along, limit * across, limit * around), heading
+
+
+def pushed(body: Body, pose: Pose, before: Pose, world: World) -> Pose:
+    """Free of the deepest two contacts."""
+    contacts = touched(body, pose, world)[:2]
+    move, heading = pushed_by(body, Give(*body.give), pose, before, contacts)
+    for _ in range(SECANTS if body.slip < math.inf else 0):
+        move, heading = pushed_by(body, softened(body, move), pose, before, contacts)
+    along, across, around = move
     c, s = math.cos(heading), math.sin(heading)
-    x = pose[0] + limit * (c * along - s * across)
-    y = pose[1] + limit * (s * along + c * across)
-    return x, y, pose[2] + limit * around
+    return pose[0] + c * along - s * across, pose[1] + s * along + c * across, pose[2] + around
 
 
 def _stopped(body: Body, pose: Pose, before: Pose, world: World) -> Pose:

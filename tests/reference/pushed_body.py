@@ -1,7 +1,8 @@
 """A driven body that meets a wall, in MuJoCo: bodies with mass, a contact that gives a little, cones of friction.
 
-A servo pushes the body towards the motion that is commanded, harder along, across or around; a wall at y = 0 stands in
-its way. MuJoCo integrates forces over 2 ms; the contact `slide` of `sim` knows neither mass nor force.
+A servo pushes the body towards the motion that is commanded, harder along, across or around, or two wheels do, whose
+grip gives out; a wall at y = 0 stands in its way. MuJoCo integrates forces over 2 ms; the contact `slide` of `sim` knows
+neither mass nor force.
 """
 
 from __future__ import annotations
@@ -19,6 +20,25 @@ MASS = 0.9  # of an S2 with batteries, about [kg]
 # What the servo answers to a deviation: along and across [N s/m], around [N m s/rad].
 SERVO = np.array([40.0, 80.0, 0.16])
 SIDES = 8  # of a rounded corner
+
+
+class Wheels(NamedTuple):
+    """Two wheels that are driven at the speeds that a commanded motion gives them, and slip on the floor."""
+
+    arm: float = 0.0765  # of each from the middle [m]
+    most: float = 2.0  # that each can push [N]
+    slip: float = 0.03  # from which on it pushes hardly more [m/s]
+
+    def push(self, along: float, across: float, around: float) -> tuple[float, float, float]:
+        """Force ahead and to the left, and torque, where the body's motion is so much less than what is commanded."""
+        ahead = aside = torque = 0.0
+        for side in (1.0, -1.0):  # left, right
+            slip = along - side * self.arm * around
+            grip = self.most / math.sqrt(self.slip**2 + slip**2 + across**2)
+            ahead += grip * slip
+            aside += grip * across
+            torque -= side * self.arm * grip * slip
+        return ahead, aside, torque
 
 
 class Push(NamedTuple):
@@ -46,9 +66,12 @@ def _outline(corners: Corners, radius: float) -> list[tuple[float, float]]:
 
 
 class PushedBody:
-    """A body of this outline before a wall of this friction."""
+    """A body of this outline before a wall of this friction, driven by a servo where no wheels are given."""
 
-    def __init__(self, corners: Corners, radius: float, friction: float) -> None:
+    def __init__(
+        self, corners: Corners, radius: float, friction: float, wheels: Wheels | None = None
+    ) -> None:
+        self._wheels = wheels
         hull = " ".join(f"{x:.6f} {y:.6f} {z}" for z in (0.0, 0.05) for x, y in _outline(corners, radius))
         self._model = mujoco.MjModel.from_xml_string(f"""
             <mujoco>
@@ -78,7 +101,7 @@ class PushedBody:
             cos, sin = math.cos(data.qpos[2]), math.sin(data.qpos[2])
             vx, vy, turn = data.qvel
             off = np.array([push.speed - (cos * vx + sin * vy), sin * vx - cos * vy, push.turn - turn])
-            along, across, around = SERVO * off
+            along, across, around = SERVO * off if self._wheels is None else self._wheels.push(*off)
             data.qfrc_applied[:] = cos * along - sin * across, sin * along + cos * across, around
             mujoco.mj_step(self._model, data)
         x, y, heading = data.qpos

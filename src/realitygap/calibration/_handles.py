@@ -22,7 +22,7 @@ MOTION_NOISE = (
 )  # fmt: skip
 """What decides how motions scatter."""
 
-CONTACT = ("contact.friction", "contact.lat", "contact.ang")
+CONTACT = ("contact.friction", "contact.lat", "contact.ang", "contact.saturation")
 """What decides how a robot gives way; `contact.long` is 1: only ratios count."""
 
 BELOW_ONE = 1.0 - 1e-12  # distributions are asked for places below 1

@@ -103,6 +103,7 @@ ADVICE: dict[str, tuple[str, str, str]] = {
     "contact.friction": (CAMERA, CAMERA, ANGLES),
     "contact.lat": (CAMERA, CAMERA, "scrape along walls, turning into them"),
     "contact.ang": (CAMERA, CAMERA, ANGLES),
+    "contact.saturation": (CAMERA, CAMERA, "press against walls with wheels that turn unequally"),
 }
 """What to record, where cells, encoders or a track were observed."""
 

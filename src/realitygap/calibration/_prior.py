@@ -164,6 +164,10 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
         Parameter("contact.friction", _even(0.0, 1.0), "", (Effect("contact.friction"),), "walls met at slant angles"),
         Parameter("contact.lat", _ratio(0.05, 5.0), "", (Effect("contact.lat"),), "walls scraped along"),
         Parameter("contact.ang", _ratio(ang / 8, ang * 8), "1/m2", (Effect("contact.ang"),), "walls met head on"),
+        Parameter(
+            "contact.saturation", _ratio(2.0, 200.0), "s/m", (Effect("contact.saturation"),),
+            "walls pressed against with wheels that turn unequally",
+        ),
         Parameter("body.length", _even(0.8, 1.2), "", _corners(plain, "x"), "walls met head on"),
         Parameter("body.width", _even(0.8, 1.2), "", _corners(plain, "y"), "walls scraped along"),
     ]  # fmt: skip

@@ -219,11 +219,11 @@ def plan(shape, rules, key, lanes, step):
 
     Args:
         shape, rules, key: Structure, how trials are run, and of the random numbers.
-        lanes: Commands, numbers and state are read; state and `moved` written.
+        lanes: Commands, numbers and state are read; state, `moved` and `lasts` written.
         step: Number of the step.
     """
     p, d, spare, moved, targets = lanes.p, shape.row_drive, lanes.spare, lanes.moved, lanes.targets
-    late, rest, going, fade = spare[0], spare[1], spare[2], spare[3]
+    late, fade, rest, going = spare[0], spare[3], lanes.lasts[0], lanes.lasts[1]
     _ask(shape, rules, lanes, step)
     if shape.noisy:
         draw_lanes(step, lanes.drive_counters, key, lanes.words)
@@ -277,6 +277,8 @@ def plan(shape, rules, key, lanes, step):
         _add_to(moved[1], moved[3])
         _set(moved[1], 0.0)
         _set(moved[2], 0.0)
+        _set(rest, rules.step_s)
+        _set(going, rules.step_s)
 
 
 @inlined

@@ -46,6 +46,7 @@ class SimLanes(NamedTuple):
     moved: (
         Rows  # (4,) what the step asks for: length [m] and turn [turns] by the old command, then the new one
     )
+    lasts: Rows  # (2,) how long the step goes on by the old command, and by the new one [s]
     distances: Rows  # (rays,) [m]
     rates: Rows  # (rays,) room
     clips: Rows  # (4 * rays,) room
@@ -94,6 +95,8 @@ class Near(NamedTuple):
     first: Contact  # the deepest
     second: Contact  # the next
     low: Row  # the least gap met so far
+    give: Rows  # (4,) what the body gives when it is pushed: `_rigid` of `_sim_contact`
+    moved: Rows  # (5,) how it is pushed free: `_give_way` of `_sim_contact`
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
     walls: Rows  # (8,) of the nearest two: normal x, y, offset and gap
@@ -153,6 +156,8 @@ def make_near(shape, dtype):
         first=contact(),
         second=contact(),
         low=row(),
+        give=rows(4),
+        moved=rows(5),
         effort=rows(4),
         gaps=rows(shape.n_walls),
         walls=rows(8),
@@ -190,6 +195,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         wheels=rows(2),
         commands=rows(2),
         moved=rows(4),
+        lasts=rows(2),
         distances=rows(n_rays),
         rates=rows(n_rays),
         clips=rows(4 * n_rays),

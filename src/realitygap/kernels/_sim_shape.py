@@ -54,7 +54,7 @@ INPUT_KINDS = {
 }
 
 # The numbers of each group, in the order of their rows; a row is the first of its group and the place here.
-CONTACT_NUMBERS = ("friction", "long", "lat", "ang")
+CONTACT_NUMBERS = ("friction", "long", "lat", "ang", "saturation")
 DRIVE_NUMBERS = (
     "speed",
     "track",

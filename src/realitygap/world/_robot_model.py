@@ -36,6 +36,11 @@ class Contact(Settings):
         171.0,
         description="How easily it is turned [1/m2]: 1 / r2, as if its grip on the floor lay r from its origin.",
     )
+    saturation: NotNegative = Field(
+        0.0,
+        description="How soon the wheels' grip gives out [s/m]: one over the speed of slip from which on it hardly grows; "
+        "0 where it grows with the slip without end.",
+    )
 
 
 class Drive(Settings):

@@ -1,8 +1,8 @@
 """A driven body that meets a wall, in MuJoCo: bodies with mass, a contact that gives a little, cones of friction.
 
 A servo pushes the body towards the motion that is commanded, harder along, across or around, or two wheels do, whose
-grip gives out; a wall at y = 0 stands in its way. MuJoCo integrates forces over 2 ms; the contact `slide` of `sim` knows
-neither mass nor force.
+grip gives out; a wall at y = 0 stands in its way. MuJoCo integrates forces over 2 ms; the contact `slide` of `sim`
+knows neither mass nor force.
 """
 
 from __future__ import annotations

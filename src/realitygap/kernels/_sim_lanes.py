@@ -95,8 +95,8 @@ class Near(NamedTuple):
     first: Contact  # the deepest
     second: Contact  # the next
     low: Row  # the least gap met so far
-    give: Rows  # (4,) what the body gives when it is pushed: `_rigid` of `_sim_contact`
-    moved: Rows  # (5,) how it is pushed free: `_give_way` of `_sim_contact`
+    give: Rows  # (4,) what the body gives when it is pushed: `unsaturated` of `_sim_push`
+    moved: Rows  # (5,) how it is pushed free: `give_way` of `_sim_push`
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
     walls: Rows  # (8,) of the nearest two: normal x, y, offset and gap

@@ -38,8 +38,8 @@ class Contact(Settings):
     )
     saturation: NotNegative = Field(
         0.0,
-        description="How soon the wheels' grip gives out [s/m]: one over the speed of slip from which on it hardly grows; "
-        "0 where it grows with the slip without end.",
+        description="How soon the wheels' grip gives out [s/m]: one over the speed of slip from which on it hardly "
+        "grows; 0 where it grows without end.",
     )
 
 

@@ -2,8 +2,8 @@
 
 At the deepest two contacts the wall pushes along its normal n and rubs along its tangent t; the body gives way along
 A * wrench, until it is free. While its wheels grip the more the more they slip, A = diag(long, lat, ang) in the frame
-of its axle. Where their grip gives out, each wheel is half of that by the secant to its grip, and A is of both together:
-a robot turns about the wheel that still holds.
+of its axle. Where their grip gives out, each wheel is half of that by the secant to its grip, and A is of both
+together: a robot turns about the wheel that still holds.
 
 Source: the wrench n - mu * sign(slip) * t, and A, of quasi-static pushing; secants, which lead to the motion of least
 dissipation, as iteratively reweighted least squares (Weiszfeld 1937). Differs: friction holds the contact point where

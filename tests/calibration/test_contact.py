@@ -21,29 +21,35 @@ def _covered(seeds: range) -> tuple[int, int]:
         truth = drawn(seed, CONTACT)
         fit = fit_contact(carried_out(PLANS, truth, seed), ENSEMBLE.replay, ROBOT, ARENA, prior=PRIOR)
         inside += sum(found.low <= truth[found.name] <= found.high for found in fit.fitted)
-    return inside, 3 * len(seeds)
+    return inside, len(CONTACT) * len(seeds)
 
 
 def test_intervals_hold_what_is_true() -> None:
-    """Of 6 intervals of 90 %, chance alone leaves fewer than 3 right once in 800; the seeds are fixed."""
+    """Of 8 intervals of 90 %, chance alone leaves fewer than 5 right once in 200; the seeds are fixed."""
     inside, total = _covered(range(2))
     assert inside >= binom.ppf(0.01, total, 0.9)
 
 
 @pytest.mark.long
 def test_intervals_hold_what_is_true_in_80_to_97_of_100() -> None:
-    """40 robots: chance alone keeps 120 intervals of 90 % between 80 and 97 in 100, 998 times of 1000."""
+    """40 robots: chance alone keeps 160 intervals of 90 % between 80 and 97 in 100, 999 times of 1000."""
     inside, total = _covered(range(100, 140))
     assert 0.80 <= inside / total <= 0.97
 
 
-def test_friction_comes_out_and_agrees_with_who_aligns_and_who_stalls() -> None:
-    truth = {"contact.friction": 0.35, "contact.lat": 0.6, "contact.ang": 150.0}
+def test_numbers_come_out_and_friction_agrees_with_who_aligns_and_who_stalls() -> None:
+    truth = {
+        "contact.friction": 0.35,
+        "contact.lat": 0.6,
+        "contact.ang": 150.0,
+        "contact.saturation": 25.0,
+    }
     trials = carried_out(PLANS, truth, 1)
     fit = fit_contact(trials, ENSEMBLE.replay, ROBOT, ARENA, prior=PRIOR)
     assert fit.numbers["contact.friction"] == pytest.approx(0.35, abs=0.05)
     assert fit.numbers["contact.lat"] == pytest.approx(0.6, rel=0.1)
     assert fit.numbers["contact.ang"] == pytest.approx(150.0, rel=0.15)
+    assert fit.numbers["contact.saturation"] == pytest.approx(25.0, rel=0.3)
     encounters = encounters_of(trials, ROBOT, ARENA)
     assert len(encounters.aligned) >= 15
     assert encounters.agreeing(0.35) >= 0.8 * len(encounters.aligned)
@@ -61,5 +67,5 @@ def test_walls_are_met_head_on_and_slantwise_and_with_both_ends() -> None:
 def test_without_poses_nothing_is_identified_and_it_says_what_to_record() -> None:
     trials = carried_out(PLANS[:1], {"contact.friction": 0.3}, 0)
     fit = fit_contact(trials, ENSEMBLE.replay, ROBOT, ARENA, prior=PRIOR, observe="encoders")
-    assert [found.identified for found in fit.fitted] == [False] * 3
+    assert [found.identified for found in fit.fitted] == [False] * len(CONTACT)
     assert all("observe = track" in found.advice for found in fit.fitted)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realitygap.robots.twin._motors import NOMINAL, TICK_S, SpeedSteps
 from tests.kernels.sim_cases import OUTLINE, SCRIBBLER, drive_robots, outline, room
 
 FIELD: dict[str, Any] = {
@@ -67,6 +68,66 @@ def test_an_old_command_goes_on_until_the_new_one_arrives(step_s: float, delay_s
     )
     assert driven.poses[n, 0, 0] - 20 == pytest.approx(SPEED * 0.7, abs=1e-9)
     assert driven.poses[-1, 0, 0] - 20 == pytest.approx(SPEED * (0.7 + 0.3 - 0.7), abs=1e-9)
+
+
+def risen(commands: np.ndarray, step_s: float, rise: float, delay: float) -> np.ndarray:
+    """(t + 1, 2) way of both wheels [m], a tenth of a millisecond at a time."""
+    tick, level, asked = 1e-4, 0.0, (0.0, 0.0)
+    ways, way = [(0.0, 0.0)], np.zeros(2)
+    n, late = round(step_s / tick), round(delay / tick)
+    heard = {step * n + late: (move - turn, move + turn) for step, (move, turn) in enumerate(commands)}
+    for k in range(len(commands) * n):
+        if k in heard:
+            if any(new * old < 0 for new, old in zip(heard[k], asked, strict=True)):
+                level = 0.0
+            asked = heard[k]
+        faster = max(map(abs, asked))
+        before = min(level, faster)
+        level = min(before + (tick / rise if rise else math.inf), faster)
+        way += tick * SPEED * np.array(asked) * ((before + level) / 2 / faster if faster else 0.0)
+        if (k + 1) % n == 0:
+            ways.append((way[0], way[1]))
+    return np.array(ways)
+
+
+@pytest.mark.parametrize(("rise", "delay"), [(0.24, 0.0), (0.24, 0.1), (0.9, 0.0), (0.9, 0.3)])
+def test_speeds_rise_evenly_and_begin_anew_where_a_wheel_turns_the_other_way(
+    rise: float, delay: float
+) -> None:
+    commands = np.array(
+        [
+            [1.0, 0.0],
+            [1.0, 0.0],
+            [0.4, 0.1],
+            [0.9, -0.1],
+            [0.2, 0.5],
+            [-0.5, 0.0],
+            [0.0, 0.0],
+            [0.6, 0.3],
+            [0.6, 0.3],
+        ]
+    )
+    late: dict[str, Any] = {"late": True, "delay_steps": 1} if delay else {}
+    driven = drive_robots({**FIELD, "drive.rise": rise, "drive.delay": delay}, commands, **late)
+    np.testing.assert_allclose(driven.wheels[:, 0], risen(commands, 0.5, rise, delay), atol=2e-6)
+
+
+def test_an_s2_of_speeds_that_rise_goes_as_far_as_its_firmware_has_it() -> None:
+    """Commands at random, each by itself: a step of the firmware's speed is 12.5 mm/s, one more each 20 ms."""
+    rng = np.random.default_rng(1)
+    speeds = rng.choice([-1.0, -0.5, 0.5, 1.0], (200, 2))
+    commands = np.stack([speeds.mean(axis=1), (speeds[:, 1] - speeds[:, 0]) / 2], axis=1)
+    regulator, ways = SpeedSteps(), []
+    for left, right in speeds:
+        regulator.drive(left, right)
+        ways.append(sum(np.array(regulator.tick()) * NOMINAL * TICK_S for _ in range(25)))
+    driven = drive_robots({**FIELD, "drive.rise": 12 * TICK_S}, commands, levels=12, lowest_level=2)
+    off = np.diff(driven.wheels[:, 0], axis=0) - np.array(ways)
+    at_once = np.diff(
+        drive_robots(FIELD, commands, levels=12, lowest_level=2).wheels[:, 0], axis=0
+    ) - np.array(ways)
+    assert np.abs(off).max() < 0.0025
+    assert np.abs(at_once).max() > 0.015
 
 
 def test_what_wheels_do_is_theirs() -> None:

@@ -13,7 +13,7 @@ from ._trial import as_command, draw_lanes
 
 SPEED, TRACK, AXLE, TURN_RATE, GAIN_LEFT, GAIN_RIGHT, BIAS_LEFT, BIAS_RIGHT = range(8)
 DEAD_BAND, LAG, DELAY, DELAY_JITTER, SLIP, TRAVEL_PER_M, TRAVEL_PER_S = range(8, 15)
-HEADING_PER_M, HEADING_PER_S, DRIFT_PER_M, BATTERY_SAG = range(15, len(DRIVE_NUMBERS))
+HEADING_PER_M, HEADING_PER_S, DRIFT_PER_M, BATTERY_SAG, RISE = range(15, len(DRIVE_NUMBERS))
 
 LEAST_LAG = 1e-9  # [s] what stands for no lag, which would be divided by
 SMALL_TURN = 1e-3  # half a turn [rad] below which sin(x) / x is taken from its series
@@ -143,8 +143,54 @@ def _fade(lag, time, rest):
 
 
 @stage
+def _rise(left, right, was_left, was_right, full, rise, time, level, worth):
+    """How long wheels would have to go at speeds that they are asked for, for the way that they go as these rise.
+
+    The faster wheel's speed rises from what it was to what it is to be at a constant rate, and falls at once; the other
+    one's follows in proportion. Both begin anew where either turns the other way.
+
+    Args:
+        left, right: Speeds asked for [m/s].
+        was_left, was_right: Those before.
+        full: Speed at full command [m/s].
+        rise: Time in which it rises from 0 to that [s].
+        time: How long wheels go [s].
+        level: Of the faster wheel, 1: full speed; changed.
+        worth: Written [s].
+    """
+    real = worth.dtype.type
+    for lane in range(LANES):
+        one = left[lane]
+        two = right[lane]
+        faster = abs(one) if abs(one) > abs(two) else abs(two)
+        top = full[lane]
+        end = faster / (top if top > real(0.0) else real(1.0))
+        turns = (one * was_left[lane] < real(0.0)) | (two * was_right[lane] < real(0.0))
+        begin = level[lane] if level[lane] < end else end
+        begin = real(0.0) if turns else begin
+        slow = rise[lane]
+        whole = time[lane]
+        needed = (end - begin) * slow
+        is_done = needed <= whole
+        gained = whole / (slow if slow > real(0.0) else real(1.0))
+        lost = (end - begin) * needed * real(0.5) if is_done else (end - begin - real(0.5) * gained) * whole
+        worth[lane] = whole - lost / (end if end > real(0.0) else real(1.0))
+        level[lane] = end if is_done else begin + gained
+
+
+@stage
 def _roll(target, lag, time, rest, speed, travel, total):
-    """Wheels near their targets exponentially; what they travel is the exact integral."""
+    """Wheels near their targets exponentially; what they travel is the exact integral.
+
+    Args:
+        target: Speed asked for [m/s].
+        lag: [s].
+        time: How long a wheel is asked for it, less what it loses as it rises to it [s].
+        rest: Of `_fade`.
+        speed: Of the wheel [m/s]; changed.
+        travel: Written [m].
+        total: Since the start [m]; changed.
+    """
     real = speed.dtype.type
     for lane in range(LANES):
         slow = lag[lane] if lag[lane] > real(LEAST_LAG) else real(LEAST_LAG)
@@ -223,7 +269,7 @@ def plan(shape, rules, key, lanes, step):
         step: Number of the step.
     """
     p, d, spare, moved, targets = lanes.p, shape.row_drive, lanes.spare, lanes.moved, lanes.targets
-    late, fade, rest, going = spare[0], spare[3], lanes.lasts[0], lanes.lasts[1]
+    late, worth, fade, rest, going = spare[0], spare[1], spare[3], lanes.lasts[0], lanes.lasts[1]
     _ask(shape, rules, lanes, step)
     if shape.noisy:
         draw_lanes(step, lanes.drive_counters, key, lanes.words)
@@ -238,18 +284,23 @@ def plan(shape, rules, key, lanes, step):
             for k in range(1, shape.delay_steps + 1):
                 _pick(late, k, targets[2 * k + wheel], spare[4 + wheel])
                 _pick(late, k, targets[2 * k + 2 + wheel], spare[6 + wheel])
+        copy_row(spare[6], spare[12])
+        copy_row(spare[7], spare[13])
+        _rise(spare[6], spare[7], spare[12], spare[13], p[d + SPEED], p[d + RISE], rest, lanes.level, worth)
         _fade(p[d + LAG], rest, fade)
-        _roll(spare[6], p[d + LAG], rest, fade, lanes.speeds[0], spare[8], lanes.wheels[0])
-        _roll(spare[7], p[d + LAG], rest, fade, lanes.speeds[1], spare[9], lanes.wheels[1])
+        _roll(spare[6], p[d + LAG], worth, fade, lanes.speeds[0], spare[8], lanes.wheels[0])
+        _roll(spare[7], p[d + LAG], worth, fade, lanes.speeds[1], spare[9], lanes.wheels[1])
     else:
         _set(rest, 0.0)
         for wheel in range(2):
             copy_row(targets[wheel], spare[4 + wheel])
+            copy_row(targets[2 + wheel], spare[6 + wheel])
             _set(spare[8 + wheel], 0.0)
     _subtract(rules.step_s, rest, going)
+    _rise(spare[4], spare[5], spare[6], spare[7], p[d + SPEED], p[d + RISE], going, lanes.level, worth)
     _fade(p[d + LAG], going, fade)
-    _roll(spare[4], p[d + LAG], going, fade, lanes.speeds[0], spare[10], lanes.wheels[0])
-    _roll(spare[5], p[d + LAG], going, fade, lanes.speeds[1], spare[11], lanes.wheels[1])
+    _roll(spare[4], p[d + LAG], worth, fade, lanes.speeds[0], spare[10], lanes.wheels[0])
+    _roll(spare[5], p[d + LAG], worth, fade, lanes.speeds[1], spare[11], lanes.wheels[1])
     if shape.late:
         _to_motion(spare[8], spare[9], p[d + SLIP], p[d + TRACK], p[d + DRIFT_PER_M], moved[0], moved[1])
     else:

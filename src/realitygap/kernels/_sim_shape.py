@@ -75,6 +75,7 @@ DRIVE_NUMBERS = (
     "heading_noise_per_s",
     "drift_per_m",
     "battery_sag",
+    "rise",
 )
 RANGE_NUMBERS = (
     "x",

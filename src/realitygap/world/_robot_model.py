@@ -71,6 +71,11 @@ class Drive(Settings):
     bias_right: Number = Field(0.0, description="Of the right wheel [m/s].")
     dead_band: Share = Field(0.0, description="A wheel stands at commands of less than this.")
     lag: NotNegative = Field(0.0, description="Time in which a wheel comes within 1/e of its new speed [s].")
+    rise: NotNegative = Field(
+        0.0,
+        description="Time in which the faster wheel's speed rises evenly from standing to full; it begins anew, with "
+        "the other one's, where either turns the other way [s].",
+    )
     delay: NotNegative = Field(0.0, description="From the command until the wheels hear it [s].")
     delay_jitter: NotNegative = Field(
         0.0, description="The delay of a step is delay + delay_jitter * U(-1, 1) [s]."

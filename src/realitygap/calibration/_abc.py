@@ -116,11 +116,12 @@ def fit_all(
     return Posterior(keep, values_of(prior, keep), off, n_simulated)
 
 
-def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter]) -> Posterior:
-    """Draws of two posteriors by turns, as many of each, and together as many as either has."""
-    n = min(len(one.places), len(other.places)) // 2
-    places = np.stack([one.places[:n], other.places[:n]], axis=1).reshape(2 * n, -1)
-    off = (one.off + other.off) / 2
+def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter], *, share: int) -> Posterior:
+    """Draws of two posteriors by turns, `share` of the first for each of the other, together as many as either has."""
+    n, p = min(len(one.places), len(other.places)) // (share + 1), len(prior)
+    turns = [one.places[: share * n].reshape(n, share, p), other.places[:n].reshape(n, 1, p)]
+    places = np.concatenate(turns, axis=1).reshape(-1, p)
+    off = (share * one.off + other.off) / (share + 1)
     return Posterior(places, values_of(prior, places), off, one.n_simulated + other.n_simulated)
 
 

@@ -44,12 +44,13 @@ from ._calibrate_kinds import Parts
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
     "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002). "
-    "With poses, half of the draws are from likelihoods of single commands (multiple shooting, Bock 1983)."
+    "With poses, three of four draws are from likelihoods of single commands (multiple shooting, Bock 1983)."
 )
 STEPS = 100  # of a trial
 IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
 N_CANDIDATES = 12  # of which the next trials are chosen
 N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
+OF_COMMANDS = 3  # draws of single commands for each of whole trials, where poses are known
 BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
 LEAST_TO_CHOOSE = 10  # trials
 
@@ -183,9 +184,9 @@ class _Fit:
     def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
         """What is left of the prior.
 
-        With poses it is half that of single commands and half that of whole trials as seen without poses: where `sim`
-        cannot make both, the first knows how the robot moves and the second what comes of it, and draws of both
-        predict controllers better than either.
+        With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
+        where `sim` cannot make both, the first knows how the robot moves and the second what comes of it, and draws of
+        both predict controllers better than either.
         """
         told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
         if not told or any(trial.observe != "track" for trial in told):
@@ -194,7 +195,7 @@ class _Fit:
             told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
         )
         blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
-        return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior)
+        return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior, share=OF_COMMANDS)
 
     def _posterior_of_trials(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
         return fit_all(

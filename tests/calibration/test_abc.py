@@ -7,9 +7,11 @@ from realitygap.calibration import (
     Effect,
     Evidence,
     Parameter,
+    Posterior,
     fit_all,
     information_of,
     misfits,
+    mixed,
     next_trials,
     numbers_of,
     ranges_of,
@@ -111,3 +113,16 @@ def test_the_prior_of_a_scribbler_holds_its_file_and_comes_back_from_its_scale()
     even |= {"drive.gain": np.array([0.9]), "drive.asymmetry": np.array([0.1])}
     numbers = numbers_of(prior, even, ROBOT)
     assert (numbers["drive.gain_left"][0], numbers["drive.gain_right"][0]) == pytest.approx((0.95, 0.85))
+
+
+def test_three_of_four_draws_are_of_the_first_posterior_and_they_come_by_turns():
+    ones, others = np.full((12, 3), 1.0), np.full((10, 3), -1.0)
+    one, other = (
+        Posterior(places, values_of(PRIOR, places), np.full(3, off), 7)
+        for places, off in ((ones, 2.0), (others, -2.0))
+    )
+    both = mixed(one, other, PRIOR, share=3)
+    np.testing.assert_array_equal(both.places[:, 0], [1.0, 1.0, 1.0, -1.0] * 2)
+    np.testing.assert_allclose(both.values["drive.lag"], values_of(PRIOR, both.places)["drive.lag"])
+    assert both.off.tolist() == [1.0, 1.0, 1.0]
+    assert both.n_simulated == 14

@@ -46,7 +46,7 @@ class Posterior:
     Attributes:
         places: (n, p) draws on the scale on which the prior is standard normal.
         values: (n,) draws of each parameter.
-        summaries: (p,) of what was observed, less what was expected, in standard deviations of the simulations nearby.
+        off: (p,) summaries of what was observed, less what was expected, in standard deviations of the simulations nearby.
         n_simulated: Sets of numbers tried.
     """
 

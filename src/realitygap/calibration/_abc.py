@@ -34,6 +34,7 @@ N_REGRESS = {"small": 800, "full": 1500}
 N_LAST = {"small": 2000, "full": 5000}
 ROUNDS = {"small": 4, "full": 7}
 N_DRAWS = 500
+FOLDS = 5
 END = 4.0  # standard deviations of the prior beyond which nothing is
 MARGIN = 0.3  # share of its width by which the box is larger than the posterior, to each side
 CUT = 0.005  # quantile of the posterior that the box leaves out to each side, before the margin
@@ -46,7 +47,7 @@ class Posterior:
     Attributes:
         places: (n, p) draws on the scale on which the prior is standard normal.
         values: (n,) draws of each parameter.
-        off: (p,) summaries of what was observed, less what was expected, in standard deviations of the simulations nearby.
+        off: (p,) summaries of what was observed, less what was expected, in standard deviations of simulations nearby.
         n_simulated: Sets of numbers tried.
     """
 
@@ -165,7 +166,7 @@ def _adjusted(
     draws, off = np.empty((4 * N_DRAWS, p)), np.empty(p)
     for group in groups:
         mine = places[:, group]
-        told, told_here = _predict(there, mine, here)
+        told, told_here = _predict(rng, there, mine, here)
         spread = (mine - told).std(axis=0) + 1e-9
         distance = (((told - told_here) / spread) ** 2).sum(axis=1)
         n_near = int(max(n // 4, min(n, 15 * len(group))))
@@ -179,21 +180,41 @@ def _adjusted(
     return draws, off
 
 
-def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
-    """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed."""
+def _predict(
+    rng: np.random.Generator, summaries: Floats, places: Floats, here: Floats
+) -> tuple[Floats, Floats]:
+    """Places by regression on summaries: for each simulation by one without it, and for the observed in the mean.
+
+    A regression knows the simulations that it was made from too well: as if the observed were one of them.
+    """
+    fold = rng.permutation(len(places)) % FOLDS
+    told, told_here = np.empty_like(places), np.zeros(places.shape[1])
+    for k in range(FOLDS):
+        mine = fold == k
+        told[mine], one_here = _regress(summaries[~mine], places[~mine], summaries[mine], here)
+        told_here += one_here / FOLDS
+    return told, told_here
+
+
+def _regress(summaries: Floats, places: Floats, others: Floats, here: Floats) -> tuple[Floats, Floats]:
+    """Ridge regression of places on summaries and their curvature: for other simulations, and for the observed."""
     mean = places.mean(axis=0)
     slopes = _ridge(summaries, places - mean)
-    first, first_here = summaries @ slopes, here @ slopes
+    first = summaries @ slopes
     scale = first.std(axis=0) + 1e-9
-    first, first_here = first / scale, np.clip(first_here / scale, -4, 4)
+    first = first / scale
     one, other = np.triu_indices(places.shape[1])
     if len(one) * 4 > len(places):
         one = other = np.arange(places.shape[1])
-    squares = first[:, one] * first[:, other]
-    design = np.column_stack([summaries, squares - squares.mean(axis=0)])
-    row = np.concatenate([here, first_here[one] * first_here[other] - squares.mean(axis=0)])
-    slopes = _ridge(design, places - mean)
-    return mean + design @ slopes, mean + row @ slopes
+    center = (first[:, one] * first[:, other]).mean(axis=0)
+
+    def curved(rows: Floats, at: Floats) -> Floats:
+        return np.column_stack([rows, at[:, one] * at[:, other] - center])
+
+    curvature = _ridge(curved(summaries, first), places - mean)
+    there = curved(others, others @ slopes / scale)
+    row = curved(here[None], np.clip(here @ slopes / scale, -4, 4)[None])[0]
+    return mean + there @ curvature, mean + row @ curvature
 
 
 def _ridge(design: Floats, wanted: Floats) -> Floats:
@@ -207,7 +228,9 @@ def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats
     weighed = design * weight[:, None]
     gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *told.var(axis=0) + 1e-12])
     slopes = np.linalg.solve(gram, weighed.T @ places)
-    return np.asarray(slopes[0] + (places - design @ slopes))
+    rest = places - design @ slopes
+    n = weight.sum() ** 2 / (weight**2).sum()  # as many of weight 1
+    return np.asarray(slopes[0] + rest * np.sqrt(n / max(n - design.shape[1], 1.0)))
 
 
 def _next_box(draws: Floats) -> tuple[Floats, Floats]:

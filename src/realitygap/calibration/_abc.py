@@ -34,7 +34,7 @@ N_REGRESS = {"small": 800, "full": 1500}
 N_LAST = {"small": 2000, "full": 5000}
 ROUNDS = {"small": 4, "full": 7}
 N_DRAWS = 500
-FOLDS = 5
+MOST_OWN = 0.9  # of a prediction, that is taken for a row's own
 END = 4.0  # standard deviations of the prior beyond which nothing is
 MARGIN = 0.3  # share of its width by which the box is larger than the posterior, to each side
 CUT = 0.005  # quantile of the posterior that the box leaves out to each side, before the margin
@@ -166,7 +166,7 @@ def _adjusted(
     draws, off = np.empty((4 * N_DRAWS, p)), np.empty(p)
     for group in groups:
         mine = places[:, group]
-        told, told_here = _predict(rng, there, mine, here)
+        told, told_here = _predict(there, mine, here)
         spread = (mine - told).std(axis=0) + 1e-9
         distance = (((told - told_here) / spread) ** 2).sum(axis=1)
         n_near = int(max(n // 4, min(n, 15 * len(group))))
@@ -180,46 +180,34 @@ def _adjusted(
     return draws, off
 
 
-def _predict(
-    rng: np.random.Generator, summaries: Floats, places: Floats, here: Floats
-) -> tuple[Floats, Floats]:
-    """Places by regression on summaries: for each simulation by one without it, and for the observed in the mean.
+def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
+    """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed.
 
-    A regression knows the simulations that it was made from too well: as if the observed were one of them.
+    For each simulation it is the regression without it, which follows from the whole one (Allen 1974): a regression
+    knows too well what it was made from, and the observed is none of these.
     """
-    fold = rng.permutation(len(places)) % FOLDS
-    told, told_here = np.empty_like(places), np.zeros(places.shape[1])
-    for k in range(FOLDS):
-        mine = fold == k
-        told[mine], one_here = _regress(summaries[~mine], places[~mine], summaries[mine], here)
-        told_here += one_here / FOLDS
-    return told, told_here
-
-
-def _regress(summaries: Floats, places: Floats, others: Floats, here: Floats) -> tuple[Floats, Floats]:
-    """Ridge regression of places on summaries and their curvature: for other simulations, and for the observed."""
     mean = places.mean(axis=0)
-    slopes = _ridge(summaries, places - mean)
-    first = summaries @ slopes
+    slopes, _ = _ridge(summaries, places - mean)
+    first, first_here = summaries @ slopes, here @ slopes
     scale = first.std(axis=0) + 1e-9
-    first = first / scale
+    first, first_here = first / scale, np.clip(first_here / scale, -4, 4)
     one, other = np.triu_indices(places.shape[1])
     if len(one) * 4 > len(places):
         one = other = np.arange(places.shape[1])
-    center = (first[:, one] * first[:, other]).mean(axis=0)
-
-    def curved(rows: Floats, at: Floats) -> Floats:
-        return np.column_stack([rows, at[:, one] * at[:, other] - center])
-
-    curvature = _ridge(curved(summaries, first), places - mean)
-    there = curved(others, others @ slopes / scale)
-    row = curved(here[None], np.clip(here @ slopes / scale, -4, 4)[None])[0]
-    return mean + there @ curvature, mean + row @ curvature
+    squares = first[:, one] * first[:, other]
+    design = np.column_stack([summaries, squares - squares.mean(axis=0)])
+    row = np.concatenate([here, first_here[one] * first_here[other] - squares.mean(axis=0)])
+    slopes, own = _ridge(design, places - mean)
+    told = mean + design @ slopes
+    return told - (places - told) * (own / (1.0 - own))[:, None], mean + row @ slopes
 
 
-def _ridge(design: Floats, wanted: Floats) -> Floats:
+def _ridge(design: Floats, wanted: Floats) -> tuple[Floats, Floats]:
+    """Slopes, and (n,) how much of what is predicted of each row is its own."""
     gram = design.T @ design
-    return np.asarray(np.linalg.solve(gram + 1e-3 * np.diag(np.diag(gram) + 1e-9), design.T @ wanted))
+    gram = gram + 1e-3 * np.diag(np.diag(gram) + 1e-9)
+    own = (design * np.linalg.solve(gram, design.T).T).sum(axis=1)
+    return np.asarray(np.linalg.solve(gram, design.T @ wanted)), np.minimum(own, MOST_OWN)
 
 
 def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:

@@ -7,6 +7,7 @@ import contextlib
 import json
 import queue
 import signal
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any, TextIO
@@ -18,6 +19,9 @@ MOST_EARLY = 100
 """Messages that are kept until somebody says what to do with them."""
 LOOK_S = 0.2
 """How often who waits looks up [s]: a library lets waits outlast signals; between two an interrupt is seen."""
+
+AGAIN_S = 0.05
+"""After which an interrupt that was lost comes once more [s]: Python is elsewhere by then."""
 
 
 class Channel:
@@ -125,3 +129,18 @@ def _interrupt() -> None:
         signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
     else:
         _thread.interrupt_main()
+
+
+def keep_interrupts() -> None:
+    """Let Ctrl-C that came where Python cannot raise it, as in the callback of a weak reference, come once more."""
+    usual = sys.unraisablehook
+
+    def again(unraisable: sys.UnraisableHookArgs) -> None:
+        if unraisable.exc_type is not KeyboardInterrupt:
+            usual(unraisable)
+            return
+        timer = threading.Timer(AGAIN_S, _interrupt)
+        timer.daemon = True
+        timer.start()
+
+    sys.unraisablehook = again

@@ -11,7 +11,7 @@ from importlib import import_module
 
 from realitygap.errors import RealityGapError
 
-from ._channel import Channel, Message
+from ._channel import Channel, Message, keep_interrupts
 
 _WORK = {
     "study": "_study_work",
@@ -30,6 +30,7 @@ def main() -> int:
     wire = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what anything prints is no message
     signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell has it ignored
+    keep_interrupts()
     channel = Channel(sys.stdin, wire)
     try:
         order = channel.begin()

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compile import inlined, stage
+from ._compile import inlined, kernel, stage
 
 # Wide enough to pay for the start of each loop, small enough for all arrays to stay in the nearest cache.
 LANES = 64
@@ -158,3 +158,12 @@ def keep_where_low(low, old, new):
         after = new[lane]
         bar = low[lane]
         old[lane] = before if bar <= real(0.0) else after
+
+
+@kernel
+def any_above_zero(row):
+    """Whether any lane is above 0."""
+    n = 0
+    for lane in range(LANES):
+        n += 1 if row[lane] > 0 else 0
+    return n > 0

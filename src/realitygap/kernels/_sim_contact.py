@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._compile import kernel, stage
-from ._lanes import LANES, fill, keep_where_low
+from ._lanes import LANES, any_above_zero, fill, keep_where_low
 from ._math import TWO_PI
 from ._sim_drive import AXLE, arc_step
 from ._sim_near import TOUCHES, copy_poses, flag_near_shapes, sizes_asked, to_axles
@@ -140,7 +140,7 @@ def _push(shape, p, seconds, parts, near):
     """Push bodies free of what they touch after one of so many parts of a motion."""
     row = shape.row_contact
     unsaturated(p, row, near.give)
-    times = N_SECANTS if _any(p[row + SATURATION]) else 0
+    times = N_SECANTS if any_above_zero(p[row + SATURATION]) else 0
     for time in range(times + 1):
         if time > 0:
             saturated(p, row, seconds, parts, near.moved, near.give)
@@ -277,7 +277,7 @@ def _end(flag, touched, stall, axle, pose, low, proposed):
 def _meet(shape, lanes, near):
     """Carry out the step of the lanes flagged in the first row of `spare`."""
     flag, axle = lanes.spare[0], lanes.p[shape.row_drive + AXLE]
-    if not _any(flag):
+    if not any_above_zero(flag):
         return
     if shape.enclosed:
         choose_walls(shape, lanes.p, near)
@@ -285,14 +285,6 @@ def _meet(shape, lanes, near):
     _begin(flag, near.low)
     _resolve(shape, lanes, near)
     _end(flag, near.low, near.first.gap, axle, near.pose, lanes.low, lanes.proposed)
-
-
-@kernel
-def _any(flag):
-    n = 0
-    for lane in range(LANES):
-        n += 1 if flag[lane] > 0 else 0
-    return n > 0
 
 
 @stage

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ._compile import inlined, stage
-from ._lanes import LANES, copy_row
+from ._lanes import LANES, any_above_zero, copy_row
 from ._math import TWO_PI, exp, normal
 from ._sim_shape import DRIVE_NUMBERS, INDEPENDENT
 from ._sim_turn import sin_cos_of, turned_by
@@ -270,6 +270,7 @@ def plan(shape, rules, key, lanes, step):
     """
     p, d, spare, moved, targets = lanes.p, shape.row_drive, lanes.spare, lanes.moved, lanes.targets
     late, worth, fade, rest, going = spare[0], spare[1], spare[3], lanes.lasts[0], lanes.lasts[1]
+    rises = any_above_zero(p[d + RISE])
     _ask(shape, rules, lanes, step)
     if shape.noisy:
         draw_lanes(step, lanes.drive_counters, key, lanes.words)
@@ -284,9 +285,14 @@ def plan(shape, rules, key, lanes, step):
             for k in range(1, shape.delay_steps + 1):
                 _pick(late, k, targets[2 * k + wheel], spare[4 + wheel])
                 _pick(late, k, targets[2 * k + 2 + wheel], spare[6 + wheel])
-        copy_row(spare[6], spare[12])
-        copy_row(spare[7], spare[13])
-        _rise(spare[6], spare[7], spare[12], spare[13], p[d + SPEED], p[d + RISE], rest, lanes.level, worth)
+        copy_row(rest, worth)
+        if rises:
+            # What goes on does not begin anew: it is what it was.
+            copy_row(spare[6], spare[12])
+            copy_row(spare[7], spare[13])
+            _rise(
+                spare[6], spare[7], spare[12], spare[13], p[d + SPEED], p[d + RISE], rest, lanes.level, worth
+            )
         _fade(p[d + LAG], rest, fade)
         _roll(spare[6], p[d + LAG], worth, fade, lanes.speeds[0], spare[8], lanes.wheels[0])
         _roll(spare[7], p[d + LAG], worth, fade, lanes.speeds[1], spare[9], lanes.wheels[1])
@@ -297,7 +303,9 @@ def plan(shape, rules, key, lanes, step):
             copy_row(targets[2 + wheel], spare[6 + wheel])
             _set(spare[8 + wheel], 0.0)
     _subtract(rules.step_s, rest, going)
-    _rise(spare[4], spare[5], spare[6], spare[7], p[d + SPEED], p[d + RISE], going, lanes.level, worth)
+    copy_row(going, worth)
+    if rises:
+        _rise(spare[4], spare[5], spare[6], spare[7], p[d + SPEED], p[d + RISE], going, lanes.level, worth)
     _fade(p[d + LAG], going, fade)
     _roll(spare[4], p[d + LAG], worth, fade, lanes.speeds[0], spare[10], lanes.wheels[0])
     _roll(spare[5], p[d + LAG], worth, fade, lanes.speeds[1], spare[11], lanes.wheels[1])

@@ -70,9 +70,10 @@ def test_an_old_command_goes_on_until_the_new_one_arrives(step_s: float, delay_s
     assert driven.poses[-1, 0, 0] - 20 == pytest.approx(SPEED * (0.7 + 0.3 - 0.7), abs=1e-9)
 
 
-def risen(commands: np.ndarray, step_s: float, rise: float, delay: float) -> np.ndarray:
+def risen(commands: np.ndarray, step_s: float, rise: float, delay: float, lag: float) -> np.ndarray:
     """(t + 1, 2) way of both wheels [m], a tenth of a millisecond at a time."""
-    tick, level, asked = 1e-4, 0.0, (0.0, 0.0)
+    tick, level, asked, speed = 1e-4, 0.0, (0.0, 0.0), np.zeros(2)
+    keeps = math.exp(-tick / lag) if lag else 0.0
     ways, way = [(0.0, 0.0)], np.zeros(2)
     n, late = round(step_s / tick), round(delay / tick)
     heard = {step * n + late: (move - turn, move + turn) for step, (move, turn) in enumerate(commands)}
@@ -84,15 +85,29 @@ def risen(commands: np.ndarray, step_s: float, rise: float, delay: float) -> np.
         faster = max(map(abs, asked))
         before = min(level, faster)
         level = min(before + (tick / rise if rise else math.inf), faster)
-        way += tick * SPEED * np.array(asked) * ((before + level) / 2 / faster if faster else 0.0)
+        target = SPEED * np.array(asked) * ((before + level) / 2 / faster if faster else 0.0)
+        way += tick * target - lag * (1 - keeps) * (target - speed)
+        speed = target + keeps * (speed - target)
         if (k + 1) % n == 0:
             ways.append((way[0], way[1]))
     return np.array(ways)
 
 
-@pytest.mark.parametrize(("rise", "delay"), [(0.24, 0.0), (0.24, 0.1), (0.9, 0.0), (0.9, 0.3)])
+@pytest.mark.parametrize(
+    ("rise", "delay", "lag"),
+    [
+        (0.24, 0.0, 0.0),
+        (0.24, 0.1, 0.0),
+        (0.9, 0.0, 0.0),
+        (0.9, 0.3, 0.0),
+        (0.24, 0.1, 0.06),
+        (0.5, 0.3, 0.4),
+        (0.02, 0.5, 0.2),
+    ],
+)
+@pytest.mark.parametrize("step_s", [0.5, 0.25])
 def test_speeds_rise_evenly_and_begin_anew_where_a_wheel_turns_the_other_way(
-    rise: float, delay: float
+    rise: float, delay: float, lag: float, step_s: float
 ) -> None:
     commands = np.array(
         [
@@ -107,9 +122,20 @@ def test_speeds_rise_evenly_and_begin_anew_where_a_wheel_turns_the_other_way(
             [0.6, 0.3],
         ]
     )
-    late: dict[str, Any] = {"late": True, "delay_steps": 1} if delay else {}
-    driven = drive_robots({**FIELD, "drive.rise": rise, "drive.delay": delay}, commands, **late)
-    np.testing.assert_allclose(driven.wheels[:, 0], risen(commands, 0.5, rise, delay), atol=2e-6)
+    late: dict[str, Any] = {"late": True, "delay_steps": 2} if delay else {}
+    numbers = {**FIELD, "drive.rise": rise, "drive.delay": delay, "drive.lag": lag}
+    driven = drive_robots(numbers, commands, step_s=step_s, **late)
+    np.testing.assert_allclose(driven.wheels[:, 0], risen(commands, step_s, rise, delay, lag), atol=2e-6)
+
+
+def test_a_command_of_the_other_way_begins_anew_however_late_each_comes() -> None:
+    """To and fro, each command 0.45 to 0.55 s late: none lasts more than 0.55 s of a step, as its speed rises."""
+    numbers = {**FIELD, "drive.rise": 0.9, "drive.delay": 0.5, "drive.delay_jitter": 0.05}
+    commands = np.array([[1.0, 0.0], [-1.0, 0.0]] * 20)
+    driven = drive_robots(numbers, commands, late=True, delay_steps=2, noisy=True, n=64)
+    ways = np.abs(np.diff(driven.wheels, axis=0))
+    assert ways.max() <= SPEED * 0.55**2 / (2 * 0.9)
+    assert ways[2:].min() > 0.0
 
 
 def test_an_s2_of_speeds_that_rise_goes_as_far_as_its_firmware_has_it() -> None:

@@ -143,22 +143,23 @@ def _fade(lag, time, rest):
 
 
 @stage
-def _rise(left, right, was_left, was_right, full, rise, time, level, worth):
-    """How long wheels would have to go at speeds that they are asked for, for the way that they go as these rise.
+def _rise(left, right, was_left, was_right, full, rise, time, level, first, last, rising, steady):
+    """For how long wheels rise to the speeds that they are asked for, and from and to what.
 
     The faster wheel's speed rises from what it was to what it is to be at a constant rate, and falls at once; the other
     one's follows in proportion. Both begin anew where either turns the other way.
 
     Args:
         left, right: Speeds asked for [m/s].
-        was_left, was_right: Those before.
+        was_left, was_right: Those asked for before; changed.
         full: Speed at full command [m/s].
         rise: Time in which it rises from 0 to that [s].
         time: How long wheels go [s].
         level: Of the faster wheel, 1: full speed; changed.
-        worth: Written [s].
+        first, last: Written: parts of the speeds asked for, at the beginning and at the end of the rise.
+        rising, steady: Written: how long it lasts, and how long wheels go after it [s].
     """
-    real = worth.dtype.type
+    real = level.dtype.type
     for lane in range(LANES):
         one = left[lane]
         two = right[lane]
@@ -166,16 +167,56 @@ def _rise(left, right, was_left, was_right, full, rise, time, level, worth):
         top = full[lane]
         end = faster / (top if top > real(0.0) else real(1.0))
         turns = (one * was_left[lane] < real(0.0)) | (two * was_right[lane] < real(0.0))
-        begin = level[lane] if level[lane] < end else end
+        before = level[lane]
+        begin = before if before < end else end
         begin = real(0.0) if turns else begin
         slow = rise[lane]
         whole = time[lane]
         needed = (end - begin) * slow
         is_done = needed <= whole
-        gained = whole / (slow if slow > real(0.0) else real(1.0))
-        lost = (end - begin) * needed * real(0.5) if is_done else (end - begin - real(0.5) * gained) * whole
-        worth[lane] = whole - lost / (end if end > real(0.0) else real(1.0))
-        level[lane] = end if is_done else begin + gained
+        lasts = needed if is_done else whole
+        reached = end if is_done else begin + whole / (slow if slow > real(0.0) else real(1.0))
+        scale = real(1.0) / (end if end > real(0.0) else real(1.0))
+        first[lane] = begin * scale
+        last[lane] = real(1.0) if is_done else reached * scale
+        rising[lane] = lasts
+        steady[lane] = whole - lasts
+        # A command that lasts no time is none.
+        goes = whole > real(0.0)
+        level[lane] = reached if goes else before
+        was_left[lane] = one if goes else was_left[lane]
+        was_right[lane] = two if goes else was_right[lane]
+
+
+@stage
+def _roll_up(target, lag, first, last, time, rest, speed, way, total):
+    """Wheels follow a speed asked for that rises evenly; what they travel is the exact integral.
+
+    Args:
+        target: Speed that it rises to [m/s].
+        lag: [s].
+        first, last, time: Of `_rise`.
+        rest: Of `_fade`.
+        speed: Of the wheel [m/s]; changed.
+        way: Written [m].
+        total: Since the start [m]; changed.
+    """
+    real = speed.dtype.type
+    for lane in range(LANES):
+        slow = lag[lane] if lag[lane] > real(LEAST_LAG) else real(LEAST_LAG)
+        lasts = time[lane]
+        rises = lasts > real(0.0)
+        begin = target[lane] * first[lane]
+        end = target[lane] * last[lane]
+        # A wheel that has followed for long is late by the lag: so much slower than what it is asked for.
+        late = (end - begin) / (lasts if rises else real(1.0)) * slow
+        old = speed[lane]
+        new = end - late + (old - begin + late) * rest[lane]
+        new = new if rises else old
+        length = real(0.5) * (begin + end) * lasts - slow * (new - old)
+        way[lane] = length
+        total[lane] = total[lane] + length
+        speed[lane] = new
 
 
 @stage
@@ -185,7 +226,7 @@ def _roll(target, lag, time, rest, speed, travel, total):
     Args:
         target: Speed asked for [m/s].
         lag: [s].
-        time: How long a wheel is asked for it, less what it loses as it rises to it [s].
+        time: How long [s].
         rest: Of `_fade`.
         speed: Of the wheel [m/s]; changed.
         travel: Written [m].
@@ -260,6 +301,37 @@ def _set(row, value):
 
 
 @stage
+def _go(lanes, row, left, right, time, rises, left_way, right_way):
+    """Wheels go for a time at the speeds that they are asked for, as they rise and lag.
+
+    Args:
+        lanes: State of the wheels is changed.
+        row: First number of the drive.
+        left, right: Speeds asked for [m/s].
+        time: [s].
+        rises: Whether any speed takes time to rise.
+        left_way, right_way: Written [m].
+    """
+    lag, spare, fade = lanes.p[row + LAG], lanes.spare, lanes.spare[3]
+    steady = time
+    if rises:
+        first, last, rising, steady = spare[14], spare[15], spare[16], spare[17]
+        _rise(
+            left, right, lanes.asked[0], lanes.asked[1], lanes.p[row + SPEED], lanes.p[row + RISE], time,
+            lanes.level, first, last, rising, steady,
+        )  # fmt: skip
+        _fade(lag, rising, fade)
+        _roll_up(left, lag, first, last, rising, fade, lanes.speeds[0], spare[18], lanes.wheels[0])
+        _roll_up(right, lag, first, last, rising, fade, lanes.speeds[1], spare[19], lanes.wheels[1])
+    _fade(lag, steady, fade)
+    _roll(left, lag, steady, fade, lanes.speeds[0], left_way, lanes.wheels[0])
+    _roll(right, lag, steady, fade, lanes.speeds[1], right_way, lanes.wheels[1])
+    if rises:
+        _add_to(spare[18], left_way)
+        _add_to(spare[19], right_way)
+
+
+@stage
 def plan(shape, rules, key, lanes, step):
     """What the commands of a step ask of the body, into `lanes.moved`; wheels and their speeds go on.
 
@@ -269,7 +341,7 @@ def plan(shape, rules, key, lanes, step):
         step: Number of the step.
     """
     p, d, spare, moved, targets = lanes.p, shape.row_drive, lanes.spare, lanes.moved, lanes.targets
-    late, worth, fade, rest, going = spare[0], spare[1], spare[3], lanes.lasts[0], lanes.lasts[1]
+    late, rest, going = spare[0], lanes.lasts[0], lanes.lasts[1]
     rises = any_above_zero(p[d + RISE])
     _ask(shape, rules, lanes, step)
     if shape.noisy:
@@ -285,30 +357,14 @@ def plan(shape, rules, key, lanes, step):
             for k in range(1, shape.delay_steps + 1):
                 _pick(late, k, targets[2 * k + wheel], spare[4 + wheel])
                 _pick(late, k, targets[2 * k + 2 + wheel], spare[6 + wheel])
-        copy_row(rest, worth)
-        if rises:
-            # What goes on does not begin anew: it is what it was.
-            copy_row(spare[6], spare[12])
-            copy_row(spare[7], spare[13])
-            _rise(
-                spare[6], spare[7], spare[12], spare[13], p[d + SPEED], p[d + RISE], rest, lanes.level, worth
-            )
-        _fade(p[d + LAG], rest, fade)
-        _roll(spare[6], p[d + LAG], worth, fade, lanes.speeds[0], spare[8], lanes.wheels[0])
-        _roll(spare[7], p[d + LAG], worth, fade, lanes.speeds[1], spare[9], lanes.wheels[1])
+        _go(lanes, d, spare[6], spare[7], rest, rises, spare[8], spare[9])
     else:
         _set(rest, 0.0)
         for wheel in range(2):
             copy_row(targets[wheel], spare[4 + wheel])
-            copy_row(targets[2 + wheel], spare[6 + wheel])
             _set(spare[8 + wheel], 0.0)
     _subtract(rules.step_s, rest, going)
-    copy_row(going, worth)
-    if rises:
-        _rise(spare[4], spare[5], spare[6], spare[7], p[d + SPEED], p[d + RISE], going, lanes.level, worth)
-    _fade(p[d + LAG], going, fade)
-    _roll(spare[4], p[d + LAG], worth, fade, lanes.speeds[0], spare[10], lanes.wheels[0])
-    _roll(spare[5], p[d + LAG], worth, fade, lanes.speeds[1], spare[11], lanes.wheels[1])
+    _go(lanes, d, spare[4], spare[5], going, rises, spare[10], spare[11])
     if shape.late:
         _to_motion(spare[8], spare[9], p[d + SLIP], p[d + TRACK], p[d + DRIFT_PER_M], moved[0], moved[1])
     else:

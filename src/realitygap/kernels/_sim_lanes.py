@@ -40,7 +40,8 @@ class SimLanes(NamedTuple):
     stalled: Row  # 1 where the last step was blocked, else 0
     n_stalls: NDArray[np.int32]
     speeds: Rows  # (2,) of the wheels [m/s]
-    level: Row  # speed of the faster wheel that is asked for now, as it rises; 1: full speed
+    asked: Rows  # (2,) speeds that the wheels were last asked for, where they rise [m/s]
+    level: Row  # the faster one's, as it rises; 1: full speed
     targets: Rows  # (2 * (delay_steps + 2),) speeds asked for, latest first, left and right in turn
     wheels: Rows  # (2,) driven since the start, as an encoder without error would say [m]
     commands: Rows  # (2,) of the last step, -1..1
@@ -192,6 +193,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         stalled=row(),
         n_stalls=np.zeros(LANES, np.int32),
         speeds=rows(2),
+        asked=rows(2),
         level=row(),
         targets=rows(2 * (shape.delay_steps + 2)),
         wheels=rows(2),
@@ -348,6 +350,7 @@ def start_block(shape, rules, table, counters, first, n_lanes, lanes):
     fill(lanes.n_line, np.int32(0))
     for k in range(2):
         fill(lanes.speeds[k], real(0.0))
+        fill(lanes.asked[k], real(0.0))
         fill(lanes.wheels[k], real(0.0))
         fill(lanes.commands[k], real(0.0))
     for k in range(lanes.targets.shape[0]):

@@ -19,6 +19,7 @@ from realitygap.calibration import (
     standard_of,
     values_of,
 )
+from realitygap.calibration._abc import _predict
 from realitygap.world import Distribution, load_robot
 
 ROBOT = load_robot("scribbler-s2-fluke2")
@@ -61,6 +62,20 @@ def test_intervals_cover_as_often_as_they_say():
         low, high = np.quantile(places, [0.05, 0.95], axis=0)
         inside.append((low <= truth) & (truth <= high))
     assert 0.81 <= np.mean(inside) <= 0.97
+
+
+def test_each_simulation_is_predicted_as_by_a_regression_without_it():
+    rng = np.random.default_rng(4)
+    places = rng.normal(size=(300, 3))
+    shown = places @ rng.normal(size=(3, 24)) + 0.3 * (places**2) @ rng.normal(size=(3, 24))
+    summaries = shown + 3.0 * rng.normal(size=(300, 24))
+    told, _ = _predict(summaries, places, summaries[0])
+    without = np.array(
+        [_predict(np.delete(summaries, k, 0), np.delete(places, k, 0), summaries[k])[1] for k in range(40)]
+    )
+    by_all = np.array([_predict(summaries, places, row)[1] for row in summaries[:40]])
+    # Means and squares stay those of all: a tenth of the difference is left.
+    assert np.abs(told[:40] - without).mean() < 0.15 * np.abs(by_all - without).mean()
 
 
 def test_what_shows_is_found_and_what_does_not_stays_as_it_was():

@@ -69,3 +69,4 @@ def test_without_poses_nothing_is_identified_and_it_says_what_to_record() -> Non
     fit = fit_contact(trials, ENSEMBLE.replay, ROBOT, ARENA, prior=PRIOR, observe="encoders")
     assert [found.identified for found in fit.fitted] == [False] * len(CONTACT)
     assert all("observe = track" in found.advice for found in fit.fitted)
+    assert all(found.low <= found.estimate <= found.high for found in fit.fitted)

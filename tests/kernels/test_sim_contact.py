@@ -50,8 +50,9 @@ def body(
     corners: Any = OUTLINE,
     radius: float = 0.01,
     slip: float = math.inf,
+    give: tuple[float, float, float] = (1.0, 1.0, 171.0),
 ) -> reference.Body:
-    return reference.Body(list(corners), radius, friction, (1.0, 1.0, 171.0), model, slip)
+    return reference.Body(list(corners), radius, friction, give, model, slip)
 
 
 def free_starts(
@@ -134,15 +135,68 @@ def test_steps_among_obstacles_equal_the_reference(model: str) -> None:
     assert compare(driven, starts, commands, like, world) > cases(40, 4)
 
 
-@pytest.mark.parametrize("saturation", [10.0, 200.0])
-def test_steps_of_wheels_whose_grip_gives_out_equal_the_reference(saturation: float) -> None:
+GIVES = [(1.0, 1.0, 171.0), (1.0, 0.3, 171.0), (3.0, 1.0, 300.0)]
+
+
+@pytest.mark.parametrize(("saturation", "give"), list(itertools.product([10.0, 200.0], GIVES)))
+def test_steps_of_wheels_whose_grip_gives_out_equal_the_reference(
+    saturation: float, give: tuple[float, float, float]
+) -> None:
     rng = np.random.default_rng(8)
-    like = body(slip=0.5 / reference.SUBSTEPS / saturation)
+    like = body(slip=0.5 / reference.SUBSTEPS / saturation, give=give)
     world = reference.World(planes())
     starts = free_starts(rng, cases(40, 6), like, world)
     commands = np.column_stack([rng.uniform(-0.2, 1, 12), rng.uniform(-0.9, 0.9, 12)])
-    driven = drive_robots({**numbers_of(starts), **room(), "contact.saturation": saturation}, commands)
+    long, lat, ang = give
+    grip = {"contact.saturation": saturation, "contact.long": long, "contact.lat": lat, "contact.ang": ang}
+    driven = drive_robots({**numbers_of(starts), **room(), **grip}, commands)
     assert compare(driven, starts, commands, like, world) > cases(40, 4)
+
+
+def test_only_ratios_of_what_a_body_gives_count() -> None:
+    """Also where its wheels' grip gives out."""
+    starts = free_starts(np.random.default_rng(9), cases(40, 6), body(), reference.World(planes()))
+    driven = [
+        drive_robots(
+            {
+                **numbers_of(starts),
+                **room(),
+                "contact.saturation": 30.0,
+                "contact.long": times,
+                "contact.lat": 0.5 * times,
+                "contact.ang": 171.0 * times,
+            },
+            np.array([[0.8, 0.3], [0.9, -0.2], [1.0, 0.1]]),
+        )
+        for times in (1.0, 4.0)
+    ]
+    assert driven[0].stalled.any()
+    np.testing.assert_allclose(driven[0].poses, driven[1].poses, atol=1e-9)
+
+
+def test_grip_that_gives_out_depends_on_no_other_robot_and_hardly_on_precision() -> None:
+    """Commands that are late, so that motions in two parts are met; half of the robots have no such wheels."""
+    starts = free_starts(np.random.default_rng(10), 12, body(), reference.World(planes()))
+    numbers = {**room(), "drive.delay": 0.2, "drive.lag": 0.1, "drive.rise": 0.2}
+    commands = np.array([[0.8, 0.3], [0.9, -0.2], [1.0, 0.1], [-0.6, 0.5]])
+    late: dict[str, Any] = {"late": True, "delay_steps": 1, "late_substeps": 4}
+    saturation = np.tile([0.0, 40.0], 6)
+    alone = [
+        drive_robots(
+            {**numbers_of(starts[k::2]), **numbers, "contact.saturation": saturation[k]}, commands, **late
+        )
+        for k in (0, 1)
+    ]
+    mixed = {**numbers_of(starts), **numbers, "contact.saturation": saturation}
+    together = drive_robots(mixed, commands, **late)
+    single = drive_robots(mixed, commands, dtype=np.float32, **late)
+    assert together.stalled[:, 0::2].any()
+    assert together.stalled[:, 1::2].any()
+    for k in (0, 1):
+        np.testing.assert_array_equal(together.poses[:, k::2], alone[k].poses)
+    # Of twelve, a push of one or two may flip by rounding.
+    off = np.abs(single.poses - together.poses).max(axis=(0, 2))
+    assert (off < 1e-4).sum() >= 10
 
 
 NOSE = (0.08, 0.05)

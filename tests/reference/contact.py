@@ -169,7 +169,7 @@ def softened(body: Body, move: Vector) -> Give:
     stiff_along = stiff_across = stiff_around = stiff_both = 0.0
     for side in (1.0, -1.0):  # left, right
         ahead, aside = move[0] - side * arm * move[2], move[1]
-        softness = math.sqrt(1 + (ahead**2 / long + aside**2 / lat) / body.slip**2)
+        softness = math.sqrt(1 + (ahead**2 + aside**2 * long / lat) / body.slip**2)
         stiff_along += 1 / (2 * long * softness)
         stiff_across += 1 / (2 * lat * softness)
         stiff_around += arm**2 / (2 * long * softness)

@@ -6,7 +6,8 @@ shrinks to where the posterior is.
 
 Sources: semi-automatic summaries, Fearnhead & Prangle, JRSS B 74 (2012); regression adjustment, Beaumont, Zhang &
 Balding, Genetics 162 (2002); rounds whose proposals are the prior cut to where the posterior can be, so that no
-weights are needed: truncated sequential estimation, Deistler, Goncalves & Macke, NeurIPS 2022.
+weights are needed: truncated sequential estimation, Deistler, Goncalves & Macke, NeurIPS 2022; predictions without the
+predicted, Allen, Technometrics 16 (1974).
 """
 
 from __future__ import annotations
@@ -184,7 +185,8 @@ def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, F
     """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed.
 
     For each simulation it is the regression without it, which follows from the whole one (Allen 1974): a regression
-    knows too well what it was made from, and the observed is none of these.
+    knows too well what it was made from, and the observed is none of these. Means and the first predictions, whose
+    squares are the curvature, stay those of all, as one simulation hardly changes them.
     """
     mean = places.mean(axis=0)
     slopes, _ = _ridge(summaries, places - mean)

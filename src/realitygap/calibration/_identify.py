@@ -91,7 +91,6 @@ ADVICE: dict[str, tuple[str, str, str]] = {
     "drive.track": (f"turn in place beside a wall for a whole trial, or {CAMERA}", CAMERA, RUNS),
     "drive.axle": (CAMERA, CAMERA, "turn in place, both ways"),
     "drive.lag": (WHEELS, f"{CHANGES}, with shorter steps", f"{CHANGES}, with shorter steps"),
-    "drive.rise": (WHEELS, CHANGES, CHANGES),
     "drive.delay": (WHEELS, CHANGES, CHANGES),
     "drive.delay_jitter": (WHEELS, f"{CHANGES}, in more trials", f"{CHANGES}, in more trials"),
     "drive.dead_band": (f"{WHEELS} under slow commands", SLOW, SLOW),

@@ -137,18 +137,19 @@ class DeadBand:
 def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method: str) -> MotionFit:
     """Parameters of which cells alone tell nothing to a fit of windows, with what to record."""
     own = own_values(robot)
-    fitted = tuple(
-        Fitted(
-            name=name, estimate=own[name], low=known[name].prior.lowest, high=known[name].prior.highest,
-            prior_low=known[name].prior.lowest, prior_high=known[name].prior.highest, identified=False,
-            unit=known[name].unit, advice=advice_for(name, "cells"),
-        )
-        for name in names
-    )  # fmt: skip
+    fitted = []
+    for name in names:
+        low, high = known[name].prior.lowest, known[name].prior.highest
+        fitted.append(
+            Fitted(
+                name=name, estimate=min(max(own[name], low), high), low=low, high=high, prior_low=low,
+                prior_high=high, identified=False, unit=known[name].unit, advice=advice_for(name, "cells"),
+            )
+        )  # fmt: skip
     notes = (
         "Cells, readings and stalls do not show where it was at each command: fit all parameters to whole trials.",
     )
-    return MotionFit(fitted, {}, {}, method, notes)
+    return MotionFit(tuple(fitted), {}, {}, method, notes)
 
 
 def _solve(problem: Problem) -> tuple[Problem, Floats, DeadBand, Floats]:

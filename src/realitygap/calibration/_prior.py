@@ -116,7 +116,7 @@ def _ratio(low: float, high: float) -> Distribution:
 
 DRIVE: tuple[tuple[str, Distribution, str, str], ...] = (
     ("lag", _even(0.0, 0.4), "s", "sudden starts and stops, with --observe encoders or track"),
-    ("rise", _even(0.0, 0.5), "s", "sudden starts, and turns of one wheel, with --observe encoders or track"),
+    ("rise", _even(0.0, 0.5), "s", "wheels that reverse, with --observe encoders or track"),
     ("delay", _even(0.0, 0.6), "s", "sudden starts and stops, with --observe encoders or track"),
     ("delay_jitter", _even(0.0, 0.25), "s", "many sudden turns, with --observe track"),
     ("dead_band", _even(0.0, 0.3), "", "slow straight lines of growing speed"),

@@ -103,8 +103,9 @@ def unsaturated(p, row, give):
 def saturated(p, row, seconds, parts, moved, give):
     """What it gives where its wheels slipped as far as a push moved it: the more each has, the less it holds.
 
-    A wheel's grip is slip / sqrt(1 + (saturation * speed of slip) ** 2); here it is the secant to the slip that there
-    was, which makes the slip that there will be the least dissipation's if it is done again and again.
+    A wheel's grip is slip / sqrt(1 + (saturation * speed of slip) ** 2), slip to the side counting sqrt(long / lat)
+    times, as it does where nothing gives out; here it is the secant to the slip that there was, which makes the slip
+    that there will be the least dissipation's if it is done again and again.
 
     Args:
         p, row: Numbers of the robots, and the first of contact.
@@ -125,9 +126,9 @@ def saturated(p, row, seconds, parts, moved, give):
         half = np.sqrt(l_x / g) * spin[k]
         left = go_x[k] - half
         right = go_x[k] + half
-        aside = go_y[k] * go_y[k] / l_y
-        left = np.sqrt(real(1.0) + (left * left / l_x + aside) * rate * rate)
-        right = np.sqrt(real(1.0) + (right * right / l_x + aside) * rate * rate)
+        aside = go_y[k] * go_y[k] / l_y * l_x
+        left = np.sqrt(real(1.0) + (left * left + aside) * rate * rate)
+        right = np.sqrt(real(1.0) + (right * right + aside) * rate * rate)
         mean = real(0.5) * (left + right)
         along[k] = l_x * mean
         across[k] = l_y * left * right / mean

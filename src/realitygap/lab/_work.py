@@ -37,6 +37,7 @@ def main() -> int:
         work: Callable[[Channel, Message], None] = import_module(f"{__package__}.{_WORK[order['work']]}").work
         work(channel, order)
     except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one that comes once more is the same one
         channel.say("interrupted")
         return 130
     except (RealityGapError, OSError, ValueError) as error:

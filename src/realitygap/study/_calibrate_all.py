@@ -50,7 +50,9 @@ STEPS = 100  # of a trial
 IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
 N_CANDIDATES = 12  # of which the next trials are chosen
 N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
-OF_COMMANDS = 3  # draws of single commands for each of whole trials, where poses are known
+OF_COMMANDS = (
+    3  # draws of single commands for each of whole trials, with poses: predicted more than 1 did, on twins
+)
 BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
 LEAST_TO_CHOOSE = 10  # trials
 
@@ -185,8 +187,7 @@ class _Fit:
         """What is left of the prior.
 
         With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
-        where `sim` cannot make both, the first knows how the robot moves and the second what comes of it, and draws of
-        both predict controllers better than either.
+        where `sim` cannot make both, the first knows how the robot moves and the second what comes of it.
         """
         told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
         if not told or any(trial.observe != "track" for trial in told):

@@ -191,7 +191,8 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
         said = str(context["error"])
         if is_table:
             return said if said.endswith("?") else f"{said}."
-        return f"{said}, came {came}."
+        # who names it already has nothing to add
+        return f"{said}." if str(problem["input"]) in said else f"{said}, came {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
         words, key = _LIMITS[kind]

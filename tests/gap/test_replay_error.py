@@ -16,6 +16,23 @@ def test_distance_and_heading_are_to_each_replay_and_noise_between_replays():
     assert found.noise_heading == pytest.approx(np.zeros((1, 2)))
 
 
+def test_its_mean_over_controllers_has_an_interval_at_each_step():
+    rng = np.random.default_rng(1)
+    observed, off = np.zeros((12, 4, 3)), rng.uniform(0, 1, 6)
+    replayed = np.zeros((2, 12, 4, 3))
+    replayed[..., 1:, 0] = np.repeat(off, 2)[:, None]
+    found = replay_error(observed, replayed, np.repeat(np.arange(6), 2))
+    spread = 2.571 * off.std(ddof=1) / np.sqrt(6)  # t with 5 degrees of freedom
+    assert found.at_end.n == 6
+    assert found.at_end.estimate == pytest.approx(off.mean())
+    assert found.at_end.high == pytest.approx(off.mean() + spread, rel=1e-3)
+    told = found.to_dict()
+    assert told["trials"] == 12
+    assert told["distance"]["estimate"] == pytest.approx([0.0] + 3 * [off.mean()])
+    assert told["distance"]["low"][0] == 0.0
+    assert len(told["noise_heading"]["high"]) == 4
+
+
 def test_one_replay_shows_no_noise():
     with pytest.raises(ValueError, match="at least 2"):
         replay_error(np.zeros((1, 3, 3)), np.zeros((1, 1, 3, 3)))

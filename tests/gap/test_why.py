@@ -36,7 +36,21 @@ def test_draws_from_the_posterior_widen_the_intervals():
 def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_advised():
     unsure = Estimate(0.02, -0.01, 0.05, 9)
     whole, none = Estimate(0.1, 0.05, 0.2, 9), Estimate(0.0, 0.0, 0.01, 9)
-    assert "not shown to be more than chance" in Why(("motor",), (unsure,), (1,), whole, none).advice
+    advice = Why(("motor",), (unsure,), (1,), whole, none).advice
+    assert "not shown to be more than chance, some 21 controllers would" in advice  # 9 * (0.03 / 0.02)^2
+    hardly = Estimate(0.001, -0.04, 0.05, 9)
+    assert "more than 1,024 controllers" in Why(("motor",), (hardly,), (1,), whole, none).advice
     harm = Estimate(-0.02, -0.03, -0.01, 9)
     advice = Why(("motor",), (harm,), (1,), whole, whole).advice
     assert advice.startswith("Change this next: nothing that was fitted")
+    one = Estimate(0.02, 0.01, 0.05, 9)
+    worse = Why(("motor",), (one,), (1,), Estimate(0.01, 0.0, 0.02, 9), Estimate(0.06, 0.03, 0.1, 9))
+    assert worse.advice.startswith(
+        "Change this next: what was fitted. All of it together makes the gap larger"
+    )
+
+
+def test_few_controllers_carry_no_advice_and_it_says_how_many_would():
+    found = explain_gap(squares((0.2, 0.05), c=2), ("motor", "body"), (3, 1))
+    assert found.after.low is None
+    assert found.advice == "What to change next cannot be said: 2 controllers give no interval; 5 would."

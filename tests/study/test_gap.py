@@ -223,6 +223,21 @@ def test_the_part_that_differs_carries_the_gap():
     assert "Change this next: " in found.advice
 
 
+def test_why_has_the_commands_of_the_calibration_last_as_long_as_they_did():
+    controllers = sample_controllers("random", 6, 1)
+    target = study_gap(sim(), sim(7), controllers, trials=2).target
+    calibration = Calibration(
+        kind="path", robot="scribbler-s2-fluke2", target="twin", label="TWIN", observe="cells", trials=10, step_s=1.0,
+        date="2026-01-01", method="known", numbers={"drive.track": 0.16},
+    )  # fmt: skip
+    genomes = [each.genome for each in controllers]
+    said, given, other = (
+        why_gap(calibration, ARENA, genomes, target, trials=2, **more).before.estimate
+        for more in ({}, {"step_s": 1.0}, {"step_s": 0.5})
+    )
+    assert said == given != other
+
+
 def test_why_needs_numbers_to_switch_and_noise_to_tell(some):
     nothing = Calibration(
         kind="all", robot="scribbler-s2-fluke2", target="sim", label="SIM", observe="cells", trials=1,

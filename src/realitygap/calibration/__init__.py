@@ -6,6 +6,7 @@ from ._contact import fit_contact
 from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers, random_start
+from ._handles import MOTION
 from ._ir_checks import Independence, independence, predictive_check
 from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
@@ -23,6 +24,7 @@ from ._step import step_of
 __all__ = [
     "LEAST_PLACEMENTS",
     "LEAST_STEPS",
+    "MOTION",
     "Effect",
     "Effort",
     "Evidence",

@@ -37,6 +37,9 @@ JYRO_STEP = 0.1
 
 ENDS = (0.05, 0.95)
 
+STANDS = 1e-3
+"""Way of five full steps below which a robot stood still [m]."""
+
 STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
 
 Simulate = Callable[[ObservedTrial], Moved]
@@ -106,7 +109,8 @@ def fit_path(
         read.
 
     Raises:
-        ValueError: No trial drove straight at full speed.
+        ValueError: No trial drove straight at full speed, or the robot stood still in all that should have, or turned
+            not at all.
     """
     straight = _Measured.of(trials, STRAIGHT, robot)
     turning = _Measured.of(trials, TURNING, robot)
@@ -115,12 +119,22 @@ def fit_path(
             "There is no straight path: expected trials of full-speed commands straight ahead, move = 1 and turn = 0, "
             "whose end was measured."
         )
+    if all(abs(moved.way) < STANDS for moved in straight.moved):
+        raise ValueError(
+            "The robot stood still on all straight paths, expected one that drives at full speed. Is it switched on, "
+            "are its batteries full, and do its wheels turn?"
+        )
     way = _mean([moved.way for moved in straight.moved], straight.length_step, n_draws, rng)
     veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, n_draws, rng)
     expected, base = simulate(straight.trials[0]), (robot.drive.gain_left + robot.drive.gain_right) / 2
     gain = base * way / expected.way
     track, turn = np.full(n_draws + 1, robot.drive.track), None
     if turning.moved and not straight.by_encoders:
+        if all(abs(moved.turned) < STANDS / robot.drive.track for moved in turning.moved):
+            raise ValueError(
+                "The robot did not turn in any trial that has it turn at full speed: expected one whose wheels turn "
+                "both ways."
+            )
         turn = _mean([moved.turned for moved in turning.moved], turning.angle_step, n_draws, rng)
         track = robot.drive.track * (gain / base) * simulate(turning.trials[0]).turned / turn
     uneven = robot.drive.gain_right - robot.drive.gain_left

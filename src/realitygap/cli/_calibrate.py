@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from realitygap.errors import StudyError
+from realitygap.errors import DescriptionError, StudyError
 
 from ._camera import CAMERA_HELP, under_camera
 
@@ -141,6 +141,10 @@ def _checked(
         raise StudyError(
             f"{out} does not end in .toml. Expected the name of a calibration, such as fit.toml."
         )
+    if out.exists() and not _is_calibration(out):
+        raise StudyError(
+            f"{out} is there already, and is no calibration: it stays as it is. Name another file."
+        )
     for path in (out, figure):
         if path is not None and not path.resolve().parent.is_dir():
             raise StudyError(
@@ -153,6 +157,15 @@ def _checked(
     if data is not None and (witness is not None or camera is not None or choose):
         raise StudyError("--witness, --camera and --choose go with --robot: --from drives nothing.")
     return out
+
+
+def _is_calibration(path: Path) -> bool:
+    from realitygap.world import read_calibration
+
+    try:
+        return read_calibration(path) is not None
+    except DescriptionError:
+        return False
 
 
 def _seen(observe: str | None) -> Any:
@@ -246,9 +259,9 @@ def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) 
     for note in made.notes:
         console.print(note, highlight=False, markup=False)
     if made.misspecified:
+        p = f" (p {made.misspecification_p:.3f})" if made.misspecification_p < 1 else ""
         typer.echo(
-            f"The simulator cannot make what was observed (p {made.misspecification_p:.3f}): what was fitted is the "
-            "nearest that it can do."
+            f"The simulator cannot make what was observed{p}: what was fitted is the nearest that it can do."
         )
     for line in sorted(
         {f"{each.name.rpartition('.')[2]}: {each.advice}" for each in made.fitted if each.advice}

@@ -15,9 +15,16 @@ from realitygap.errors import StudyError
 from ._camera import CAMERA_HELP, under_camera
 
 if TYPE_CHECKING:
-    from realitygap.gap import Estimate, GapResult, Why
+    from realitygap.gap import Estimate, GapResult, ReplayError, Why
     from realitygap.study import GapPlan
     from realitygap.trials import Attendant
+
+
+class Randomize(StrEnum):
+    """Whether robots are drawn from a calibration."""
+
+    no = "no"
+    posterior = "posterior"
 
 
 class Seen(StrEnum):
@@ -59,6 +66,10 @@ def gap(
         float | None,
         typer.Option(min=0, max=10, help="The paper's a on simulators. [default: 0.1 on jyro, else none]"),
     ] = None,
+    randomize: Annotated[
+        Randomize,
+        typer.Option(help="posterior draws the robot of each trial from the calibration that SIM is."),
+    ] = Randomize.no,
     reevolved: Annotated[
         str | None,
         typer.Option(
@@ -100,6 +111,8 @@ def gap(
 
     Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
 
+    Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
+
     In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
     """
     from realitygap.study import gap_between
@@ -126,6 +139,7 @@ def gap(
                 observe=observe.value,
                 arena=arena,
                 noise=noise,
+                randomize=randomize.value,
                 reevolved=reevolved,
                 why=why,
                 processes=processes,
@@ -152,11 +166,11 @@ def gap(
         typer.echo(f"Written: {report}", err=True)
     if as_json:
         values: dict[str, Any] = result.to_dict()
-        typer.echo(
-            json.dumps(values if found.why is None else values | {"why": found.why.to_dict()}, indent=2)
-        )
+        for name, part in (("replay", found.study.replay), ("why", found.why)):
+            values |= {} if part is None else {name: part.to_dict()}
+        typer.echo(json.dumps(values, indent=2))
         return
-    _print(result)
+    _print(result, found.study.replay)
     if found.why is not None:
         _print_why(found.why)
 
@@ -189,7 +203,7 @@ _ROWS = (
 )
 
 
-def _print(result: GapResult) -> None:
+def _print(result: GapResult, replay: ReplayError | None) -> None:
     one, other = result.trials
     typer.echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
@@ -197,6 +211,8 @@ def _print(result: GapResult) -> None:
     )
     for name, title in _ROWS:
         _print_row(title, getattr(result, name))
+    if replay is not None:
+        _print_row("replays off at their end [m]", replay.at_end)
     typer.echo("Kept apart from it:")
     _print_row("re-evolved gap", result.reevolved)
     _print_row("luck of selection", result.luck)

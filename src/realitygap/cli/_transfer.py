@@ -21,7 +21,9 @@ def transfer(
     budget: Annotated[
         list[int] | None,
         typer.Option(
-            min=0, help="Trials on the target that a strategy may spend; may be given again. [default: 20]"
+            min=0,
+            max=4999,
+            help="Trials on the target that a strategy may spend; may be given again. [default: 20]",
         ),
     ] = None,
     strategy: Annotated[
@@ -45,7 +47,7 @@ def transfer(
         int, typer.Option(min=1, max=1000, help="Times that everything is done, each evolving anew.")
     ] = 1,
     fresh_trials: Annotated[
-        int, typer.Option(min=1, help="By which each champion is judged; not of the budget.")
+        int, typer.Option(min=1, max=5000, help="By which each champion is judged; not of the budget.")
     ] = 20,
     runs: Annotated[int, typer.Option(min=1, help="Evolutions in simulation of each replicate.")] = 100,
     repeats: Annotated[int, typer.Option(min=1, help="Trials of each individual in simulation.")] = 8,
@@ -121,10 +123,12 @@ def _print(result: TransferResult) -> None:
         f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
         f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials each"
     )
-    typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>9}{'in simulation':>15}")
+    typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:
-        quality = f"{row.quality.estimate:.3f} ({row.quality.low:.3f} to {row.quality.high:.3f})"
+        quality, regret = (
+            f"{each.estimate:.3f} ({each.low:.3f} to {each.high:.3f})" for each in (row.quality, row.regret)
+        )
         simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
-        typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{row.regret.estimate:>9.3f}{simulated:>15}")
+        typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
     if result.replicates == 1:
         typer.echo("Intervals are of the fresh trials of one champion; --replicates says more of a strategy.")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ._estimate import Estimate
+from ._means import mean_of
 from ._side import Values
 
 
@@ -18,25 +22,51 @@ class ReplayError:
         heading: (m, t + 1) between their headings [rad, 0..pi].
         noise_distance: (m, t + 1) between two replays in simulation, which noise alone drives apart [m].
         noise_heading: (m, t + 1) likewise [rad].
+        controllers: (m,) which controller's each trial is.
     """
 
     distance: Values
     heading: Values
     noise_distance: Values
     noise_heading: Values
+    controllers: NDArray[np.int64]
 
     @property
     def n(self) -> int:
         """Trials."""
         return len(self.distance)
 
+    @property
+    def at_end(self) -> Estimate:
+        """Mean distance at the end of a trial [m], over controllers."""
+        return self._mean(self.distance[:, -1])
 
-def replay_error(observed: Values, replayed: Values) -> ReplayError:
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values: after each step the mean over controllers, with its interval."""
+        values: dict[str, Any] = {"trials": self.n, "n": len(np.unique(self.controllers))}
+        for name in ("distance", "heading", "noise_distance", "noise_heading"):
+            found = [self._mean(step) for step in getattr(self, name).T]
+            values[name] = {
+                end: [getattr(each, end) for each in found] for end in ("estimate", "low", "high")
+            }
+        return values
+
+    def _mean(self, values: Values) -> Estimate:
+        """Of (m,) values that cannot be below 0: trials of one controller count as one."""
+        _, which, n = np.unique(self.controllers, return_inverse=True, return_counts=True)
+        found = mean_of(np.bincount(which, values) / n)
+        return found if found.low is None else replace(found, low=max(found.low, 0.0))
+
+
+def replay_error(
+    observed: Values, replayed: Values, controllers: NDArray[np.int64] | None = None
+) -> ReplayError:
     """Set poses of the target beside those of its commands replayed in simulation.
 
     Args:
         observed: (m, t + 1, 3) x [m], y [m], heading [rad] on the target.
         replayed: (k, m, t + 1, 3) of k replays with noise of their own, k at least 2.
+        controllers: (m,) which controller's each trial is; each another one's when not given.
 
     Returns:
         The mean over replays. Of the noise: between each replay and the next.
@@ -53,7 +83,13 @@ def replay_error(observed: Values, replayed: Values) -> ReplayError:
         raise ValueError("There is one replay, expected at least 2: noise shows between them.")
     distance, heading = _apart(observed[None], replayed)
     noise_distance, noise_heading = _apart(replayed, np.roll(replayed, 1, axis=0))
-    return ReplayError(*(each.mean(axis=0) for each in (distance, heading, noise_distance, noise_heading)))
+    return ReplayError(
+        distance.mean(axis=0),
+        heading.mean(axis=0),
+        noise_distance.mean(axis=0),
+        noise_heading.mean(axis=0),
+        np.arange(len(observed)) if controllers is None else controllers,
+    )
 
 
 def _apart(one: Values, other: Values) -> tuple[Values, Values]:

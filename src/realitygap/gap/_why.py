@@ -15,6 +15,7 @@ from ._shapley import shapley_values
 from ._side import Values
 
 RESAMPLES = 2_000
+MOST = 1_024  # controllers that `realitygap gap` takes
 
 
 @dataclass(frozen=True)
@@ -43,20 +44,23 @@ class Why:
     @property
     def advice(self) -> str:
         """What to change next, in a sentence or two."""
+        if self.after.low is None:
+            return f"What to change next cannot be said: {self.after.refused}"
         left = (
             f" What is left with the whole fit, {self.after} RMS, lies outside these numbers."
-            if (self.after.low or 0.0) > 0
+            if self.after.low > 0
             else " With the whole fit no gap is shown."
         )
         first = self.order[0]
         fall = self.falls[first]
         if (fall.estimate or 0.0) <= 0:
             return f"Change this next: nothing that was fitted, which makes the gap no smaller.{left}"
-        sure = (
-            ""
-            if (fall.low or 0.0) > 0
-            else "; that is not shown to be more than chance, more controllers would"
-        )
+        if (self.after.estimate or 0.0) > (self.before.estimate or 0.0):
+            return (
+                "Change this next: what was fitted. All of it together makes the gap larger, "
+                f"{self.after} RMS in place of {self.before}: try what it was fitted to again, before any part of it."
+            )
+        sure = "" if (fall.low or 0.0) > 0 else f"; that is not shown to be more than chance, {_would(fall)}"
         return (
             f"Change this next: {self.parts[first]}, which carries most, {fall} of the RMS gap of "
             f"{self.before.estimate:.3f}{sure}.{left}"
@@ -71,6 +75,16 @@ class Why:
             "parts": {name: {**fall.to_dict(), "numbers": numbers} for name, fall, numbers in falls},
             "advice": self.advice,
         }
+
+
+def _would(fall: Estimate) -> str:
+    """How many controllers would show a fall of this size: intervals shrink with the root of their number."""
+    if not fall.estimate or fall.low is None:
+        return "more controllers would"
+    n = fall.n * ((fall.estimate - fall.low) / fall.estimate) ** 2
+    if n > MOST:
+        return f"and it would take more than {MOST:,} controllers"
+    return f"some {int(np.ceil(n))} controllers would"
 
 
 def explain_gap(

@@ -46,12 +46,14 @@ def refuse_gap_page(path: str | Path) -> None:
     """Refuse a place for the page before trials are carried out.
 
     Raises:
-        RecordError: It ends in something else than .html, or is a file of results.
+        RecordError: It ends in something else than .html, is a file of results, or is to lie in a folder that is none.
     """
     path = Path(path)
     refuse_results(path)
     if path.suffix.lower() not in (".html", ".htm") and not is_special(path):
         raise RecordError(f"{path} does not end in .html: the report of a gap is a page.")
+    if not path.absolute().parent.is_dir():
+        raise RecordError(f"There is no folder {path.parent} for {path.name}. Make it, or name another file.")
 
 
 def write_gap_report(gap: GapBetween, path: str | Path) -> Path:

@@ -25,7 +25,7 @@ from realitygap.robots import DEFAULT_ROBOT
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
-from ._calibrate_kinds import ALL_TRIALS, KINDS, Kind, Parts
+from ._calibrate_kinds import ALL_TRIALS, KINDS, LEAST_TO_CHOOSE, Kind, Parts
 from ._targets import observations_head
 from ._wrapped_targets import (
     PATH,
@@ -80,6 +80,11 @@ def calibrate(
     _refuse(kind, target, robot, observe, budget)
     if choose and kind != "all":
         raise StudyError(f"--choose goes with all: the trials of {kind} are known before the first of them.")
+    if choose and budget is not None and budget < LEAST_TO_CHOOSE:
+        raise StudyError(
+            f"--budget is {budget}, and the last trials can be chosen where there are at least {LEAST_TO_CHOOSE}: the "
+            "first ones have to tell which. Give more, or leave out --choose."
+        )
     around: Target = GuidedTarget(target, guide) if guide is not None else RuledTarget(target)
     if trials_file is None:
         return _calibrated(kind, around, robot, observe, budget, seed, tell, choose=choose)
@@ -152,10 +157,19 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
             f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
             f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
         )
-    if len(base.range) != target.n_sensors:
+    refuse_other_sensors(base, target)
+
+
+def refuse_other_sensors(robot: RobotModel, target: Target) -> None:
+    """Return where a target has as many range sensors as the robot on whose numbers a fit builds.
+
+    Raises:
+        StudyError: It has not.
+    """
+    if len(robot.range) != target.n_sensors:
         raise StudyError(
-            f"{target.name} has {target.n_sensors} range sensors and robot {base.name!r} {len(base.range)}. Build on "
-            "the robot that it is (--base ROBOT)."
+            f"{target.name} has {target.n_sensors} range sensors and robot {robot.name!r} {len(robot.range)}. Build on "
+            "the robot that it is (--base ROBOT, or a study whose robot it is)."
         )
 
 
@@ -256,6 +270,7 @@ def _calibration(
     numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
     fitted, notes = parts.fitted, parts.notes
     name = str(robot)
+    _refuse_no_robot(parts, robot, target)
     step_s = round(step_of(trials), 4) if trials and kind != "sensors" else 0.0
     if below is not None:
         step_s = step_s or below.step_s
@@ -283,6 +298,23 @@ def _calibration(
         notes=tuple(notes),
         evidence=parts.evidence,
     )
+
+
+def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
+    """Return where a robot can have the numbers that were fitted.
+
+    Raises:
+        StudyError: It cannot: a wheel's gain below 0, say.
+    """
+    try:
+        load_robot(robot).with_numbers(parts.numbers)
+    except ValueError as error:
+        said = "; ".join(line.removeprefix("RobotModel.") for line in str(error).split("\n"))
+        raise StudyError(
+            f"What was fitted to {target} makes no robot: {said} Did it go back when it was told to go ahead, or turn "
+            "the other way? See which end of it is ahead, and that left and right are not swapped. Trials that were "
+            "kept are safe."
+        ) from None
 
 
 def _beside(robot: str, calibration: Path) -> str:

@@ -39,7 +39,7 @@ from realitygap.robots import SimPlatform
 from realitygap.trials import SimEnsemble, Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
-from ._calibrate_kinds import Parts
+from ._calibrate_kinds import LEAST_TO_CHOOSE, Parts
 
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
@@ -54,7 +54,6 @@ OF_COMMANDS = (
     3  # draws of single commands for each of whole trials, with poses: predicted more than 1 did, on twins
 )
 BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
-LEAST_TO_CHOOSE = 10  # trials
 
 
 def calibrate_all(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
+    MOTION,
     MotionFit,
     Moved,
     Placement,
@@ -67,6 +68,23 @@ class Kind:
     observes: tuple[Observe, ...] = OBSERVATIONS
 
 
+def _told_of_ends(parts: Parts) -> Parts:
+    """Misspecified where what decides how the robot moves wants to be more than was thought possible.
+
+    Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
+    These fits have no predictive check.
+    """
+    at_end = [each for each in parts.fitted if each.is_at_end and each.name in MOTION]
+    if not at_end:
+        return parts
+    said = ", ".join(
+        f"{each.name} is {each.estimate:.3g} ({each.prior_low:.3g} to {each.prior_high:.3g})"
+        for each in at_end
+    )
+    note = f"At or beyond the end of what was thought possible: {said}."
+    return replace(parts, misspecified=True, notes=(*parts.notes, note))
+
+
 # path
 
 _PATH_METHOD = (
@@ -86,7 +104,9 @@ def _fit_path(
         return _moved_in_sim(trial, robot, arena)
 
     fit = fit_path(trials, simulate, robot, np.random.default_rng(seed))
-    return Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence})
+    return _told_of_ends(
+        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence})
+    )
 
 
 def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
@@ -216,7 +236,7 @@ def _fit_motion(
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
     fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
-    return _parts_of(fit)
+    return _told_of_ends(_parts_of(fit))
 
 
 def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
@@ -268,6 +288,9 @@ def _fit_all(
 
 ALL_TRIALS = 20
 """Of a calibration of everything, when nothing is said."""
+
+LEAST_TO_CHOOSE = 10
+"""Trials of a calibration of everything, from which on the last ones are chosen."""
 
 KINDS: dict[str, Kind] = {
     "path": Kind(_path_plans, _fit_path, least=2),

@@ -12,6 +12,7 @@ import numpy as np
 
 from realitygap import _special as special
 from realitygap._version import __version__
+from realitygap.world import Fitted
 
 from ._closing_plan import ClosingPlan, TwinName, read_plan
 
@@ -24,9 +25,6 @@ FALLS = {"track": 0.6, "cells": 0.4}
 
 STRETCH = 0.8
 """The same with `track`, where all goes well."""
-
-NEAR_END = 0.05
-"""Of a prior's width: what is nearer to an end of it lies at that end."""
 
 LEAST_SRCC = 0.95
 MOST_MMRV = 2.0
@@ -137,15 +135,8 @@ def _calibrated(unit: Row, before: Row) -> Row:
         "unidentified": sorted(
             {each["name"].split(".")[0] for each in fit["fitted"] if not each["identified"]}
         ),
-        "at_prior_end": sorted(each["name"] for each in fit["fitted"] if _is_at_end(each)),
+        "at_prior_end": sorted(each["name"] for each in fit["fitted"] if Fitted(**each).is_at_end),
     }
-
-
-def _is_at_end(fitted: Row) -> bool:
-    """Whether a parameter is told and lies at an end of what was thought possible that is not 0: it wants to go on."""
-    low, high = fitted["prior_low"], fitted["prior_high"]
-    ways = [abs(fitted["estimate"] - end) for end in (low, high) if end != 0]
-    return bool(fitted["identified"] and min(ways) < NEAR_END * (high - low))
 
 
 def _measures(unit: Row) -> Row:

@@ -67,6 +67,7 @@ class GapStudy:
         maps: Where trials go on both sides.
         replay: Open-loop replays; None where nobody saw the target's robot.
         observe: How much was seen of the target.
+        step_s: How long commands lasted in simulation [s].
     """
 
     result: GapResult
@@ -79,6 +80,7 @@ class GapStudy:
     maps: CoverageMaps | None
     replay: ReplayError | None
     observe: Observe
+    step_s: float
 
 
 def run_gap(
@@ -181,8 +183,9 @@ def study_gap(
         tuple(_by_controller(in_source, len(controllers))),
         tuple(_by_controller(on_target[: len(plans)], len(controllers))),
         coverage_maps(one, other),
-        _replay(source, on_target[: len(plans)], tell),
+        _replay(source, on_target[: len(plans)], len(controllers), tell),
         observe,
+        source.step_s,
     )
 
 
@@ -272,10 +275,13 @@ def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int) -> GapSid
     )
 
 
-def _replay(source: Target, observed: Sequence[ObservedTrial], tell: Tell | None) -> ReplayError | None:
-    """The target's commands replayed in simulation from where its robot was."""
+def _replay(
+    source: Target, observed: Sequence[ObservedTrial], n: int, tell: Tell | None
+) -> ReplayError | None:
+    """The target's commands replayed in simulation from where its robot was; its trials went round n controllers."""
     t = min((len(trial.commands) for trial in observed), default=0)
-    there = [trial for trial in observed if len(trial.poses) > t][:MOST_REPLAYED]
+    seen = [k for k, trial in enumerate(observed) if len(trial.poses) > t][:MOST_REPLAYED]
+    there = [observed[k] for k in seen]
     if not there or t == 0 or source.observes != "track":
         return None
     plans = [
@@ -293,6 +299,7 @@ def _replay(source: Target, observed: Sequence[ObservedTrial], tell: Tell | None
     return replay_error(
         np.array([trial.poses[: t + 1] for trial in there]),
         poses.reshape(REPLAYS, len(there), t + 1, 3),
+        np.array(seen) % n,
     )
 
 

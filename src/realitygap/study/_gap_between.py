@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from realitygap.errors import StudyError
 from realitygap.gap import Why
-from realitygap.records import OBSERVATIONS, Observe
+from realitygap.records import Observe
 from realitygap.trials import Attendant, RecordedTarget, Target
 from realitygap.world import Arena, Calibration, load_arena
 
 from ._controllers import recorded_controllers, sample_controllers
 from ._gap import STEPS, GapStudy, Tell, study_gap
-from ._targets import open_target
+from ._targets import open_target, refuse_more_than_is_seen
 from ._why import calibration_of, why_gap
 
 PAPERS_NOISE = 0.1
@@ -47,6 +48,7 @@ def gap_between(
     observe: Observe = "cells",
     arena: str | Path | Arena = "paper",
     noise: float | None = None,
+    randomize: Literal["no", "posterior"] = "no",
     reevolved: str | Path | None = None,
     why: bool = False,
     processes: int | None = None,
@@ -69,6 +71,7 @@ def gap_between(
         observe: How much is seen of the target.
         arena: By name, from a file, or an `Arena`.
         noise: The paper's a on simulators; 0.1 on `jyro` and none on others when not given.
+        randomize: Of a simulator that is a calibration: posterior draws the robot of each trial from it.
         reevolved: Results or a study that was evolved on the target.
         why: Whether to find what each part of the model carries; the simulator has to be a calibration then.
         processes: Of a twin.
@@ -109,10 +112,10 @@ def gap_between(
         chosen = sample_controllers(controllers, n_controllers, seed)
     there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
     with (
-        _open(sim, place, noise, 2 * seed) as source,
+        _open(sim, place, noise, 2 * seed, randomize=randomize) as source,
         _open(target, place, noise, 2 * seed + 1, processes, witness, attendant) as costly,
     ):
-        _refuse_more_than_is_seen(costly, observe)
+        refuse_more_than_is_seen(costly, observe)
         found = study_gap(
             source,
             costly,
@@ -132,7 +135,9 @@ def gap_between(
     if why and calibration is not None:
         tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")
         genomes = [each.genome for each in chosen]
-        parts = why_gap(calibration, place, genomes, found.target, seed=seed)
+        parts = why_gap(
+            calibration, place, genomes, found.target, steps=steps, step_s=found.step_s, seed=seed
+        )
     return GapBetween(found, parts)
 
 
@@ -151,16 +156,10 @@ def _open(
     processes: int | None = None,
     witness: str | None = None,
     attendant: Attendant | None = None,
+    randomize: Literal["no", "posterior"] = "no",
 ) -> Target:
     level = (PAPERS_NOISE if spec == "jyro" else 0.0) if noise is None else noise
     return open_target(
-        spec, arena, processes=processes, witness=witness, attendant=attendant, noise=level, key=key
-    )
-
-
-def _refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
-    if OBSERVATIONS.index(observe) > OBSERVATIONS.index(target.observes):
-        raise StudyError(
-            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
-            "or name a witness that sees more."
-        )
+        spec, arena, processes=processes, witness=witness, attendant=attendant, noise=level, key=key,
+        randomize=randomize,
+    )  # fmt: skip

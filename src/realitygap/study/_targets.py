@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import functools
+from typing import Literal
 
 from realitygap.errors import StudyError, did_you_mean
-from realitygap.records import ObservationsHead, Observe
+from realitygap.records import OBSERVATIONS, ObservationsHead, Observe
 from realitygap.robots import DEFAULT_ROBOT, JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.robots.scribbler import is_in_this_program
 from realitygap.trials import (
@@ -38,6 +39,7 @@ def open_target(
     on_lost: OnLost = "retry",
     noise: float = 0.0,
     key: int = 0,
+    randomize: Literal["no", "posterior"] = "no",
 ) -> Target:
     """Open what can carry out trials.
 
@@ -52,6 +54,8 @@ def open_target(
         on_lost: Of a robot: what follows a trial in which the link was lost.
         noise: Of a simulator: the paper's a, on top of the robot's own noise.
         key: Of a simulator: of its random numbers.
+        randomize: Of `sim:FILE`, where the file is a calibration: posterior draws the robot of each trial of a
+            controller from it.
 
     Raises:
         StudyError: There is no such platform, or it cannot be made of this.
@@ -60,10 +64,15 @@ def open_target(
         RobotError: The robot, its witness or the twin's process cannot be reached.
     """
     name, colon, rest = spec.partition(":")
+    if randomize != "no" and not (name == "sim" and rest):
+        raise StudyError(
+            f"--randomize {randomize} draws robots from a calibration, sim:FILE, and {spec!r} is none."
+        )
     if name == "jyro" and not colon:
         return SimTarget(JyroPlatform(), arena, noise, key=key, name=spec)
     if name == "sim" and bool(colon) == bool(rest):
-        return SimTarget(_sim(rest), arena, noise, key=key, name=spec)
+        drawn = "" if randomize == "no" else f", {randomize}"
+        return SimTarget(_sim(rest, randomize), arena, noise, key=key, name=spec + drawn)
     if name == "twin" and rest:
         return TwinTarget(rest, arena, processes, name=spec)
     if name == "recorded" and rest:
@@ -87,6 +96,19 @@ def steps_as_a_robot(target: Target) -> bool:
     return not (isinstance(target, SimTarget) and isinstance(target.platform, JyroPlatform))
 
 
+def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
+    """Return where so much can be seen of a target.
+
+    Raises:
+        StudyError: It cannot.
+    """
+    if OBSERVATIONS.index(observe) > OBSERVATIONS.index(target.observes):
+        raise StudyError(
+            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
+            "or name a witness that sees more."
+        )
+
+
 def _witness(port: str, address: str | None) -> Attendant:
     if is_in_this_program(port):
         return WitnessAttendant()
@@ -102,8 +124,14 @@ def _witness(port: str, address: str | None) -> Attendant:
     )
 
 
-def _sim(file: str) -> SimPlatform:
+def _sim(file: str, randomize: Literal["no", "posterior"]) -> SimPlatform:
     try:
-        return SimPlatform(**({"robot": file} if file else {}))
+        platform = SimPlatform(**({"robot": file} if file else {}), randomize=randomize)
     except ValueError as error:
         raise StudyError(f"sim:{file}: {str(error).removeprefix('SimPlatform.robot: ')}") from None
+    if randomize != "no" and not platform.draws:
+        raise StudyError(
+            f"--randomize {randomize} draws robots from a calibration, and {file} has no draws: it is a robot, or a "
+            "calibration of no trials."
+        )
+    return platform

@@ -15,11 +15,11 @@ from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
 from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target
-from realitygap.world import load_calibration
+from realitygap.world import load_calibration, load_robot
 
 from ._file import load_study
 from ._study import Study
-from ._targets import steps_as_a_robot
+from ._targets import refuse_more_than_is_seen, steps_as_a_robot
 from ._transfer_attempt import Attempt, Simulation, plans_of
 from ._transfer_calibrated import Calibrating, calibrated, posterior
 from ._transfer_direct import direct
@@ -127,13 +127,16 @@ def transfer(
         tell: Told what is going on, in words.
 
     Raises:
-        StudyError: No such study, condition or strategy, or a task whose worth nobody sees from outside.
-        DescriptionError: The calibration is none.
+        StudyError: No such study, condition or strategy, a task whose worth nobody sees from outside, or so much cannot
+            be seen of the target.
+        DescriptionError: The calibration is none, or of no robot that can be.
         RecordError: The folder belongs to another transfer.
         RobotError: The target failed; what was tried is safe.
         TypeError, ValueError: A number that is none, or out of its range.
     """
     budgets = _budgets(budget)
+    seen = _known_observation(observe)
+    refuse_more_than_is_seen(target, seen)
     plan = TransferPlan(
         study=study.about.name if isinstance(study, Study) else str(study),
         condition="",
@@ -145,7 +148,7 @@ def transfer(
         fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
         runs=max(whole_number("runs", runs, 1), *budgets),
         repeats=whole_number("repeats", repeats, 1),
-        observe=_known_observation(observe),
+        observe=seen,
         calibration="" if calibration is None else str(calibration),
         fit="" if calibration is None else _fit_of(calibration),
         seed=whole_number("seed", seed, 0, 2**63 - 1),
@@ -300,6 +303,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
 
 def _fit_of(calibration: str | Path) -> str:
     """SHA-256 of what the file of a calibration says, but when it was made."""
+    load_robot(calibration)  # refuses one that no robot can be
     said = load_calibration(calibration).model_dump(mode="json", exclude={"date"})
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 

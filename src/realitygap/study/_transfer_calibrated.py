@@ -14,6 +14,7 @@ from realitygap.runs import Condition
 from realitygap.trials import Target
 from realitygap.world import Calibration, load_calibration
 
+from ._calibrate import refuse_other_sensors
 from ._calibrate_all import calibrate_all
 from ._transfer_attempt import Attempt
 from ._transfer_noise import needs_sim
@@ -100,6 +101,7 @@ class Calibrating:
 
     def _on_budget(self, condition: Condition, n: int) -> Calibration:
         """A calibration by n trials, or the one that is there."""
+        refuse_other_sensors(condition.sim.robot, self.target)
         name = f"{n}-{self.observe}-{self.seed}"
         path = self.folder / f"{name}.toml"
         if path.exists():

@@ -9,7 +9,7 @@ from realitygap.evolution import Genome
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan
 
-from ._targets import observations_head
+from ._targets import observations_head, refuse_more_than_is_seen
 
 
 def try_on(
@@ -32,9 +32,11 @@ def try_on(
         out: A file for the trials, as they come; those that are in it are not driven again.
 
     Raises:
+        StudyError: So much cannot be seen of it.
         RecordError: The file is of another controller or target, or cannot be written.
         RobotError: The robot failed; what is in the file is safe.
     """
+    refuse_more_than_is_seen(target, observe)
     file = None if out is None else ObservationsFile(out, observations_head(target, observe))
     done = {} if file is None else {trial.number: trial for trial in file.trials}
     if any(trial.genome != genome.to_json() for trial in done.values()):

@@ -61,6 +61,7 @@ def why_gap(
     target: GapSide,
     *,
     steps: int = 100,
+    step_s: float | None = None,
     seed: int = 1,
     draws: int = DRAWS,
     trials: int = TRIALS,
@@ -76,6 +77,7 @@ def why_gap(
         genomes: The controllers; row k of the target is of genome k.
         target: Their trials on the target, at least 2 of each.
         steps: Commands in a trial.
+        step_s: How long each lasts [s]; as the calibration says, and where it does not, as the robot's file does.
         seed: Of the noise.
         draws: From the posterior beside the estimate, for intervals; fewer where the calibration has fewer.
         trials: Of each controller with each choice of parts, at least 2.
@@ -96,7 +98,8 @@ def why_gap(
             "does: realitygap calibrate all."
         )
     values = _choices(default, _rows(fitted, calibration, draws))
-    quality = _carry_out(SimPlatform(robot=robot), arena, genomes, steps, values, seed, trials)
+    pace = {"step_s": step_s} if step_s else calibration.step
+    quality = _carry_out(SimPlatform(robot=robot, **pace), arena, genomes, steps, values, seed, trials)
     m, c = len(quality), len(genomes)
     squares = square_differences(quality, np.broadcast_to(target.values, (m, *target.values.shape)))
     numbers = [sum(part_of(name) == part for name in fitted) for part in PARTS]

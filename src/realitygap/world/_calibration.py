@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
@@ -12,6 +13,7 @@ from realitygap.settings import Settings
 from ._toml import toml_table
 
 MOST_DRAWS = 10_000
+NEAR_END = 0.05  # of the prior's width: what is nearer to an end of it lies at that end
 
 _HEAD = """\
 # What was measured of a robot, with intervals of 90 %. `sim:FILE` simulates it with [numbers];
@@ -45,6 +47,13 @@ class Fitted(Settings):
                 )
         return self
 
+    @property
+    def is_at_end(self) -> bool:
+        """Whether it is told, and lies at or beyond an end of what was thought possible that is not 0."""
+        ways = [self.estimate - self.prior_low if self.prior_low else math.inf]
+        ways += [self.prior_high - self.estimate if self.prior_high else math.inf]
+        return self.identified and min(ways) < NEAR_END * (self.prior_high - self.prior_low)
+
 
 class Calibration(Settings):
     """What was fitted to a robot: parameters, the robot's numbers, and draws from the posterior."""
@@ -67,7 +76,9 @@ class Calibration(Settings):
         {}, description="The same numbers in each draw from the posterior; all of one length."
     )
     misspecified: bool = Field(False, description="Whether the simulator cannot make what was observed.")
-    misspecification_p: float = Field(1.0, description="Of the posterior predictive check.")
+    misspecification_p: float = Field(
+        1.0, description="Of the posterior predictive check; 1 where there is none (path, motion, contact)."
+    )
     notes: tuple[str, ...] = Field((), description="What else there is to say.")
     evidence: dict[str, Any] = Field({}, description="What figures are drawn from.")
 

@@ -121,3 +121,10 @@ def test_the_ruler_rounds_and_forgets_what_a_camera_saw():
 def test_no_straight_path_is_told():
     with pytest.raises(ValueError, match="There is no straight path"):
         fitted([measured(0, 300.0, TURNING)])
+
+
+def test_a_robot_that_stands_still_or_does_not_turn_is_told():
+    with pytest.raises(ValueError, match="stood still on all straight paths"):
+        fitted([measured(0.0, 0.0, STRAIGHT), measured(0.0, 0.0, TURNING)])
+    with pytest.raises(ValueError, match="did not turn in any trial"):
+        fitted([measured(13.75, 0.0, STRAIGHT), measured(0.0, 0.0, TURNING)])

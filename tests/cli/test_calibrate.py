@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from realitygap.calibration import path_plans
 from realitygap.cli import _calibrate, _calibrate_guide, app
 from realitygap.errors import RealityGapError
-from realitygap.records import read_observations
+from realitygap.records import read_observations, write_observations
+from realitygap.robots import SimPlatform
 from realitygap.study import parse_length
-from realitygap.world import load_calibration, load_robot
+from realitygap.study._targets import observations_head
+from realitygap.trials import SimTarget
+from realitygap.world import load_calibration, load_robot, paper_arena
 
 PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 
@@ -209,12 +214,50 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
         (("sensors", "--robot", "jyro", "--base", "jyro", "-o", "x.toml"), "expected ir or pulses"),
         (("sensors", "--from", "none.jsonl", "-o", "x.toml"), "There is no file none.jsonl"),
         (("sensors", "--robot", "sim", "--arena", "peper", "-o", "x.toml"), "Unknown arena"),
+        (("all", "--robot", "sim", "--choose", "--budget", "9", "-o", "x.toml"), "at least 10"),
     ],
 )
 def test_mistakes_are_one_message_and_lose_nothing(arguments, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert says in refused(*arguments)
     assert not Path("x.toml").exists()
+
+
+def test_what_is_no_calibration_is_not_overwritten(tmp_path):
+    twin = tmp_path / "worn.toml"
+    twin.write_text('format = "realitygap twin 1"\n')
+    assert "is no calibration: it stays as it is" in refused("path", "--robot", "sim", "-o", twin)
+    assert twin.read_text() == 'format = "realitygap twin 1"\n'
+
+
+def path_trials(file: Path, numbers: dict[str, float], way: float = 1.0) -> Path:
+    """Paths of a robot of sim with other numbers, that go so much of the way."""
+    with SimTarget(SimPlatform(set=numbers), paper_arena()) as target:
+        trials = target.carry_out(path_plans(target.arena, 4), "track")
+        head = observations_head(target, "track")
+    moved = [
+        replace(trial, poses=trial.poses[0] + (trial.poses - trial.poses[0]) * [way, way, 1.0])
+        for trial in trials
+    ]
+    write_observations(file, head, moved)
+    return file
+
+
+def test_a_robot_that_goes_back_makes_no_robot_and_one_beyond_what_was_thought_possible_is_flagged(tmp_path):
+    back = path_trials(tmp_path / "back.jsonl", {}, way=-0.5)
+    told = refused("path", "--from", back, "-o", tmp_path / "back.toml")
+    assert "makes no robot: " in told
+    assert "drive.gain_left: expected more than 0" in told
+    assert not (tmp_path / "back.toml").exists()
+    wide = path_trials(tmp_path / "wide.jsonl", {"drive.track": 0.25})
+    out = run("path", "--from", wide, "-o", tmp_path / "wide.toml")
+    assert "The simulator cannot make what was observed: what was fitted" in out
+    made = load_calibration(tmp_path / "wide.toml")
+    assert made.misspecified
+    assert any("drive.track is 0.25 (0.107 to 0.199)" in note for note in made.notes)
+    usual = path_trials(tmp_path / "usual.jsonl", {"drive.track": 0.16})
+    run("path", "--from", usual, "-o", tmp_path / "usual.toml")
+    assert not load_calibration(tmp_path / "usual.toml").misspecified
 
 
 def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):

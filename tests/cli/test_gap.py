@@ -43,6 +43,8 @@ def test_json_has_every_measure_with_estimate_low_high_and_n(printed):
     for name in MEASURES:
         assert {"estimate", "low", "high", "n"} <= set(found[name]), name
     assert found["misspecified"] is None
+    assert found["replay"]["n"] == 6
+    assert len(found["replay"]["distance"]["low"]) == 101
     assert "SIM jyro" in found["verdict"]
 
 
@@ -79,6 +81,8 @@ def test_the_table_ends_with_the_verdict(command):
         (("gap", "sim", "jyro", "--why"), ("realitygap calibrate all --robot jyro",)),
         (("gap", "sim", "jyro", "--margin", "-1"), ("--margin is -1", "above 0")),
         (("gap", "sim", "jyro", "--report", "gap.pdf"), (".html",)),
+        (("gap", "sim", "jyro", "--report", "none/gap.html"), ("There is no folder none",)),
+        (("gap", "sim", "jyro", "--randomize", "posterior"), ("draws robots from a calibration",)),
         (("gap", "sim", "jyro", "--controllers", "nobody"), ("Unknown study 'nobody'",)),
         (("gap", "sim:nowhere.toml", "jyro"), ("nowhere.toml",)),
         (("gap", "sim", "jyro", "--arena", "nowhere"), ("nowhere",)),

@@ -71,6 +71,34 @@ def test_mistakes_are_said_in_words(folder, tmp_path):
         run("transfer", "sim-paper", "--to", "sim", "--strategy", "select", *SMALL, "-o", folder)
 
 
+def test_what_cannot_be_is_refused_before_a_trial_is_spent(folder, tmp_path):
+    champion, out = folder / "champions" / "select-3-0.json", tmp_path / "travels"
+    run("gap", "sim", "sim", "--n-controllers", "2", "--trials", "2", "-o", tmp_path / "gap.jsonl")
+    recorded = f"recorded:{tmp_path / 'gap.jsonl'}"
+    calibrated = ("transfer", "sim-paper", "--strategy", "calibrated", *SMALL, "-o", out)
+    with pytest.raises(StudyError, match="no more can be seen than 'cells'"):
+        run("try", champion, "--on", recorded, "--observe", "track")
+    with pytest.raises(StudyError, match="no more can be seen than 'cells'"):
+        run(*calibrated, "--to", recorded, "--observe", "track")
+    assert not out.exists()
+    backward = tmp_path / "backward.toml"
+    backward.write_text(
+        'format = "realitygap calibration 1"\nkind = "path"\nrobot = "scribbler-s2-fluke2"\ntarget = "sim"\n'
+        'label = "SIM"\nobserve = "cells"\ntrials = 2\ndate = "2026-01-01"\nmethod = "by hand"\n'
+        "[numbers]\n'drive.gain_left' = -0.5\n"
+    )
+    with pytest.raises(RealityGapError, match=r"drive\.gain_left: expected more than 0"):
+        run(*calibrated, "--to", "sim", "--calibration", backward)
+    assert not out.exists()
+    with pytest.raises(StudyError, match="sim:e-puck has 8 range sensors and robot"):
+        run(*calibrated, "--to", "sim:e-puck")
+    assert not list((out / "calibrations").glob("*.jsonl"))
+    for wrong in (("--budget", "5000"), ("--fresh-trials", "5001")):
+        result = run(*calibrated, "--to", "sim", *wrong)
+        assert result.exit_code == 2
+        assert "less than or equal to" in result.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

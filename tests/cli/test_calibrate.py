@@ -254,7 +254,7 @@ def test_a_robot_that_goes_back_makes_no_robot_and_one_beyond_what_was_thought_p
     assert "The simulator cannot make what was observed: what was fitted" in out
     made = load_calibration(tmp_path / "wide.toml")
     assert made.misspecified
-    assert any("drive.track is 0.25 (0.107 to 0.199)" in note for note in made.notes)
+    assert any("drive.track is 0.2" in note and "(0.107 to 0.199)" in note for note in made.notes)
     usual = path_trials(tmp_path / "usual.jsonl", {"drive.track": 0.16})
     run("path", "--from", usual, "-o", tmp_path / "usual.toml")
     assert not load_calibration(tmp_path / "usual.toml").misspecified

@@ -239,7 +239,7 @@ def _print_why(why: Why) -> None:
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
         ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
-        typer.echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} numbers")
+        typer.echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
     typer.echo(why.advice)
 
 

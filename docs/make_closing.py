@@ -113,13 +113,13 @@ def directions(summary: dict[str, Any]) -> str:
   worse from one with less *or more*. Not told here: noise is among what is fitted, and no condition has less or more of
   it than the fit. `realitygap transfer --strategy noise --strategy posterior` asks it of one target.
 * Miglino, Nafasi & Taylor (1995), on a robot that is to wander over an arena: the correlation of simulated and real
-  performance rises with noise in the simulation. Here SRCC, whose median over twins is {order[0]:.2f} with the simulator
-  as it is, is {order[1]:.2f} calibrated by {summary["budget"]} trials (`track`), and rises on {rises} of {len(pairs)}
+  performance rises with noise in the simulation. Here SRCC, whose median over twins is {order[0]:.2f} with the
+  simulator as it is, is {order[1]:.2f} calibrated by {summary["budget"]} trials (`track`), and rises on {rises} of {len(pairs)}
   twins; noise is among what was fitted, and not told apart. Miglino, Lund & Nolfi (1995) bring the two closer by
   sampling the robot's own sensors and motors, which is what calibrating does.
 * Koos, Mouret & Doncieux (2013): few trials on the target, spent on learning where the simulation is wrong, find
-  controllers that transfer. Here the same few trials change the simulation itself, or choose among champions, or are all
-  that evolution has. In coverage on the twin over `plain`: {gains}. Their own strategy,
+  controllers that transfer. Here the same few trials change the simulation itself, or choose among champions, or are
+  all that evolution has. In coverage on the twin over `plain`: {gains}. Their own strategy,
   [`transferability`](../how-to/transfer.md), is not among those of this study.
 * Ligot & Birattari (2019): pseudo-reality, another simulator in place of the robot, reproduces which design methods
   drop in reality. It is what makes this study a test at all, and its limit: an order of methods may carry over to a

@@ -114,9 +114,9 @@ def directions(summary: dict[str, Any]) -> str:
   it than the fit. `realitygap transfer --strategy noise --strategy posterior` asks it of one target.
 * Miglino, Nafasi & Taylor (1995), on a robot that is to wander over an arena: the correlation of simulated and real
   performance rises with noise in the simulation. Here SRCC, whose median over twins is {order[0]:.2f} with the
-  simulator as it is, is {order[1]:.2f} calibrated by {summary["budget"]} trials (`track`), and rises on {rises} of {len(pairs)}
-  twins; noise is among what was fitted, and not told apart. Miglino, Lund & Nolfi (1995) bring the two closer by
-  sampling the robot's own sensors and motors, which is what calibrating does.
+  simulator as it is, is {order[1]:.2f} calibrated by {summary["budget"]} trials (`track`), and rises on {rises} of
+  {len(pairs)} twins; noise is among what was fitted, and not told apart. Miglino, Lund & Nolfi (1995) bring the two
+  closer by sampling the robot's own sensors and motors, which is what calibrating does.
 * Koos, Mouret & Doncieux (2013): few trials on the target, spent on learning where the simulation is wrong, find
   controllers that transfer. Here the same few trials change the simulation itself, or choose among champions, or are
   all that evolution has. In coverage on the twin over `plain`: {gains}. Their own strategy,

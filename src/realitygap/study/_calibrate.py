@@ -25,7 +25,7 @@ from realitygap.robots import DEFAULT_ROBOT
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
 
-from ._calibrate_kinds import ALL_TRIALS, KINDS, LEAST_TO_CHOOSE, Kind, Parts
+from ._calibrate_kinds import ALL_TRIALS, KINDS, LEAST_TO_CHOOSE, SOFTWARE, Kind, Parts
 from ._targets import observations_head
 from ._wrapped_targets import (
     PATH,
@@ -110,7 +110,7 @@ def _calibrated(
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
-    return _calibration(kind, parts, robot, target.name, target.label, observe, trials)
+    return _calibration(kind, parts, robot, target.name, target.label, observe, trials, target.arena, seed)
 
 
 def _chosen(
@@ -136,7 +136,7 @@ def _chosen(
         made.misspecification_p,
         made.evidence,
     )
-    made_of = _calibration("all", parts, robot, target.name, target.label, observe, ())
+    made_of = _calibration("all", parts, robot, target.name, target.label, observe, (), target.arena, seed)
     return made_of.model_copy(update={"trials": made.trials, "step_s": made.step_s})
 
 
@@ -198,8 +198,10 @@ def calibrate_from(
         raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
     trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
     parts = _fit(kind, trials, robot, arena, seen, seed)
-    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials)
-    return made.model_copy(update={"notes": (*made.notes, found.problem)}) if found.problem else made
+    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials, arena, seed)
+    last = datetime.datetime.fromtimestamp(data.stat().st_mtime, datetime.UTC)
+    more = {"measured": last.isoformat(timespec="seconds")}
+    return made.model_copy(update=more | ({"notes": (*made.notes, found.problem)} if found.problem else {}))
 
 
 def save_calibration(path: Path, calibration: Calibration) -> None:
@@ -264,6 +266,8 @@ def _calibration(
     label: str,
     observe: Observe,
     trials: Sequence[ObservedTrial],
+    arena: Arena,
+    seed: int,
 ) -> Calibration:
     """The parts of a fit laid over an earlier calibration, where it builds on one."""
     below = read_calibration(robot)
@@ -289,6 +293,9 @@ def _calibration(
         trials=len(trials),
         step_s=step_s,
         date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        arena=arena.name,
+        seed=seed,
+        software=SOFTWARE,
         method=parts.method,
         fitted=tuple(fitted),
         numbers=numbers,

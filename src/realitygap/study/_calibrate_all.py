@@ -39,7 +39,7 @@ from realitygap.robots import SimPlatform
 from realitygap.trials import SimEnsemble, Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
-from ._calibrate_kinds import LEAST_TO_CHOOSE, Parts
+from ._calibrate_kinds import LEAST_TO_CHOOSE, SOFTWARE, Parts
 
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
@@ -116,6 +116,9 @@ def calibrate_all(
         observe=observe,
         trials=len(trials),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
+        arena=target.arena.name,
+        seed=seed,
+        software=SOFTWARE,
         method=parts.method,
         fitted=parts.fitted,
         numbers=dict(parts.numbers),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._version import __version__
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
     MOTION,
@@ -288,6 +289,8 @@ def _fit_all(
 
 ALL_TRIALS = 20
 """Of a calibration of everything, when nothing is said."""
+
+SOFTWARE = f"realitygap {__version__}"
 
 LEAST_TO_CHOOSE = 10
 """Trials of a calibration of everything, from which on the last ones are chosen."""

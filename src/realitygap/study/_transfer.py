@@ -302,9 +302,11 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
 
 
 def _fit_of(calibration: str | Path) -> str:
-    """SHA-256 of what the file of a calibration says, but when it was made."""
+    """SHA-256 of what the file of a calibration says, but when, where and by what it was made."""
     load_robot(calibration)  # refuses one that no robot can be
-    said = load_calibration(calibration).model_dump(mode="json", exclude={"date"})
+    said = load_calibration(calibration).model_dump(
+        mode="json", exclude={"date", "measured", "arena", "seed", "software"}
+    )
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 

@@ -68,7 +68,13 @@ class Calibration(Settings):
     step_s: float = Field(
         0.0, ge=0, le=60, description="How long its commands lasted [s]; 0: as the robot's file has it."
     )
-    date: str = Field(description="When it was measured, ISO 8601.")
+    date: str = Field(description="When it was fitted, ISO 8601.")
+    measured: str = Field(
+        "", description="When the last of its trials was kept, ISO 8601, where they came from a file."
+    )
+    arena: str = Field("", description="Where it was measured, by name.")
+    seed: int = Field(0, description="Of trials and draws.")
+    software: str = Field("", description="What fitted it, with its version.")
     method: str = Field(description="How it was fitted, with the source of the method.")
     fitted: tuple[Fitted, ...] = Field((), description="The parameters.")
     numbers: dict[str, float] = Field({}, description="Numbers of the robot by dotted name: the estimate.")

@@ -2,7 +2,7 @@
 
 `python benchmarks/calibration.py sim --n 12 --observe track cells` draws robots from the prior, carries out 20 trials
 of each in `sim`, and says which of the 90 % intervals hold the truth (simulation-based calibration) and how far
-identified parameters are off.
+identified parameters are off: how many are near the truth, and how many the posteriors themselves have near it.
 
 `python benchmarks/calibration.py motion` (`contact`, `sensors`) does the same for what that calibration fits, with
 poses; other numbers are those of the robot's file.
@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -47,7 +48,7 @@ from realitygap.robots import SimPlatform
 from realitygap.robots.twin import sample_twin
 from realitygap.study import calibrate, calibrate_all, gap_between
 from realitygap.trials import SimEnsemble, SimTarget, TrialPlan, TwinTarget
-from realitygap.world import Calibration, Distribution, paper_arena
+from realitygap.world import Calibration, Distribution, Fitted, paper_arena
 
 ARENA = paper_arena()
 PLATFORM = SimPlatform()
@@ -57,6 +58,7 @@ N_HELD_OUT, N_TRIALS = 40, 6  # of these, and of each of them
 N_SAME, N_TRIALS_SAME = 30, 10  # likewise of gaps that are none
 N_ROBOTS = 120  # of the posterior that predict
 FIRST = 10_000  # number of the first held-out trial: none of the calibration's
+QUANTILE = 1.6449  # of a normal, at 95 %
 NEAR, NEAR_PRIOR = 0.05, 0.1  # how far an identified parameter may be off, of itself or of its prior's width
 
 
@@ -112,7 +114,7 @@ def _one_kind(kind: str, prior: list[Parameter], seed: int, observe: str) -> dic
 def _judged(prior: Sequence[Parameter], values: Mapping[str, Floats], found: Calibration) -> dict[str, Any]:
     """Whether the interval of each parameter holds it, and whether what is identified is near it."""
     fitted = {fit.name: fit for fit in found.fitted}
-    held, near = {}, {}
+    held, near, expected = {}, {}, {}
     for parameter in prior:
         if (fit := fitted.get(parameter.name)) is None:
             continue
@@ -121,7 +123,19 @@ def _judged(prior: Sequence[Parameter], values: Mapping[str, Floats], found: Cal
         off = abs(float(parameter.scale(fit.estimate)) - float(parameter.scale(truth))) / parameter.width
         if fit.identified:
             near[parameter.name] = bool(off <= NEAR_PRIOR or abs(fit.estimate - truth) <= NEAR * abs(truth))
-    return {"held": held, "near": near}
+            expected[parameter.name] = _expected_near(parameter, fit)
+    return {"held": held, "near": near, "expected": expected}
+
+
+def _expected_near(parameter: Parameter, fit: Fitted) -> float:
+    """How likely the posterior has it that the truth is near the estimate: half a normal to either side of it."""
+    low, middle, high = (float(parameter.scale(value)) for value in (fit.low, fit.estimate, fit.high))
+    sides = []
+    for end, factor in ((low, 1 - NEAR), (high, 1 + NEAR)):
+        reach = max(NEAR_PRIOR * parameter.width, abs(float(parameter.scale(factor * fit.estimate)) - middle))
+        spread = abs(end - middle) / QUANTILE
+        sides.append(math.erf(reach / spread / math.sqrt(2)) if spread else 1.0)
+    return sum(sides) / 2
 
 
 def flags(family: str, seed: int, observe: str) -> dict[str, Any]:

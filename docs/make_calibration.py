@@ -40,17 +40,23 @@ def share(held: Sequence[bool]) -> str:
     return f"{100 * np.mean(held):.1f} % ({sum(held)} of {len(held)})"
 
 
+def by_draws(rows: Sequence[Row]) -> str:
+    """How many of the identified parameters the posteriors themselves have near the truth, in percent."""
+    expected = [chance for row in rows for chance in row.get("expected", {}).values()]
+    return f"{100 * np.mean(expected):.1f} %" if expected else "–"
+
+
 def intervals(rows: Sequence[Row]) -> str:
     """How many intervals hold the truth, and how many estimates are near it."""
     lines = [
-        "| observed | robots | 90 % intervals that hold the truth | identified parameters near it |",
-        "|---|---|---|---|",
+        "| observed | robots | 90 % intervals that hold the truth | identified parameters near it | by the draws |",
+        "|---|---|---|---|---|",
     ]
     for observe in ("track", "cells"):
         some = [row for row in rows if row["what"] == "sim" and row["observe"] == observe]
         held = [inside for row in some for inside in row["held"].values()]
         near = [close for row in some for close in row["near"].values()]
-        lines.append(f"| `{observe}` | {len(some)} | {share(held)} | {share(near)} |")
+        lines.append(f"| `{observe}` | {len(some)} | {share(held)} | {share(near)} | {by_draws(some)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -120,7 +120,7 @@ def directions(summary: dict[str, Any]) -> str:
 * Koos, Mouret & Doncieux (2013): few trials on the target, spent on learning where the simulation is wrong, find
   controllers that transfer. Here the same few trials change the simulation itself, or choose among champions, or are
   all that evolution has. In coverage on the twin over `plain`: {gains}. Their own strategy,
-  [`transferability`](../how-to/transfer.md), is not among those of this study.
+  `transferability`, is not among those of this study.
 * Ligot & Birattari (2019): pseudo-reality, another simulator in place of the robot, reproduces which design methods
   drop in reality. It is what makes this study a test at all, and its limit: an order of methods may carry over to a
   robot; an amount may not.

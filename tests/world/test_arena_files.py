@@ -297,7 +297,7 @@ def test_arenas_by_name_begin_where_their_files_say_unless_a_study_does():
     [
         ({"preset": "papr"}, "ArenaSettings.preset: expected avoid, goal, "),
         ({"preset": "goal", "start": "left"}, "ArenaSettings.start: goes with the paper's arena, expected"),
-        ({"file": "none.toml"}, "ArenaSettings.file: There is no arena file none.toml, came"),
+        ({"file": "none.toml"}, "ArenaSettings.file: There is no arena file none.toml."),
         ({"preset": "goal", "file": "none.toml"}, "no arena file"),
         ({"start": [5.0, 0.1, 0.0]}, "start lies outside the arena: expected 0 < x < 1.0668"),
         ({"start": [0.5, 0.3, 90.0]}, "heading is in radians"),

@@ -303,10 +303,10 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
 
 def _fit_of(calibration: str | Path) -> str:
     """SHA-256 of what the file of a calibration says, but when, where and by what it was made."""
-    load_robot(calibration)  # refuses one that no robot can be
     said = load_calibration(calibration).model_dump(
         mode="json", exclude={"date", "measured", "arena", "seed", "software"}
     )
+    load_robot(calibration)  # refuses one that no robot can be
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 

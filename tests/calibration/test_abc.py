@@ -100,6 +100,8 @@ def test_a_simulator_that_cannot_make_what_was_observed_is_told():
     assert fits.p > 0.01
     assert fails.is_too_large
     assert fails.p == 0.0
+    (still,) = misfits([evidence_with(np.zeros(60, np.float32))], simulate, numbers, key=1)
+    assert still.share == 0.0  # nothing varied, so there is no variance to predict
 
 
 def test_the_next_trial_is_the_one_that_tells_of_the_goal():

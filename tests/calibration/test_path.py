@@ -99,6 +99,19 @@ def test_one_path_alone_identifies_nothing():
     assert "three times more" in own["drive.gain"].advice
 
 
+def test_draws_of_few_repeats_are_of_robots_that_can_be():
+    """Two repeats have a Cauchy distribution: without care some 15 of 500 draws go back where they should go ahead."""
+    trials = [measured(13.75, 0.0, STRAIGHT), measured(9.0, 0.0, STRAIGHT)] + [
+        measured(0, 300.0, TURNING)
+    ] * 2
+    fit, own = fitted(trials)
+    for name in ("drive.gain_left", "drive.gain_right", "drive.track"):
+        assert len(fit.draws[name]) == 500
+        assert fit.draws[name].min() > 0
+        assert fit.numbers[name] > 0
+    assert own["path.step_length"].low > 0
+
+
 def test_encoders_tell_gains_and_not_the_track():
     trials = recorded({"drive.gain_left": 0.95, "drive.gain_right": 0.95}, 3, observe="encoders")
     fit, own = fitted(trials)

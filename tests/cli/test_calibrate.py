@@ -14,7 +14,7 @@ from realitygap.cli import _calibrate, _calibrate_guide, app
 from realitygap.errors import RealityGapError
 from realitygap.records import read_observations, write_observations
 from realitygap.robots import SimPlatform
-from realitygap.study import parse_length
+from realitygap.study import parse_length, save_calibration
 from realitygap.study._targets import observations_head
 from realitygap.trials import SimTarget
 from realitygap.world import load_calibration, load_robot, paper_arena
@@ -251,13 +251,26 @@ def test_a_robot_that_goes_back_makes_no_robot_and_one_beyond_what_was_thought_p
     assert not (tmp_path / "back.toml").exists()
     wide = path_trials(tmp_path / "wide.jsonl", {"drive.track": 0.25})
     out = run("path", "--from", wide, "-o", tmp_path / "wide.toml")
-    assert "The simulator cannot make what was observed: what was fitted" in out
+    assert "At or beyond the end of what was thought possible" in out
     made = load_calibration(tmp_path / "wide.toml")
-    assert made.misspecified
     assert any("drive.track is 0.2" in note and "(0.107 to 0.199)" in note for note in made.notes)
+    assert not made.misspecified  # `sim` makes it, with this track
     usual = path_trials(tmp_path / "usual.jsonl", {"drive.track": 0.16})
-    run("path", "--from", usual, "-o", tmp_path / "usual.toml")
-    assert not load_calibration(tmp_path / "usual.toml").misspecified
+    assert "thought possible" not in run("path", "--from", usual, "-o", tmp_path / "usual.toml")
+
+
+def test_what_was_flagged_stays_so_in_what_builds_on_it(sensors, tmp_path):
+    file = tmp_path / "path.toml"
+    run("path", "--from", path_trials(tmp_path / "path.jsonl", {"drive.track": 0.16}), "-o", file)
+    flagged = load_calibration(file).model_copy(
+        update={"misspecified": True, "misspecification_p": 0.01, "notes": ("What was said.",)}
+    )
+    save_calibration(file, flagged)
+    data = sensors / "fit.trials.jsonl"
+    run("sensors", "--from", data, "--base", file, "-o", tmp_path / "both.toml")
+    made = load_calibration(tmp_path / "both.toml")
+    assert (made.misspecified, made.misspecification_p) == (True, 0.01)
+    assert "What was said." in made.notes
 
 
 def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):

@@ -18,6 +18,7 @@ def test_parts_carry_what_they_take_and_add_up():
     assert [each.estimate for each in found.falls] == pytest.approx([0.2, 0.05])
     assert found.before.estimate == pytest.approx(0.3)
     assert found.after.estimate == pytest.approx(0.05)
+    assert found.change.estimate == pytest.approx(-0.25)
     assert found.order == [0, 1]
     assert found.advice.startswith("Change this next: motor, which carries most, 0.200 [0.200, 0.200]")
     assert "lies outside these numbers" in found.advice
@@ -36,18 +37,25 @@ def test_draws_from_the_posterior_widen_the_intervals():
 def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_advised():
     unsure = Estimate(0.02, -0.01, 0.05, 9)
     whole, none = Estimate(0.1, 0.05, 0.2, 9), Estimate(0.0, 0.0, 0.01, 9)
-    advice = Why(("motor",), (unsure,), (1,), whole, none).advice
+    less = Estimate(-0.1, -0.2, -0.05, 9)
+    advice = Why(("motor",), (unsure,), (1,), whole, none, less).advice
     assert "not shown to be more than chance, some 21 controllers would" in advice  # 9 * (0.03 / 0.02)^2
     hardly = Estimate(0.001, -0.04, 0.05, 9)
-    assert "more than 1,024 controllers" in Why(("motor",), (hardly,), (1,), whole, none).advice
+    assert "more than 1,024 controllers" in Why(("motor",), (hardly,), (1,), whole, none, less).advice
+    nearly = Estimate(0.02, 0.0, 0.05, 9)
+    assert "some 10 controllers would" in Why(("motor",), (nearly,), (1,), whole, none, less).advice
     harm = Estimate(-0.02, -0.03, -0.01, 9)
-    advice = Why(("motor",), (harm,), (1,), whole, whole).advice
+    advice = Why(("motor",), (harm,), (1,), whole, whole, Estimate(0.0, -0.02, 0.02, 9)).advice
     assert advice.startswith("Change this next: nothing that was fitted")
     one = Estimate(0.02, 0.01, 0.05, 9)
-    worse = Why(("motor",), (one,), (1,), Estimate(0.01, 0.0, 0.02, 9), Estimate(0.06, 0.03, 0.1, 9))
+    before, after = Estimate(0.01, 0.0, 0.02, 9), Estimate(0.06, 0.03, 0.1, 9)
+    worse = Why(("motor",), (one,), (1,), before, after, Estimate(0.05, 0.01, 0.09, 9))
     assert worse.advice.startswith(
         "Change this next: what was fitted. All of it together makes the gap larger"
     )
+    perhaps = Why(("motor",), (one,), (1,), before, after, Estimate(0.05, -0.01, 0.09, 9))
+    assert perhaps.advice.startswith("Change this next: motor, ")
+    assert perhaps.advice.endswith("All of the fit together is not shown to make it smaller.")
 
 
 def test_few_controllers_carry_no_advice_and_it_says_how_many_would():

@@ -6,12 +6,13 @@ import pytest
 
 from realitygap.errors import DescriptionError, RecordError, StudyError
 from realitygap.robots import JyroPlatform, SimPlatform
-from realitygap.study import STRATEGIES, transfer
+from realitygap.study import STRATEGIES, choose_condition, transfer
+from realitygap.study._transfer_calibrated import Calibrating, fitted_condition
 from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
 from realitygap.study._transfer_simulated import evolve_champions
 from realitygap.study._transferability import distances, nsga2_order
 from realitygap.trials import SimTarget
-from realitygap.world import Calibration, paper_arena
+from realitygap.world import Calibration, load_calibration, load_robot, paper_arena
 
 # Far from `sim` as it is: wheels that are slow and hear late, and eyes that see less far.
 OTHER = {"drive.gain_left": 0.8, "drive.gain_right": 0.9, "drive.delay": 0.25, "drive.lag": 0.2}
@@ -150,6 +151,34 @@ def test_what_evolves_has_commands_as_long_as_a_robots(target, step_s, tmp_path)
     assert (evolved["step_s"] or evolved["robot"]["step_s"]) == step_s
 
 
+def test_what_one_strategy_cannot_do_is_refused_before_another_spends(calibration, tmp_path):
+    target = CountingTarget()
+    target.n_sensors = 1
+    with pytest.raises(StudyError, match="other has 1 range sensors and robot"):
+        transfer("sim-paper", target, "all", 3, out=tmp_path, **SMALL)
+    with pytest.raises(StudyError, match="took 6 trials, more than a budget of 5"):
+        transfer("sim-paper", target, "all", [8, 5], out=tmp_path, calibration=calibration, **SMALL)
+    with pytest.raises(StudyError, match="platform 'jyro', which has none"):
+        transfer("paper", target, "all", 3, out=tmp_path, **SMALL)
+    assert target.n == 0
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_fit_on_the_budget_builds_on_the_robot_of_the_study(calibration, tmp_path):
+    """One that a file describes was looked for by its name, when half of the budget had been spent."""
+    robot = load_robot("scribbler-s2-fluke2")
+    own = robot.with_numbers({"drive.speed": 0.2}).model_copy(update={"name": "mine"})
+    condition = choose_condition("sim-paper", None, 1).model_copy(update={"sim": SimPlatform(robot=own)})
+    made = load_calibration(calibration).model_copy(update={"robot": "mine"})
+    (tmp_path / "3-cells-0.toml").write_text(made.to_toml())
+    calibrating = Calibrating(CountingTarget(), tmp_path, 0, 0, "cells", None, print)
+    found, base = calibrating(condition, 6)
+    fitted = fitted_condition(condition, found, "posterior", base)
+    assert fitted.sim.robot.drive.speed == 0.2
+    assert fitted.sim.robot.drive.gain_left == OTHER["drive.gain_left"]
+    assert fitted.sim.draws["drive.delay"] == (0.25, 0.25)
+
+
 def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):
     with pytest.raises(StudyError, match="took 6 trials, more than a budget of 5"):
         transfer(
@@ -181,8 +210,6 @@ def test_what_evolved_in_the_true_simulator_does_better_than_plain(calibration, 
 
 
 def test_champions_come_the_best_first_and_do_not_depend_on_the_other_runs():
-    from realitygap.study import choose_condition
-
     condition = choose_condition("sim-paper", None, 3)
     both = evolve_champions(condition, range(0, 4), repeats=2)
     assert [each.simulated for each in both] == sorted((each.simulated for each in both), reverse=True)

@@ -74,6 +74,16 @@ def test_a_calibration_finds_the_robot_file_that_lies_beside_it(tmp_path):
     assert (robot.drive.speed, robot.drive.track) == (0.2, 0.15)
 
 
+@pytest.mark.parametrize("read", [load_calibration, read_calibration])
+def test_the_robot_file_is_found_from_elsewhere_too(read, tmp_path):
+    """`gap --why` and `transfer` looked for it from where they ran, when trials had been spent."""
+    (tmp_path / "mine.toml").write_text('base = "scribbler-s2"\n[drive]\nspeed = 0.2\n')
+    (tmp_path / "fits").mkdir()
+    calibration = read(written(tmp_path / "fits", made(robot="../mine.toml")))
+    assert load_robot(calibration.robot).drive.speed == 0.2
+    assert SimPlatform(robot=calibration).robot.drive.speed == 0.2
+
+
 def test_what_is_no_calibration_is_told_from_one(tmp_path):
     plain = tmp_path / "mine.toml"
     plain.write_text('base = "scribbler-s2"\n')

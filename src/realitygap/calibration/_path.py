@@ -139,6 +139,9 @@ def fit_path(
         track = robot.drive.track * (gain / base) * simulate(turning.trials[0]).turned / turn
     uneven = robot.drive.gain_right - robot.drive.gain_left
     uneven = uneven + (veer - expected.turned) * track * base / expected.way
+    kept = _of_a_robot(gain - uneven / 2, gain + uneven / 2, track)
+    way, gain, uneven, track = way[kept], gain[kept], uneven[kept], track[kept]
+    turn = None if turn is None else turn[kept]
     numbers = {"drive.gain_left": gain - uneven / 2, "drive.gain_right": gain + uneven / 2}
     rows = _rows(straight, way, expected.way, gain, uneven)
     notes = [_in_jyro_steps(rows[1])]
@@ -212,6 +215,16 @@ def _mean(values: Sequence[float], step: float, n_draws: int, rng: np.random.Gen
     spread = rng.standard_t(max(n - 1, 1), size=n_draws) * np.sqrt(variance / n)
     mean: Array = np.mean(values) + np.concatenate([[0.0], spread])
     return mean
+
+
+def _of_a_robot(*numbers: Array) -> NDArray[np.intp]:
+    """(1 + n,) rows of numbers (1 + n,): the first, and the draws that are above 0, as those of a robot are.
+
+    The others, of which few repeats have some, are left to these.
+    """
+    whole = 1 + np.flatnonzero(np.all(np.stack(numbers)[:, 1:] > 0, axis=0))
+    n = len(numbers[0]) - 1
+    return np.concatenate([[0], np.resize(whole, n) if len(whole) else 1 + np.arange(n)])
 
 
 def _rows(straight: _Measured, way: Array, expected: float, gain: Array, uneven: Array) -> list[Fitted]:

@@ -94,7 +94,9 @@ def misfits(
     found = []
     for kind, (off_sum, expected_sum, total, *own_sums) in sums.items():
         if kind in TOLERATED:
-            share = (off_sum - expected_sum) / total
+            share = (
+                (off_sum - expected_sum) / total if total else 0.0
+            )  # what never varied has none to predict
             p = float(np.mean(np.array(own_sums) >= off_sum))
             found.append(Misfit(kind, float(share), TOLERATED[kind], p))
     return found

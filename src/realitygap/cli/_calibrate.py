@@ -141,10 +141,8 @@ def _checked(
         raise StudyError(
             f"{out} does not end in .toml. Expected the name of a calibration, such as fit.toml."
         )
-    if out.exists() and not _is_calibration(out):
-        raise StudyError(
-            f"{out} is there already, and is no calibration: it stays as it is. Name another file."
-        )
+    if out.exists():
+        _refuse_other_files(out)
     for path in (out, figure):
         if path is not None and not path.resolve().parent.is_dir():
             raise StudyError(
@@ -159,13 +157,23 @@ def _checked(
     return out
 
 
-def _is_calibration(path: Path) -> bool:
+def _refuse_other_files(out: Path) -> None:
+    """Return where a file may be written over: it is a calibration.
+
+    Raises:
+        StudyError: It is something else, or a calibration that somebody changed and that cannot be read.
+    """
     from realitygap.world import read_calibration
 
+    stays = "it stays as it is. Name another file."
     try:
-        return read_calibration(path) is not None
-    except DescriptionError:
-        return False
+        made = read_calibration(out)
+    except DescriptionError as error:
+        raise StudyError(
+            f"{out} is there already and cannot be read as a calibration: {stays} {error}"
+        ) from None
+    if made is None:
+        raise StudyError(f"{out} is there already, and is no calibration: {stays}")
 
 
 def _seen(observe: str | None) -> Any:

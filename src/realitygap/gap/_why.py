@@ -28,6 +28,7 @@ class Why:
         numbers: How many numbers of each part the fit changes; a part without any carries nothing.
         before: RMS gap with the defaults.
         after: With the whole fit.
+        change: By how much the whole fit makes it larger.
     """
 
     parts: tuple[str, ...]
@@ -35,6 +36,7 @@ class Why:
     numbers: tuple[int, ...]
     before: Estimate
     after: Estimate
+    change: Estimate
 
     @property
     def order(self) -> list[int]:
@@ -55,11 +57,13 @@ class Why:
         fall = self.falls[first]
         if (fall.estimate or 0.0) <= 0:
             return f"Change this next: nothing that was fitted, which makes the gap no smaller.{left}"
-        if (self.after.estimate or 0.0) > (self.before.estimate or 0.0):
+        if (self.change.low or 0.0) > 0:
             return (
                 "Change this next: what was fitted. All of it together makes the gap larger, "
                 f"{self.after} RMS in place of {self.before}: try what it was fitted to again, before any part of it."
             )
+        if (self.change.high or 0.0) >= 0:
+            left = " All of the fit together is not shown to make it smaller."
         sure = "" if (fall.low or 0.0) > 0 else f"; that is not shown to be more than chance, {_would(fall)}"
         return (
             f"Change this next: {self.parts[first]}, which carries most, {fall} of the RMS gap of "
@@ -72,19 +76,23 @@ class Why:
         return {
             "before": self.before.to_dict(),
             "after": self.after.to_dict(),
+            "change": self.change.to_dict(),
             "parts": {name: {**fall.to_dict(), "numbers": numbers} for name, fall, numbers in falls},
             "advice": self.advice,
         }
 
 
 def _would(fall: Estimate) -> str:
-    """How many controllers would show a fall of this size: intervals shrink with the root of their number."""
+    """How many controllers would show a fall of this size: intervals shrink with the root of their number.
+
+    As far as the fit is sure: what its draws differ by does not shrink with controllers.
+    """
     if not fall.estimate or fall.low is None:
         return "more controllers would"
-    n = fall.n * ((fall.estimate - fall.low) / fall.estimate) ** 2
+    n = max(int(np.ceil(fall.n * ((fall.estimate - fall.low) / fall.estimate) ** 2)), fall.n + 1)
     if n > MOST:
         return f"and it would take more than {MOST:,} controllers"
-    return f"some {int(np.ceil(n))} controllers would"
+    return f"some {n} controllers would, where the fit is sure enough"
 
 
 def explain_gap(
@@ -124,6 +132,7 @@ def explain_gap(
         tuple(numbers),
         _estimate(worth[0, 0], drawn[:, 0], c),
         _estimate(worth[0, -1], drawn[:, -1], c),
+        _estimate(worth[0, -1] - worth[0, 0], drawn[:, -1] - drawn[:, 0], c),
     )
 
 

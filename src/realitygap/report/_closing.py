@@ -24,7 +24,7 @@ FAMILY_HEAD = (
     "twins that count",
     "fall",
 )
-WHY_HEAD = ("goal", "twin", "figure", "p", "not told", "at an end")
+WHY_HEAD = ("goal", "twin", "figure", "p", "at an end")
 TWIN_HEAD = ("twin", "RMS gap as it is", "standard error", "counts")
 STRATEGY_HEAD = ("strategy", "twins", "coverage on the twin", "95 % interval")
 _RATIOS = ("SRCC", "MMRV")
@@ -121,7 +121,6 @@ def why_table(summary: Mapping[str, Any]) -> Table:
                         each["twin"],
                         _plain(goal, each["figure"]),
                         "–" if p is None else f"{p:.3f}",
-                        ", ".join(each.get("unidentified", [])) or "–",
                         ", ".join(each.get("at_prior_end", [])) or "–",
                     )
                 )

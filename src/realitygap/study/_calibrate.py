@@ -273,17 +273,21 @@ def _calibration(
     below = read_calibration(robot)
     numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
     fitted, notes = parts.fitted, parts.notes
+    flagged, p = parts.misspecified, parts.misspecification_p
     name = str(robot)
     _refuse_no_robot(parts, robot, target)
     step_s = round(step_of(trials), 4) if trials and kind != "sensors" else 0.0
     if below is not None:
         step_s = step_s or below.step_s
-        name = _beside(below.robot, Path(robot))
+        name = below.robot
         numbers = {**below.numbers, **numbers}
         draws = _paired(below.draws, draws)
         names = {each.name for each in fitted}
         fitted = (*(each for each in below.fitted if each.name not in names), *fitted)
         notes = (*notes, f"Builds on {Path(robot).name}: {below.kind} of {below.target}, {below.date}.")
+        if below.misspecified and kind != "all":  # which fits all numbers anew
+            flagged, p = True, min(p, below.misspecification_p)
+            notes = (*notes, *below.notes)
     return Calibration(
         kind=kind,
         robot=name,
@@ -300,8 +304,8 @@ def _calibration(
         fitted=tuple(fitted),
         numbers=numbers,
         draws={key: tuple(values) for key, values in draws.items()},
-        misspecified=parts.misspecified,
-        misspecification_p=parts.misspecification_p,
+        misspecified=flagged,
+        misspecification_p=p,
         notes=tuple(notes),
         evidence=parts.evidence,
     )
@@ -322,12 +326,6 @@ def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
             "the other way? See which end of it is ahead, and that left and right are not swapped. Trials that were "
             "kept are safe."
         ) from None
-
-
-def _beside(robot: str, calibration: Path) -> str:
-    """The robot that a calibration names, as it is found from here."""
-    beside = calibration.parent / robot
-    return str(beside) if beside.is_file() else robot
 
 
 def _paired(

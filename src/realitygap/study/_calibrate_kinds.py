@@ -69,11 +69,14 @@ class Kind:
     observes: tuple[Observe, ...] = OBSERVATIONS
 
 
-def _told_of_ends(parts: Parts) -> Parts:
-    """Misspecified where what decides how the robot moves wants to be more than was thought possible.
+def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
+    """Says of what decides how the robot moves where it wants to be more than was thought possible.
 
     Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
-    These fits have no predictive check.
+
+    Args:
+        parts: Of a fit that has no predictive check.
+        is_cut: Whether the fit keeps within what was thought possible, so that at an end it is misspecified.
     """
     at_end = [each for each in parts.fitted if each.is_at_end and each.name in MOTION]
     if not at_end:
@@ -83,7 +86,7 @@ def _told_of_ends(parts: Parts) -> Parts:
         for each in at_end
     )
     note = f"At or beyond the end of what was thought possible: {said}."
-    return replace(parts, misspecified=True, notes=(*parts.notes, note))
+    return replace(parts, misspecified=is_cut, notes=(*parts.notes, note))
 
 
 # path
@@ -106,7 +109,8 @@ def _fit_path(
 
     fit = fit_path(trials, simulate, robot, np.random.default_rng(seed))
     return _told_of_ends(
-        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence})
+        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence}),
+        is_cut=False,
     )
 
 
@@ -237,7 +241,7 @@ def _fit_motion(
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
     fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
-    return _told_of_ends(_parts_of(fit))
+    return _told_of_ends(_parts_of(fit), is_cut=True)
 
 
 def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:

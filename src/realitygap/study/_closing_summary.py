@@ -132,9 +132,6 @@ def _calibrated(unit: Row, before: Row) -> Row:
         "means": unit["means"],
         "misspecified": fit["misspecified"],
         "misspecification_p": fit["misspecification_p"],
-        "unidentified": sorted(
-            {each["name"].split(".")[0] for each in fit["fitted"] if not each["identified"]}
-        ),
         "at_prior_end": sorted(each["name"] for each in fit["fitted"] if Fitted(**each).is_at_end),
     }
 
@@ -325,7 +322,7 @@ def _why_unknown(name: str, after: Row) -> str:
 
 def _why(twin: Row, after: Row, value: float) -> Row:
     """What is known of a twin that misses a goal."""
-    names = ("misspecified", "misspecification_p", "unidentified", "at_prior_end")
+    names = ("misspecified", "misspecification_p", "at_prior_end")
     return {
         "twin": twin["twin"],
         "family": twin["family"],

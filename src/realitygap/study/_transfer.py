@@ -23,7 +23,7 @@ from ._targets import refuse_more_than_is_seen, steps_as_a_robot
 from ._transfer_attempt import Attempt, Simulation, plans_of
 from ._transfer_calibrated import Calibrating, calibrated, posterior
 from ._transfer_direct import direct
-from ._transfer_noise import noise, randomized
+from ._transfer_noise import needs_sim, noise, randomized
 from ._transfer_result import Transferred, TransferResult, summarize_transfer
 from ._transfer_select import halving, plain, select
 from ._transfer_simulated import Champion, refuse_other_tasks
@@ -42,6 +42,12 @@ STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "direct": direct,
 }
 """What each does is in the docstring of the function."""
+
+CALIBRATE = ("calibrated", "posterior")
+"""Strategies that share calibrations."""
+
+NEED_SIM = ("randomized", *CALIBRATE)
+"""Strategies that change numbers of the simulated robot."""
 
 WITHOUT_TRIALS = ("plain",)
 """Strategies that spend nothing: carried out once for all budgets."""
@@ -157,8 +163,9 @@ def transfer(
     plan = _with(plan, condition=chosen.name, settings=chosen.settings())
     names = strategy_names(strategies)
     folder = Path(out)
-    _adopt(folder, plan)
     work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
+    work.refuse(names)
+    _adopt(folder, plan)
     champions = [
         work.carry_out(name, n, r) for name in names for n in budgets for r in range(plan.replicates)
     ]
@@ -241,6 +248,19 @@ class _Work:
     def __post_init__(self) -> None:
         self.simulation = Simulation(self.plan.runs, self.plan.repeats)
 
+    def refuse(self, strategies: Sequence[str]) -> None:
+        """Return where all strategies can be carried out, before trials are spent on one of them.
+
+        Raises:
+            StudyError: One cannot be.
+        """
+        for strategy in strategies:
+            if strategy in NEED_SIM:
+                needs_sim(self.condition, strategy)
+            if strategy in CALIBRATE:
+                for budget in self.plan.budgets:
+                    self._calibration(0).refuse(self.condition, budget)
+
     def carry_out(self, strategy: str, budget: int, replicate: int) -> Transferred:
         """The champion of a strategy, with its fresh trials."""
         spends = strategy not in WITHOUT_TRIALS
@@ -302,10 +322,15 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
 
 
 def _fit_of(calibration: str | Path) -> str:
-    """SHA-256 of what the file of a calibration says, but when, where and by what it was made."""
-    said = load_calibration(calibration).model_dump(
-        mode="json", exclude={"date", "measured", "arena", "seed", "software"}
+    """SHA-256 of what the file of a calibration says, but in words, or of when, where and by what it was made.
+
+    Of the robot on whose numbers it builds counts what it is, and not where its file lies.
+    """
+    made = load_calibration(calibration)
+    said = made.model_dump(
+        mode="json", exclude={"date", "measured", "arena", "seed", "software", "notes", "robot"}
     )
+    said["robot"] = load_robot(made.robot).to_dict()
     load_robot(calibration)  # refuses one that no robot can be
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 

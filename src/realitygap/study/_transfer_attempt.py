@@ -9,7 +9,7 @@ from typing import Protocol
 from realitygap.evolution import Genome
 from realitygap.runs import Condition
 from realitygap.trials import TrialPlan
-from realitygap.world import Calibration
+from realitygap.world import Calibration, RobotModel
 
 from ._transfer_simulated import Champion, evolve_champions
 from ._transfer_target import KeptTarget
@@ -56,8 +56,11 @@ class Simulation:
 class Calibrates(Protocol):
     """How calibrations come about that strategies share."""
 
-    def __call__(self, condition: Condition, left: int) -> Calibration:
-        """The calibration of a robot where so many trials are left; its `trials` are what it spends of them."""
+    def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
+        """The calibration where so many trials are left, and the robot on whose numbers it builds.
+
+        Its `trials` are what it spends of them.
+        """
         ...
 
 

@@ -12,7 +12,7 @@ from realitygap.records import Observe, write_whole
 from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target
-from realitygap.world import Calibration, load_calibration
+from realitygap.world import Calibration, RobotModel, load_calibration, load_robot
 
 from ._calibrate import refuse_other_sensors
 from ._calibrate_all import calibrate_all
@@ -39,13 +39,16 @@ def posterior(attempt: Attempt) -> Champion:
 
 def _fitted(attempt: Attempt, randomize: Literal["no", "posterior"]) -> Condition:
     needs_sim(attempt.condition, "calibrated" if randomize == "no" else "posterior")
-    calibration = attempt.calibration(attempt.condition, attempt.left)
+    calibration, base = attempt.calibration(attempt.condition, attempt.left)
     attempt.target.spent += calibration.trials
-    return fitted_condition(attempt.condition, calibration, randomize)
+    return fitted_condition(attempt.condition, calibration, randomize, base)
 
 
 def fitted_condition(
-    condition: Condition, calibration: Calibration, randomize: Literal["no", "posterior"]
+    condition: Condition,
+    calibration: Calibration,
+    randomize: Literal["no", "posterior"],
+    base: RobotModel | None = None,
 ) -> Condition:
     """The condition on a simulator that was calibrated.
 
@@ -53,10 +56,13 @@ def fitted_condition(
         condition: On platform `sim`; what it sets itself of the robot's numbers stays.
         calibration: The fit.
         randomize: `no`: the estimate; `posterior`: a draw for each trial.
+        base: The robot on whose numbers the fit builds; as the calibration names it when not given.
     """
     keep = ("steps", "step_s", "contact", "noise", "noisy_reading", "precision", "set")
     old = {name: getattr(condition.sim, name) for name in keep}
-    sim = SimPlatform(**{**old, "robot": calibration, "randomize": randomize})
+    robot = (base or load_robot(calibration.robot)).with_numbers(calibration.numbers)
+    fitted = {"robot": robot.model_copy(update=calibration.step), "draws": dict(calibration.draws)}
+    sim = SimPlatform(**{**old, **fitted, "randomize": randomize})
     name = "calibrated" if randomize == "no" else "posterior"
     return condition.model_copy(update={"sim": sim, "name": name})
 
@@ -83,25 +89,31 @@ class Calibrating:
     file: Path | None
     tell: Callable[[str], None]
 
-    def __call__(self, condition: Condition, left: int) -> Calibration:
-        """The calibration for a budget of `left` trials.
+    def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
+        """The calibration for a budget of `left` trials, and the robot on whose numbers it builds."""
+        if self.file is None:
+            return self._on_budget(condition, left - left // SELECTING), condition.sim.robot
+        calibration = load_calibration(self.file)
+        return calibration, load_robot(calibration.robot)
+
+    def refuse(self, condition: Condition, left: int) -> None:
+        """Return where there can be a calibration for a budget of `left` trials.
 
         Raises:
-            StudyError: The one that was given took more trials than that.
+            StudyError: The one that was given took more trials than that, or the target has other sensors than the
+                robot of the condition.
         """
         if self.file is None:
-            return self._on_budget(condition, left - left // SELECTING)
-        calibration = load_calibration(self.file)
-        if calibration.trials > left:
+            if left:
+                refuse_other_sensors(condition.sim.robot, self.target)
+        elif (trials := load_calibration(self.file).trials) > left:
             raise StudyError(
-                f"{self.file} took {calibration.trials} trials, more than a budget of {left}. Give a larger budget, or "
-                "a calibration of fewer trials."
+                f"{self.file} took {trials} trials, more than a budget of {left}. Give a larger budget, or a "
+                "calibration of fewer trials."
             )
-        return calibration
 
     def _on_budget(self, condition: Condition, n: int) -> Calibration:
         """A calibration by n trials, or the one that is there."""
-        refuse_other_sensors(condition.sim.robot, self.target)
         name = f"{n}-{self.observe}-{self.seed}"
         path = self.folder / f"{name}.toml"
         if path.exists():

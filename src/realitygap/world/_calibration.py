@@ -70,7 +70,7 @@ class Calibration(Settings):
     )
     date: str = Field(description="When it was fitted, ISO 8601.")
     measured: str = Field(
-        "", description="When the last of its trials was kept, ISO 8601, where they came from a file."
+        "", description="When the file that its trials came from was last changed, ISO 8601."
     )
     arena: str = Field("", description="Where it was measured, by name.")
     seed: int = Field(0, description="Of trials and draws.")

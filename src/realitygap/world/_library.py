@@ -108,12 +108,14 @@ def read_calibration(robot: str | Path) -> Calibration | None:
 
 
 def _as_calibration(values: Mapping[str, Any], origin: str) -> Calibration:
-    return _checked(origin, lambda: Calibration(**values))
+    """The robot's file that it names, beside it, is named as it is found from here."""
+    made = _checked(origin, lambda: Calibration(**values))
+    return made.model_copy(update={"robot": str(_beside(made.robot, origin))})
 
 
 def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict[str, Any]:
     """The values of the robot that a calibration builds on, with its numbers."""
-    below, _ = _robot_values(_beside(calibration.robot, origin), chain)
+    below, _ = _robot_values(calibration.robot, chain)
     model = _checked(origin, lambda: RobotModel(**below).with_numbers(calibration.numbers))
     said = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
     texts = {"sources": [*_texts(below.get("sources")), said]}

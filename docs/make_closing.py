@@ -75,7 +75,10 @@ def sentences(summary: dict[str, Any]) -> str:
     met = [goal["name"] for goal in goals if goal["met"]]
     missed = [goal["name"] for goal in goals if goal["met"] is False]
     verdict = f"Met: {'; '.join(met) or NOTHING}.\n\nMissed: {'; '.join(missed) or NOTHING}."
-    return "\n\n".join([size, counted, verdict, *not_counted(summary), *_reasons(summary)]) + "\n"
+    return (
+        "\n\n".join([size, counted, verdict, *not_counted(summary), *_reasons(summary), *_of_order(summary)])
+        + "\n"
+    )
 
 
 def _reasons(summary: dict[str, Any]) -> list[str]:
@@ -99,9 +102,29 @@ def _reasons(summary: dict[str, Any]) -> list[str]:
     return found
 
 
+def _of_order(summary: dict[str, Any]) -> list[str]:
+    """How far rank violations fall, and how far they would have to."""
+    before = float(np.median([twin["gap"]["mmrv"] for twin in summary["twins"]]))
+    floor = float(np.median([twin["gap"]["mmrv_floor"] for twin in summary["twins"]]))
+    found = []
+    for observe in summary["plan"]["observations"]:
+        after = [_at_goal(twin, summary["budget"], observe) for twin in summary["twins"]]
+        mmrv = [each["gap"]["mmrv"] for each in after if each is not None]
+        if mmrv:
+            now = float(np.median(mmrv))
+            found.append(f"to {now:.4f} with `{observe}`, by {100 * (1 - now / before):.0f} %")
+    if not found or not before:
+        return []
+    falls, wanted = " and ".join(found), 100 * (1 - 2 * floor / before)
+    return [
+        f"The median MMRV falls from {before:.4f} {falls}. Twice the median floor is {2 * floor:.4f}: a fall by "
+        f"{wanted:.0f} %."
+    ]
+
+
 def directions(summary: dict[str, Any]) -> str:
     """What prior results found, and whether it is so here, as a list in Markdown."""
-    twins = [(twin, _at_goal(twin, summary["budget"])) for twin in summary["twins"]]
+    twins = [(twin, _at_goal(twin, summary["budget"], "track")) for twin in summary["twins"]]
     pairs = [(twin["gap"]["srcc"], after["gap"]["srcc"]) for twin, after in twins if after is not None]
     rises = sum(after > before for before, after in pairs)
     order = [float(np.median([pair[k] for pair in pairs])) if pairs else float("nan") for k in (0, 1)]
@@ -127,10 +150,10 @@ def directions(summary: dict[str, Any]) -> str:
 """
 
 
-def _at_goal(twin: dict[str, Any], budget: int) -> dict[str, Any] | None:
-    """A twin's gap after calibrating with poses, by so many trials."""
+def _at_goal(twin: dict[str, Any], budget: int, observe: str) -> dict[str, Any] | None:
+    """A twin's gap after calibrating by so many trials."""
     found: Iterable[dict[str, Any]] = twin["calibrated"]
-    return next((each for each in found if (each["observe"], each["budget"]) == ("track", budget)), None)
+    return next((each for each in found if (each["observe"], each["budget"]) == (observe, budget)), None)
 
 
 def slim(summary: dict[str, Any]) -> str:

@@ -16,6 +16,7 @@ import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, Timeout
 
 from realitygap.errors import RobotError, did_you_mean
+from realitygap.robots import SystemClock
 from realitygap.robots.twin import TwinBody, load_twin
 from realitygap.world import Arena
 
@@ -28,6 +29,7 @@ from ._witness import DirectWitness
 SCHEME = "emulator"
 KEYS = ("fluke", "arena", "seed", "speed", "timing", "faults", "state", "id", "twin")
 FASTEST = 1000.0
+_REAL_TIME = SystemClock()
 _shared: dict[str, tuple[Emulator, RLock]] = {}
 
 
@@ -136,7 +138,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
             with self._lock:
                 self._robot.advance(max(0.0, seconds))
         else:
-            time.sleep(max(0.0, seconds) / self._speed)
+            _REAL_TIME.sleep(seconds / self._speed)
 
     # bytes
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from typing import Protocol, runtime_checkable
 
+HEAR_S = 0.1
+"""The longest wait in one piece [s]: Ctrl-C that comes just before a piece begins is heard only after it."""
+
 
 @runtime_checkable
 class Clock(Protocol):
@@ -28,4 +31,13 @@ class SystemClock:
 
     def sleep(self, seconds: float) -> None:
         """Wait [s]."""
-        time.sleep(seconds)
+        sleep(seconds)
+
+
+def sleep(seconds: float) -> None:
+    """Let real time pass [s], so that whoever ends the program never waits for the end: a robot may be driving."""
+    until = time.monotonic() + seconds
+    while seconds > HEAR_S:
+        time.sleep(HEAR_S)
+        seconds = until - time.monotonic()
+    time.sleep(max(seconds, 0.0))

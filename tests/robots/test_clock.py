@@ -1,0 +1,41 @@
+"""Real time: waits are as long as they should be, and whoever ends a program need not wait for them."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from realitygap.robots import SystemClock
+from realitygap.robots import _clock as module
+
+
+@pytest.mark.parametrize("seconds", [-1.0, 0.0, 0.02, 0.35])
+def test_a_wait_is_as_long_as_it_should_be(monkeypatch, seconds):
+    now, pieces = [5.0], []
+
+    def pass_time(piece):
+        assert piece >= 0
+        pieces.append(piece)
+        now[0] += piece + 0.004  # as systems do
+
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module.time, "sleep", pass_time)
+    SystemClock().sleep(seconds)
+    assert max(seconds, 0) <= now[0] - 5 <= max(seconds, 0) + 0.005
+    assert max(pieces) <= module.HEAR_S
+
+
+def test_ctrl_c_that_comes_just_before_a_wait_is_heard_soon(monkeypatch):
+    sleep = time.sleep
+
+    def unaware(seconds):
+        """As Python's where a signal comes between its last look and the system's sleep."""
+        sleep(seconds)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module.time, "sleep", unaware)
+    since = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        SystemClock().sleep(5.0)
+    assert time.monotonic() - since < 2.5

@@ -10,6 +10,7 @@ from realitygap.errors import RobotError
 from realitygap.robots import Command
 from realitygap.robots.scribbler import Scribbler
 from realitygap.robots.twin import TwinBody, TwinModel, TwinRobot, sample_twin
+from realitygap.robots.twin._shape import STEP_S
 from realitygap.world import Pose, paper_arena
 
 from .wire import ask, packet, say, signed
@@ -92,6 +93,16 @@ def test_it_rolls_out_after_the_motors_are_off():
     after = robot.pose
     robot.advance(5.0)
     assert robot.pose == after
+
+
+def test_it_goes_on_as_it_does_where_its_delay_grows():
+    """It stood still until as many words had come as it was late now."""
+    twin = quiet(motors={"delay": 0.15, "delay_jitter": 0.15})
+    body = TwinBody(twin, paper_arena())
+    body.place(Pose(0.3, 0.3, 0.0))
+    ways = [body.advance(0.1, 0.1, STEP_S) for _ in range(700)]
+    rolling = np.array(ways)[100:].mean(axis=1)  # 3 s, in which its delay is drawn six times
+    assert rolling.min() > 0.9 * 0.1 * STEP_S
 
 
 def test_its_battery_is_what_the_gauge_reads():

@@ -76,6 +76,7 @@ class TwinBody:
         self._delays = numbers_for(model.seed, number, DELAYS)
         self._late: deque[tuple[float, float]] = deque()
         self._late_steps = 0
+        self._heard = (0.0, 0.0)
         self._steps = 0
         self._turned = (0.0, 0.0)
         self._looks, self._asked = 0, set(EMITTERS)
@@ -122,7 +123,9 @@ class TwinBody:
         self._late.append((left, right))
         while len(self._late) > self._late_steps + 1:
             self._late.popleft()
-        return self._late[0] if len(self._late) > self._late_steps else (0.0, 0.0)
+        if len(self._late) > self._late_steps:  # else the delay has just grown, and wheels go on as they do
+            self._heard = self._late[0]
+        return self._heard
 
     def obstacle(self, emitter: str, stronger: float) -> int:
         """What the Fluke counts, 0 (free) to 6400 (near).

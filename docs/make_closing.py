@@ -140,9 +140,8 @@ def _of_few(summary: dict[str, Any]) -> list[str]:
         mended = source.copy()
         np.put_along_axis(mended, worst, np.take_along_axis(target, worst, axis=1), axis=1)
         median = float(np.median(mean_maximum_rank_violation(mended, target)))
-        found.append(
-            f"{median:.4f} with `{observe}` (of these controllers {100 * np.mean(worst < n_random):.0f} % are random ones)"
-        )
+        random = 100 * float(np.mean(worst < n_random))
+        found.append(f"{median:.4f} with `{observe}` (of these controllers {random:.0f} % are random ones)")
     if not found:
         return []
     return [

@@ -43,5 +43,10 @@ def test_p_is_even_where_there_is_no_gap():
     assert np.sum(np.array(ps) <= 0.05) < 20
 
 
-def test_one_controller_with_two_trials_can_give_no_p_below_a_sixth():
-    assert smallest_energy_p(1, 2, 2) == pytest.approx(1 / 6)
+def test_ways_to_share_out_trials_that_are_mirror_images_count_once():
+    assert smallest_energy_p(1, 2, 2) == pytest.approx(1 / 3)
+    assert smallest_energy_p(2, 2, 2) == pytest.approx(1 / 9)
+    assert smallest_energy_p(1, 2, 3) == pytest.approx(1 / 10)
+    # and no permutation gives less: 2 and 2 trials, far apart
+    far = energy_test(np.array([[[0.0], [0.1]]]), np.array([[[9.0], [9.1]]]), np.random.default_rng(0))
+    assert far == pytest.approx(1 / 3, abs=0.06)

@@ -46,3 +46,7 @@ def test_what_cannot_be_is_refused():
 def test_spread_and_reliability_by_hand():
     assert spread_of_differences(0.03, 0.1, 50) == pytest.approx((0.0009 + 0.0004) ** 0.5)
     assert trial_reliability(0.1, 0.2, 4) == pytest.approx(0.5)
+
+
+def test_no_plan_is_for_fewer_controllers_than_give_an_interval():
+    assert plan_effect(0.5, spread=0.01, noise=0.05, trials=10).controllers == 5

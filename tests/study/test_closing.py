@@ -204,6 +204,8 @@ def test_a_folder_of_another_plan_is_left_alone_and_more_twins_extend_it(tmp_pat
     adopt_plan(tmp_path, PLAN)
     with pytest.raises(RecordError, match="trials was 8, is 9"):
         adopt_plan(tmp_path, replace(PLAN, trials=9))
+    with pytest.raises(RecordError, match="observations was"):  # its transfer is of both ways to observe
+        adopt_plan(tmp_path, replace(PLAN, observations=("cells",)))
     adopt_plan(tmp_path, replace(PLAN, twins=3))
     assert json.loads((tmp_path / "plan.json").read_text())["twins"] == 3
     with pytest.raises(RecordError, match="realitygap run closing-the-gap"):

@@ -387,6 +387,12 @@ def _print_plan(found: GapPlan, least: float, power: float) -> None:
             f"Fewest trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} controllers with "
             f"{found.best.trials} each."
         )
+    else:
+        from realitygap.study import MOST_CONTROLLERS
+
+        typer.echo(
+            f"`realitygap gap` takes at most {MOST_CONTROLLERS:,} controllers, with which none of these is."
+        )
     if found.question == "effect":
         typer.echo(
             "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."

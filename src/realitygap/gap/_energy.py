@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ._side import Values
 
@@ -28,7 +30,9 @@ def energy_distances(source: Values, target: Values) -> Values:
 
     Source: Székely & Rizzo (2013), Journal of Statistical Planning and Inference 143(8), 1249-1272.
     """
-    return _distances(_matrices(source, target), source.shape[1])
+    r = source.shape[1]
+    in_source = (np.arange(r + target.shape[1]) < r)[None]
+    return np.array([_shared_out(matrix, in_source)[0] for matrix in _matrices(source, target)])
 
 
 def energy_test(
@@ -44,40 +48,41 @@ def energy_test(
 
     Source: permutation within strata; the observed one counts (Phipson & Smyth 2010).
     """
-    matrices, r = _matrices(source, target), source.shape[1]
-    n, both = matrices.shape[:2]
-    in_source = np.tile(np.arange(both) < r, (n, permutations + 1, 1))
+    n, r = source.shape[:2]
+    in_source = np.tile(np.arange(r + target.shape[1]) < r, (n, permutations + 1, 1))
     in_source[:, 1:] = rng.permuted(in_source[:, 1:], axis=2)
-    means = _shared_out(matrices, in_source.astype(float)).mean(axis=0)
+    matrices = _matrices(source, target)
+    means = np.mean([_shared_out(*pair) for pair in zip(matrices, in_source, strict=True)], axis=0)
     return float((means >= means[0] - 1e-9).mean())
 
 
 def smallest_energy_p(n: int, r: int, q: int) -> float:
-    """The smallest p that n controllers with r and q trials can give: one of all ways to share out trials."""
-    return float(math.exp(-n * math.log(math.comb(r + q, r))))
+    """The smallest p that n controllers with r and q trials can give: one of all ways to share out trials.
+
+    With as many trials on both sides, two ways that are each other's mirror image give the same distance.
+    """
+    ways = math.comb(r + q, r) // (2 if r == q else 1)
+    return float(math.exp(-n * math.log(ways)))
 
 
-def _matrices(source: Values, target: Values) -> Values:
+def _matrices(source: Values, target: Values) -> Iterator[Values]:
+    """(r + q, r + q) distances between the trials of a controller, of one after the other."""
     from scipy.spatial.distance import cdist  # which takes a while to import, and nothing else needs
 
     if min(source.shape[1], target.shape[1]) < 2:
         raise ValueError("An energy distance needs at least 2 trials of each controller on both sides.")
     both = np.concatenate([source, target], axis=1).astype(float)
-    return np.stack([cdist(each, each) for each in both])
+    return (cdist(each, each) for each in both)
 
 
-def _distances(matrices: Values, r: int) -> Values:
-    in_source = np.broadcast_to(np.arange(matrices.shape[1]) < r, (len(matrices), 1, matrices.shape[1]))
-    return _shared_out(matrices, in_source.astype(float))[:, 0]
-
-
-def _shared_out(matrices: Values, in_source: Values) -> Values:
-    """(c, p) energy distance of each controller for p ways to share out its trials, (c, p, r + q) 1 in the source."""
-    r = float(in_source[0, 0].sum())
-    q = in_source.shape[2] - r
+def _shared_out(matrix: Values, is_in_source: NDArray[np.bool_]) -> Values:
+    """(p,) energy distance of a controller for p ways to share out its trials, (p, r + q)."""
+    in_source = is_in_source.astype(float)
+    r = float(in_source[0].sum())
+    q = in_source.shape[1] - r
     in_target = 1 - in_source
-    to_source = in_source @ matrices
-    within_source = (to_source * in_source).sum(axis=2) / (r * (r - 1))
-    across = (to_source * in_target).sum(axis=2) / (r * q)
-    within_target = (in_target @ matrices * in_target).sum(axis=2) / (q * (q - 1))
+    to_source = in_source @ matrix
+    within_source = (to_source * in_source).sum(axis=1) / (r * (r - 1))
+    across = (to_source * in_target).sum(axis=1) / (r * q)
+    within_target = (in_target @ matrix * in_target).sum(axis=1) / (q * (q - 1))
     return np.asarray(2 * across - within_source - within_target)

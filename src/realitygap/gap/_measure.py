@@ -266,6 +266,8 @@ def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
 
 
 def _no_interval(n: int) -> str:
+    if n >= SMALLEST_N:
+        return "Noise leaves no order in most resamples, so there is no interval; more trials of each controller would."
     return f"{n} controllers give no interval; {SMALLEST_N} would."
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap import _special as special
 
+from ._bootstrap import SMALLEST_N
 from ._correlation import spearman
 from ._equivalence import controllers_for_margin
 from ._side import Values
@@ -71,7 +72,7 @@ def plan_effect(
     """
     _check(effect=effect, noise=noise + spread, power=power)
     sd = spread_of_differences(spread, noise, trials)
-    n = _fewest(lambda n: _t_power(effect / sd, n), power)
+    n = _fewest(lambda n: _t_power(effect / sd, n), power, smallest=SMALLEST_N)
     if n is None:
         return Needed(trials, None)
     means, errors = _simulated(effect, sd, n, seed)
@@ -115,7 +116,7 @@ def plan_correlation(
             f"least is {least} and correlation {correlation}, expected -1 < least < correlation < 1."
         )
     seen, floor = correlation * reliability, least * reliability
-    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=5)
+    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
     if n is None:
         return Needed(trials, None)
     return Needed(trials, n, *_share(_simulated_correlations(seen, floor, n, seed)))

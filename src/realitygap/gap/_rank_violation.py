@@ -7,6 +7,9 @@ import numpy as np
 from ._correlation import SPLITS, Rng, halves
 from ._side import Values
 
+_BLOCK = 4_000_000
+"""Pairs of controllers that are held at a time."""
+
 
 def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
     """(b,) mean over controllers of the largest difference on the target to one that the simulator orders otherwise.
@@ -21,6 +24,14 @@ def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
 
     Source: Li et al. (2024), Evaluating Real-World Robot Manipulation Policies in Simulation (SIMPLER), section III.
     """
+    b, c = target.shape
+    size = max(1, _BLOCK // (c * c))
+    return np.concatenate(
+        [_of_block(source[first : first + size], target[first : first + size]) for first in range(0, b, size)]
+    )
+
+
+def _of_block(source: Values, target: Values) -> Values:
     violated = (source[:, :, None] < source[:, None, :]) != (target[:, :, None] < target[:, None, :])
     apart = np.abs(target[:, :, None] - target[:, None, :])
     return np.asarray(np.where(violated, apart, 0.0).max(axis=2).mean(axis=1))

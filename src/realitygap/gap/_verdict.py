@@ -22,13 +22,18 @@ def verdict_of(result: GapResult) -> str:
 def _size(result: GapResult) -> str:
     rms, level = result.rms, result.level
     if rms.estimate is None:
-        return "the size of the gap cannot be told"
+        return "the size of the gap cannot be told" + _side_if_any(level)
     if rms.high is None:
         return f"the transfer gap is {rms.estimate:.3f} RMS, of too few controllers to say how sure that is"
     if not result.excludes_no_gap:
         return f"no gap is shown (RMS at most {rms.high:.3f})"
     side = _side(level)
     return f"the transfer gap is {rms} RMS over {rms.n} controllers{side}"
+
+
+def _side_if_any(level: Estimate) -> str:
+    side = _side(level)
+    return "" if side.endswith("both sides") else side
 
 
 def _side(level: Estimate) -> str:

@@ -111,7 +111,7 @@ SMALL = ClosingPlan(
 )
 """Minutes in place of hours; too little to say anything but that all of it works."""
 
-EXTENDED = ("families", "twins", "budgets", "observations")
+EXTENDED = ("families", "twins", "budgets")
 """What may differ between calls on one folder: the rest of its plan is fixed."""
 
 

@@ -53,7 +53,7 @@ def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) 
 def test_intervals_cover_gains_and_track_as_often_as_they_say(seen):
     rng = np.random.default_rng(17)
     hits = []
-    for key in range(12):
+    for key in range(30):
         truth = {
             "drive.gain_left": float(rng.uniform(0.85, 1.1)),
             "drive.gain_right": float(rng.uniform(0.85, 1.1)),
@@ -64,7 +64,8 @@ def test_intervals_cover_gains_and_track_as_often_as_they_say(seen):
         for name, value in truth.items():
             low, high = np.quantile(fit.draws[name], [0.05, 0.95])
             hits.append(low <= value <= high)
-    # 36 intervals: 0.90 with a standard deviation of 0.05, so that chance alone fails some 1 in 300 keys; these do not
+    # 90 intervals, those of a robot of the same trials: 0.90 with a standard deviation of 0.05, so that chance alone
+    # fails some 1 in 300 keys; these do not
     assert np.mean(hits) >= 0.75
 
 
@@ -82,7 +83,7 @@ def test_turns_beyond_half_a_turn_are_counted():
     trials = [measured(13.0, 0.0, STRAIGHT), measured(0, 300.0, TURNING)] * 3
     _, own = fitted(trials)
     assert own["path.step_turn"].estimate == pytest.approx(math.radians(60))
-    simulated = next(trial for trial in recorded({}, 0) if np.all(trial.commands == TURNING))
+    simulated = next(trial for trial in recorded({}, 0) if trial.commands[0, 1])
     assert moved_in(simulated).turned > math.pi  # 5 steps of 54 degrees
 
 
@@ -97,6 +98,31 @@ def test_one_path_alone_identifies_nothing():
     _, own = fitted([measured(13.75, 0.0, STRAIGHT)])
     assert not own["drive.gain"].identified
     assert "three times more" in own["drive.gain"].advice
+
+
+def test_one_path_and_one_turn_are_as_uncertain_as_before_whatever_a_camera_reads():
+    """They had intervals of a thousandth of a millimeter, from which `--randomize posterior` drew a single robot."""
+    fit, own = fitted(recorded({}, 2, n=2))
+    assert fit.draws["drive.gain_left"].std() > 0.1
+    assert fit.draws["drive.track"].std() > 0.1 * ROBOT.drive.track
+    assert not any(own[name].identified for name in ("drive.gain", "drive.asymmetry", "drive.track"))
+
+
+def test_the_way_in_which_a_robot_comes_to_rest_is_of_the_path():
+    """A ruler finds it at rest: the simulated robot was compared at the moment at which it was told to stop."""
+    late = {"drive.lag": 0.2, "drive.delay": 0.1, "drive.gain_left": 0.9, "drive.gain_right": 0.9}
+    robot = ROBOT.with_numbers({"drive.lag": 0.2, "drive.delay": 0.1})
+    trials = recorded(late, 4, n=60)
+    fit, _ = fitted(trials, robot=robot)
+    assert fit.numbers["drive.gain_left"] == pytest.approx(0.9, rel=0.015)
+    # with five full steps, lag and delay hardly matter to where it ends
+    assert fitted(trials)[0].numbers["drive.gain_left"] == pytest.approx(0.9, rel=0.015)
+    assert not trials[0].commands[-1].any()
+
+
+def test_asymmetry_is_left_less_right():
+    _, own = fitted(recorded({"drive.gain_left": 1.05, "drive.gain_right": 0.95}, 6))
+    assert own["drive.asymmetry"].estimate == pytest.approx(0.1, abs=0.03)
 
 
 def test_draws_of_few_repeats_are_of_robots_that_can_be():

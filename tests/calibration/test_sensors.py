@@ -214,3 +214,18 @@ def test_other_sensors_and_no_readings_are_refused():
 def test_the_step_of_a_sensor_is_what_its_readings_are_multiples_of():
     assert step_of(np.array([0.0, 0.3, 0.4, 0.9])) == pytest.approx(0.1)
     assert step_of(np.array([0.0, 0.3137, 0.4, 0.9])) < 1e-4
+
+
+def test_placements_that_were_to_be_the_same_are_compared_wherever_a_camera_saw_them():
+    """Told apart by distances to a tenth of a millimeter, no two were of one place, and nothing was between them."""
+    rng = np.random.default_rng(4)
+    placements = []
+    for place in range(4):
+        for _ in range(3):
+            level = 0.2 + 0.1 * place + rng.normal(0, 0.05)  # as it was put down, and stays for all readings
+            distances = np.array([0.1 + 0.05 * place + rng.normal(0, 0.002)])
+            readings = np.clip(rng.normal(level, 0.02, 40), 0, 1)
+            placements.append(Placement(distances, readings, place=(0.1 * place, 0.0, 0.0)))
+    found = independence(placements, rng)
+    assert found.between > 0.5
+    assert found.between_p < 0.05

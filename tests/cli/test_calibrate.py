@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +16,11 @@ from realitygap.errors import RealityGapError
 from realitygap.records import read_observations, write_observations
 from realitygap.robots import SimPlatform
 from realitygap.study import parse_length, save_calibration
+from realitygap.study._calibrate import _still_said
+from realitygap.study._calibrate_kinds import Parts
 from realitygap.study._targets import observations_head
-from realitygap.trials import SimTarget
-from realitygap.world import load_calibration, load_robot, paper_arena
+from realitygap.trials import SimTarget, _target_robot
+from realitygap.world import Fitted, load_calibration, load_robot, paper_arena
 
 PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 
@@ -159,6 +162,53 @@ def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person
     assert made.label == "EMULATED"
 
 
+def test_a_trial_that_was_taken_back_does_not_count_whatever_follows(person, tmp_path):
+    """It did where somebody stopped before it was driven again."""
+    command = ("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
+    person(*STRAIGHT, *TURN, "r", "q")
+    run(*command)
+    kept = read_observations(tmp_path / "path.trials.jsonl").trials
+    assert [trial.end for trial in kept] == ["step limit", "step limit", "aborted"]
+    person("", "285", "", "14", "0", "0", "", "286")
+    assert "Trial 1 of 3" in run(*command)
+    made = load_calibration(tmp_path / "path.toml")
+    turned = [math.radians(285), math.radians(286)]
+    assert made.evidence["path"]["turned_rad"] == pytest.approx(turned, rel=1e-6)
+    run("path", "--from", tmp_path / "path.trials.jsonl", "-o", tmp_path / "again.toml")
+    assert load_calibration(tmp_path / "again.toml").evidence["path"]["turned_rad"] == pytest.approx(turned)
+
+
+def test_a_robot_whose_link_is_lost_is_not_driven_again_before_somebody_puts_it_back(
+    person, tmp_path, monkeypatch
+):
+    """It set off at once, from wherever it stood, and what it did was kept as begun at its start."""
+    carry_out, n = _target_robot.carry_out_on_robot, []
+
+    def losing(robot, plan, *more):
+        n.append(plan.number)
+        trial, _ = carry_out(robot, plan, *more)
+        return replace(trial, end="lost"), "The link is gone."
+
+    monkeypatch.setattr(_target_robot, "carry_out_on_robot", losing)
+    person("")
+    command = ("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
+    said = refused(*command)
+    assert "was lost after 7 commands: The link is gone." in said
+    assert n == [0]
+    monkeypatch.setattr(_target_robot, "carry_out_on_robot", carry_out)
+    person("q")
+    assert "Trial 1 of 4" in run(*command)
+
+
+def test_more_than_is_seen_is_refused_before_anything_is_done(person, tmp_path):
+    nobody = person()
+    file = tmp_path / "fit.toml"
+    said = refused("contact", "--robot", PORT.replace("s2", "s1"), "--observe", "track", "-o", file)
+    assert "no more can be seen than 'cells'" in said
+    assert not nobody.asked
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_person_is_told_how_far_from_the_wall_the_robot_has_to_stand(person, tmp_path):
     person("", "", "q")
     out = run("sensors", "--robot", PORT, "-o", tmp_path / "fit.toml")
@@ -187,6 +237,7 @@ def test_without_a_terminal_nobody_is_led(monkeypatch, tmp_path):
         ("", None),
         ("1/0", None),
         ("13 3/0", None),
+        ("13 3/00", None),
         ("13 in", None),
     ],
 )
@@ -271,6 +322,76 @@ def test_what_was_flagged_stays_so_in_what_builds_on_it(sensors, tmp_path):
     made = load_calibration(tmp_path / "both.toml")
     assert (made.misspecified, made.misspecification_p) == (True, 0.01)
     assert "What was said." in made.notes
+
+
+def test_what_was_fitted_anew_is_not_said_of_the_earlier_fit(tmp_path):
+    def made(kind, names, numbers):
+        rows = tuple(
+            Fitted(
+                name=name, estimate=1.0, low=0.9, high=1.1, prior_low=0.0, prior_high=2.0, identified=True, unit="",
+                advice="",
+            )
+            for name in names
+        )  # fmt: skip
+        return Parts(rows, dict.fromkeys(numbers, 1.0), {}, kind)
+
+    below = made(
+        "path", ["path.sim_steps", "drive.gain", "drive.track", "range.0.decay", "range.amplitude"], []
+    ).fitted
+    above = made(
+        "all", ["drive.gain", "range.decay", "range.1.amplitude"], ["drive.gain_left", "range.0.decay"]
+    )
+    assert [each.name for each in _still_said(below, above)] == ["drive.track"]
+    turned = made("x", ["drive.track"], ["drive.track"])
+    assert [each.name for each in _still_said(below, turned)] == [
+        *("path.sim_steps", "drive.gain", "range.0.decay", "range.amplitude")
+    ]
+
+
+def test_trials_with_commands_of_another_length_are_left_out_and_named(tmp_path):
+    """One slow trial ended the command with a traceback, after the last one, each time."""
+    file = path_trials(tmp_path / "path.jsonl", {})
+    found = read_observations(file)
+    slow = replace(found.trials[3], step_s=0.58)
+    more = [replace(trial, number=trial.number + 4) for trial in found.trials]
+    write_observations(file, found.head, [*found.trials[:3], slow, *more])
+    run("path", "--from", file, "-o", tmp_path / "fit.toml")
+    made = load_calibration(tmp_path / "fit.toml")
+    assert any(
+        "1 of 8 trials were left out: their commands lasted 0.58 to 0.58 s" in note for note in made.notes
+    )
+    assert (made.trials, made.step_s, len(made.evidence["path"]["turned_rad"])) == (8, 0.5, 3)
+
+
+def test_paths_that_end_at_a_wall_are_left_out(tmp_path):
+    """They were taken for shorter ones: a robot of any speed had the gain that the arena had room for."""
+    file = path_trials(tmp_path / "path.jsonl", {})
+    found = read_observations(file)
+    at_wall = found.trials[0].poses.copy()
+    at_wall[-1, 0] = 42 * 0.0254 - 0.09
+    stopped = replace(found.trials[0], poses=at_wall, number=9)
+    write_observations(file, found.head, [*found.trials, stopped])
+    run("path", "--from", file, "-o", tmp_path / "fit.toml")
+    made = load_calibration(tmp_path / "fit.toml")
+    assert "1 of 5 paths ended at a wall, and were left out." in made.notes
+    assert made.numbers["drive.gain_left"] == pytest.approx(1.0, abs=0.1)
+    write_observations(file, found.head, [stopped, replace(stopped, number=10)])
+    assert "All 2 paths ended at a wall" in refused("path", "--from", file, "-o", tmp_path / "x.toml")
+    slow = [replace(trial, step_s=2.0) for trial in found.trials]
+    write_observations(file, found.head, slow)
+    assert "turns cannot be counted" in refused("path", "--from", file, "-o", tmp_path / "x.toml")
+
+
+def test_recorded_trials_of_another_robot_or_without_an_arena_are_one_message(tmp_path):
+    file = path_trials(tmp_path / "path.jsonl", {})
+    said = refused("all", "--from", file, "--base", "e-puck", "-o", tmp_path / "x.toml")
+    assert "have 3 range sensors and robot 'e-puck' 8" in said
+    lines = file.read_text().splitlines()
+    head = json.loads(lines[0])
+    del head["arena"]["grid"]
+    file.write_text("\n".join([json.dumps(head), *lines[1:]]) + "\n")
+    said = refused("path", "--from", file, "-o", tmp_path / "x.toml")
+    assert "its first line has no arena that can be read" in said
 
 
 def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):

@@ -180,6 +180,8 @@ def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, text: bytes,
         ({"poses": [[1, 2]]}, "a trial that cannot be read"),
         ({"cells": "many"}, "a trial that cannot be read"),
         ({"end": ...}, "a trial without 'end'"),
+        ({"readings": [[0.1, None, 0.2]] * 3}, "a trial whose readings are not all numbers"),
+        ({"start": [0.1, float("nan"), 0.0]}, "a trial whose start are not all numbers"),
     ],
 )
 def test_damage_before_the_last_line_is_told_with_its_line(
@@ -200,3 +202,14 @@ def test_a_file_that_is_not_there_is_told_in_one_message(tmp_path: Path) -> None
         read_observations(tmp_path / "none.jsonl")
     with pytest.raises(RecordError, match="Could not write"):
         ObservationsFile(tmp_path / "no folder" / "one.jsonl", HEAD)
+
+
+def test_a_file_without_a_trial_is_nobodys(tmp_path: Path) -> None:
+    """A command that was refused after its file was begun kept the right one from using the same name."""
+    path = tmp_path / "trials.jsonl"
+    ObservationsFile(path, HEAD).close()
+    with ObservationsFile(path, replace(HEAD, observe="cells")) as file:
+        file.append(trial(0))
+    assert read_observations(path).head.observe == "cells"
+    with pytest.raises(RecordError, match="observe 'cells' and not 'track'"):
+        ObservationsFile(path, HEAD)

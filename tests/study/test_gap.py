@@ -1,12 +1,13 @@
 """The same controllers on both sides of a gap, resumable, with what is not the transfer gap kept apart."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
 from realitygap.errors import RecordError, StudyError
 from realitygap.gap import GapSide
+from realitygap.records import read_observations
 from realitygap.robots import SimPlatform
 from realitygap.study import (
     PARTS,
@@ -14,12 +15,15 @@ from realitygap.study import (
     gap_between,
     open_target,
     part_of,
+    recorded_spreads,
     run_gap,
     sample_controllers,
     study_gap,
+    try_on,
     why_gap,
 )
-from realitygap.trials import SimTarget
+from realitygap.study import _gap_between as study_gap_between
+from realitygap.trials import EndReason, SimTarget
 from realitygap.world import Calibration, paper_arena
 
 ARENA = paper_arena()
@@ -263,3 +267,95 @@ def test_a_slippery_twin_is_a_gap_and_one_of_the_family_same_is_none(tmp_path):
     assert found["slippery"].labels == ("SIM", "TWIN")
     assert found["slippery"].excludes_no_gap
     assert not found["same"].excludes_no_gap
+
+
+@dataclass
+class Interrupted(Counted):
+    """Ctrl-C in the midst of a trial, which is told as far as it went."""
+
+    def carry_out(self, plans, observe, tell=None):
+        try:
+            return super().carry_out(plans, observe, tell)
+        except RecordError:
+            (trial,) = self.target.carry_out([plans[self.fails_after]], observe)
+            tell(self.fails_after, replace(trial, cells=(), end=str(EndReason.INTERRUPTED)))
+            raise KeyboardInterrupt from None
+
+
+def test_a_trial_that_was_cut_off_does_not_count_and_is_carried_out_again(some, tmp_path):
+    """It counted as one that visited nothing."""
+    path = tmp_path / "trials.jsonl"
+    whole = run_gap(sim(), sim(), some, trials=3)
+    with pytest.raises(KeyboardInterrupt):
+        run_gap(sim(), Interrupted(sim(), fails_after=7), some, trials=3, results=path)
+    kept = read_observations(path).trials
+    assert [trial.end for trial in kept] == ["step limit"] * 7 + ["interrupted"]
+    again = Counted(sim())
+    assert run_gap(sim(), again, some, trials=3, results=path) == whole
+    assert len(again.asked) == 18 - 7
+    run_gap(sim(), sim(), some, trials=3, results=tmp_path / "whole.jsonl")
+    assert recorded_spreads(str(path)).noise == pytest.approx(
+        recorded_spreads(str(tmp_path / "whole.jsonl")).noise
+    )
+
+
+def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
+    real = sim()
+    real.label = "REAL"
+    there = study_gap_between._open
+    monkeypatch.setattr(
+        study_gap_between,
+        "_open",
+        lambda spec, *more, **named: real if spec == "robot" else there(spec, *more, **named),
+    )
+    with pytest.raises(StudyError, match=r"12 trials on robot would be kept nowhere.*-o FILE"):
+        gap_between("sim", "robot", n_controllers=6, trials=2)
+    found = gap_between("sim", "robot", n_controllers=6, trials=2, results=tmp_path / "trials.jsonl")
+    assert found.study.target.label == "REAL"
+
+
+def test_trials_of_one_controller_tell_no_gap(some, tmp_path):
+    path = tmp_path / "one.jsonl"
+    try_on(sim(), some[0].genome, trials=2, out=path)
+    with pytest.raises(StudyError, match="of one controller, expected at least 2"):
+        gap_between("sim", f"recorded:{path}")
+
+
+def test_re_evolved_is_only_what_evolved_there(some):
+    with pytest.raises(
+        StudyError, match="random-0 of --reevolved random was evolved nowhere, expected champions"
+    ):
+        gap_between("sim", "jyro", n_controllers=3, trials=1, reevolved="random")
+    elsewhere = [
+        replace(each, kind="champion", selected_score=0.5, fresh_score=0.4, selected_on="jyro")
+        for each in some
+    ]
+    there = [replace(each, selected_on="sim") for each in elsewhere]
+    assert (
+        "were evolved on jyro"
+        in run_gap(sim(), sim(), elsewhere, trials=2, reevolved=there).reevolved.refused
+    )
+    assert run_gap(sim(), sim(), there, trials=2, reevolved=there).reevolved.estimate is not None
+
+
+def test_kept_trials_of_another_simulator_are_not_taken(some, tmp_path):
+    """`sim` with other numbers, or another noise, was given the trials of the one before."""
+    path = tmp_path / "trials.jsonl"
+    run_gap(sim(), sim(), some, trials=1, results=path)
+    with pytest.raises(RecordError, match="identity"):
+        run_gap(sim(), sim(**{"drive.track": 0.17}), some, trials=1, results=path)
+    with pytest.raises(RecordError, match=r"noise 0\.5"):
+        run_gap(sim(), SimTarget(SimPlatform(), ARENA, 0.5, key=1, name="sim"), some, trials=1, results=path)
+    again = Counted(sim())
+    run_gap(sim(), again, some, trials=1, results=path)
+    assert not again.asked
+
+
+def test_why_and_the_papers_noise_are_not_put_together(tmp_path):
+    calibration = Calibration(
+        kind="path", robot="scribbler-s2-fluke2", target="twin", label="TWIN", observe="cells", trials=10,
+        date="2026-01-01", method="known", numbers={"drive.track": 0.16},
+    )  # fmt: skip
+    (tmp_path / "fit.toml").write_text(calibration.to_toml())
+    with pytest.raises(StudyError, match="without the paper's noise"):
+        gap_between(f"sim:{tmp_path / 'fit.toml'}", "sim", why=True, noise=0.5, n_controllers=5, trials=2)

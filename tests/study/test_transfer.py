@@ -1,5 +1,6 @@
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from realitygap.errors import DescriptionError, RecordError, StudyError
 from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.study import STRATEGIES, choose_condition, transfer
+from realitygap.study._transfer import TransferPlan, _Work
 from realitygap.study._transfer_calibrated import Calibrating, fitted_condition
 from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
 from realitygap.study._transfer_simulated import evolve_champions
@@ -171,7 +173,7 @@ def test_a_fit_on_the_budget_builds_on_the_robot_of_the_study(calibration, tmp_p
     condition = choose_condition("sim-paper", None, 1).model_copy(update={"sim": SimPlatform(robot=own)})
     made = load_calibration(calibration).model_copy(update={"robot": "mine"})
     (tmp_path / "3-cells-0.toml").write_text(made.to_toml())
-    calibrating = Calibrating(CountingTarget(), tmp_path, 0, 0, "cells", None, print)
+    calibrating = Calibrating(CountingTarget(), tmp_path, 0, 0, 7, "cells", None, print)
     found, base = calibrating(condition, 6)
     fitted = fitted_condition(condition, found, "posterior", base)
     assert fitted.sim.robot.drive.speed == 0.2
@@ -259,3 +261,60 @@ def test_behavior_distance_is_jaccards_where_visits_are_sure():
     one, other = np.array([[1.0, 1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 1.0, 0.0], [1.0, 1.0, 0.0, 0.0]])
     assert distances(one, other).tolist() == [[1 - 1 / 3, 0.0]]
     assert distances(np.zeros((1, 2)), np.zeros((1, 2))).tolist() == [[0.0]]
+
+
+def test_a_trial_that_was_cut_off_is_carried_out_again(calibration, tmp_path):
+    """It counted as one that visited nothing, or kept a calibration from ever going on."""
+
+    class CutOff(CountingTarget):
+        def carry_out(self, plans, observe, tell=None):
+            def cut(k, trial):
+                self.n += 1
+                if self.n == self.enough:
+                    tell(k, replace(trial, cells=(), end="interrupted"))
+                    raise KeyboardInterrupt
+                tell(k, trial)
+
+            return SimTarget.carry_out(self, plans, observe, cut)
+
+    arguments = ("sim-paper", ["plain", "select"], [4])
+    whole = transfer(arguments[0], CountingTarget(), *arguments[1:], out=tmp_path / "whole", **SMALL)
+    with pytest.raises(KeyboardInterrupt):
+        transfer(arguments[0], CutOff(enough=6), *arguments[1:], out=tmp_path / "cut", **SMALL)
+    again = CountingTarget()
+    assert transfer(arguments[0], again, *arguments[1:], out=tmp_path / "cut", **SMALL) == whole
+    assert again.n == 4 + 4 + 4 - 5
+
+
+def test_regret_is_to_the_best_that_the_folder_knows(result, calibration, tmp_path):
+    found, target, folder = result
+    best = json.loads((folder / "result.json").read_text())["best_known"]
+    alone = transfer("sim-paper", target, ["plain"], [8], out=folder, calibration=calibration, **SMALL)
+    assert alone.best_known == pytest.approx(best)
+    plain = next(row for row in found.strategies if row.strategy == "plain")
+    assert alone.strategies[0].regret.estimate == pytest.approx(plain.regret.estimate)
+
+
+def test_intervals_of_few_replicates_cover_as_often_as_they_say():
+    """A resampling of two or three replicates ended at the two or three, and covered half to three quarters."""
+    rng = np.random.default_rng(2)
+    for r in (2, 3, 4):
+        held = []
+        for _ in range(400):
+            found = estimate_mean(rng.normal(0, 0.05, (r, 1)) + rng.normal(0.5, 0.1, (r, 20)))
+            held.append(found.low <= 0.5 <= found.high)
+        # 0.95 with a standard deviation of 0.011: chance alone fails 1 in 300 seeds; replicates alike make it wider
+        assert np.mean(held) > 0.92
+    alone = estimate_mean(np.array([[0.5]]))
+    assert (alone.low, alone.high) == (None, None)
+    alike = estimate_mean(np.array([[0.4, 0.6], [0.6, 0.4]]))
+    assert alike.low < 0.45
+
+
+def test_calibrations_of_another_seed_are_other_ones(tmp_path):
+    seeds = []
+    for seed in (1, 2):
+        plan = TransferPlan("sim-paper", "", {}, "other", "", (6,), seed=seed)
+        work = _Work(plan, choose_condition("sim-paper", None, seed), CountingTarget(), tmp_path, print)
+        seeds += [work._calibration(replicate).seed for replicate in (0, 1)]
+    assert len(set(seeds)) == 4

@@ -246,6 +246,19 @@ def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
     assert not robot.link.is_open
 
 
+def test_ctrl_c_while_somebody_is_asked_for_cells_tells_the_trial() -> None:
+    class Asked(WitnessAttendant):
+        def cells(self) -> tuple[int, ...]:
+            raise KeyboardInterrupt
+
+    robot = connect_robot(PORT)(ScribblerPlatform(reading_max=6400))
+    target = RobotTarget(lambda: robot, ARENA, Asked(), name="scribbler:test")
+    told: list[ObservedTrial] = []
+    with pytest.raises(KeyboardInterrupt):
+        target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
+    assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 6)]
+
+
 def test_what_cannot_be_is_said_before_anything_moves() -> None:
     with pytest.raises(StudyError, match="Who places the robot at /dev/rfcomm0"):
         open_target("scribbler:/dev/rfcomm0", ARENA)

@@ -19,7 +19,7 @@ from ._predictive import Misfit, misfits
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
-from ._step import step_of
+from ._step import of_one_length, step_of
 
 __all__ = [
     "LEAST_PLACEMENTS",
@@ -59,6 +59,7 @@ __all__ = [
     "moved_in",
     "next_trials",
     "numbers_of",
+    "of_one_length",
     "path_plans",
     "placements_of",
     "predictive_check",

@@ -8,8 +8,7 @@ import numpy as np
 
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.trials import TrialPlan
-from realitygap.world import Arena, Pose
-from realitygap.world._obstacle import distance_to_segment
+from realitygap.world import Arena, Pose, distance_to_segment
 
 CLEAR = 0.015  # between a robot at its start and what is nearest [m]
 LONGEST = 8  # steps that one command goes on

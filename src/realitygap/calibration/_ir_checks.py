@@ -85,7 +85,7 @@ def _between(placements: list[Placement], rng: np.random.Generator) -> tuple[flo
     """Share of the variance at one distance that lies between placements, and its p value."""
     groups: dict[tuple[float, ...], list[Array]] = defaultdict(list)
     for placement in placements:
-        groups[tuple(np.round(placement.distances, 4))].append(np.asarray(placement.readings, np.float64))
+        groups[placement.group].append(np.asarray(placement.readings, np.float64))
     several = [rows for rows in groups.values() if len(rows) > 1 and np.ptp(np.concatenate(rows)) > 0]
     if not several:
         return 0.0, 1.0

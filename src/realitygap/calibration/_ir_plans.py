@@ -106,5 +106,8 @@ def placements_of(trials: Sequence[ObservedTrial], rays: Rays) -> list[list[Plac
         if not placements:
             placements = [[] for _ in distances]
         for k, each in enumerate(distances):
-            placements[k].append(Placement(np.asarray(each), trial.readings[:, k], trial.battery_v))
+            readings = trial.readings[:, k]
+            placements[k].append(
+                Placement(np.asarray(each), readings, trial.battery_v, place=tuple(trial.start))
+            )
     return placements

@@ -41,12 +41,19 @@ class Placement:
         readings: (n,) one after the other, 0..1.
         battery_v: [V]; nan where it is not known.
         cosines: (rays,) between each ray and the normal of what it meets; 1 for all where it is faced.
+        place: Which one was meant, equal for placements of one; by `distances` where nothing is said.
     """
 
     distances: Array
     readings: Array
     battery_v: float = math.nan
     cosines: Array | None = None
+    place: tuple[float, ...] = ()
+
+    @property
+    def group(self) -> tuple[float, ...]:
+        """Equal for placements that were to be the same."""
+        return self.place or tuple(np.round(self.distances, 4).tolist())
 
 
 @dataclass(frozen=True)

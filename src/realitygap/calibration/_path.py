@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 PATH_STEPS = 5
 """Full-speed commands of a trial (section 2.2)."""
 
+REST_STEPS = 2
+"""Commands in which the robot comes to rest: a ruler finds it there, and so do a camera and the simulation."""
+
 REPEATS = 5
 """Of each of the two paths, where no budget says otherwise."""
 
@@ -39,6 +42,9 @@ ENDS = (0.05, 0.95)
 
 STANDS = 1e-3
 """Way of five full steps below which a robot stood still [m]."""
+
+GAIN_SPREAD, UNEVEN_SPREAD, TRACK_SPREAD = 0.29, 0.115, 0.17
+"""Standard deviations of what is thought possible of gain, of their difference, and of the track, as shares."""
 
 STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
 
@@ -78,7 +84,7 @@ def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
     return [
         TrialPlan(
             start=starts[kinds[k % 2]],
-            commands=np.tile(kinds[k % 2], (PATH_STEPS, 1)),
+            commands=np.array([kinds[k % 2]] * PATH_STEPS + [(0.0, 0.0)] * REST_STEPS),
             number=k,
             purpose="path",
         )
@@ -124,8 +130,10 @@ def fit_path(
             "The robot stood still on all straight paths, expected one that drives at full speed. Is it switched on, "
             "are its batteries full, and do its wheels turn?"
         )
-    way = _mean([moved.way for moved in straight.moved], straight.length_step, n_draws, rng)
-    veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, n_draws, rng)
+    ways = [moved.way for moved in straight.moved]
+    way = _mean(ways, straight.length_step, GAIN_SPREAD * abs(ways[0]), n_draws, rng)
+    unknown = UNEVEN_SPREAD * abs(ways[0]) / robot.drive.track
+    veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, unknown, n_draws, rng)
     expected, base = simulate(straight.trials[0]), (robot.drive.gain_left + robot.drive.gain_right) / 2
     gain = base * way / expected.way
     track, turn = np.full(n_draws + 1, robot.drive.track), None
@@ -135,7 +143,8 @@ def fit_path(
                 "The robot did not turn in any trial that has it turn at full speed: expected one whose wheels turn "
                 "both ways."
             )
-        turn = _mean([moved.turned for moved in turning.moved], turning.angle_step, n_draws, rng)
+        turns = [moved.turned for moved in turning.moved]
+        turn = _mean(turns, turning.angle_step, TRACK_SPREAD * abs(turns[0]), n_draws, rng)
         track = robot.drive.track * (gain / base) * simulate(turning.trials[0]).turned / turn
     uneven = robot.drive.gain_right - robot.drive.gain_left
     uneven = uneven + (veer - expected.turned) * track * base / expected.way
@@ -145,9 +154,12 @@ def fit_path(
     numbers = {"drive.gain_left": gain - uneven / 2, "drive.gain_right": gain + uneven / 2}
     rows = _rows(straight, way, expected.way, gain, uneven)
     notes = [_in_jyro_steps(rows[1])]
+    if not turning.moved:
+        notes.append("In no trial it turned on the spot.")
     if turn is None:
         rows.append(_unknown_track(robot))
-        notes.append("Encoders tell how far wheels went, and not how far the robot turned.")
+        if turning.moved:
+            notes.append("Encoders tell how far wheels went, and not how far the robot turned.")
     else:
         numbers["drive.track"] = track
         rows += _rows_of_turning(turning, turn, track, robot)
@@ -171,11 +183,16 @@ class _Measured:
     trials: list[ObservedTrial]
     moved: list[Moved]
 
+    @property
+    def n_commands(self) -> int:
+        """Of full speed, in each."""
+        return len(_driven(self.trials[0]))
+
     @classmethod
     def of(
         cls, trials: Sequence[ObservedTrial], command: tuple[float, float], robot: RobotModel
     ) -> _Measured:
-        alike = [trial for trial in trials if len(trial.commands) and bool(np.all(trial.commands == command))]
+        alike = [trial for trial in trials if len(_driven(trial)) and bool(np.all(_driven(trial) == command))]
         measured = [(trial, moved_in(trial) or _by_encoders(trial, robot)) for trial in alike]
         kept = [(trial, moved) for trial, moved in measured if moved is not None]
         return cls([trial for trial, _ in kept], [moved for _, moved in kept])
@@ -194,6 +211,12 @@ class _Measured:
         return max((moved.angle_step for moved in self.moved), default=EXACT)
 
 
+def _driven(trial: ObservedTrial) -> Array:
+    """(t, 2) commands of a trial up to those in which it comes to rest."""
+    moving = np.flatnonzero(np.any(trial.commands != 0, axis=1))
+    return trial.commands[: moving[-1] + 1] if len(moving) else trial.commands[:0]
+
+
 def _by_encoders(trial: ObservedTrial, robot: RobotModel) -> Moved | None:
     """By the ways of the wheels, with the track that the robot's file has; None without encoders."""
     if not len(trial.wheels):
@@ -205,14 +228,20 @@ def _by_encoders(trial: ObservedTrial, robot: RobotModel) -> Moved | None:
     return Moved(float(chord * np.cos(half)), float(chord * np.sin(half)), turned)
 
 
-def _mean(values: Sequence[float], step: float, n_draws: int, rng: np.random.Generator) -> Array:
+def _mean(
+    values: Sequence[float], step: float, unknown: float, n_draws: int, rng: np.random.Generator
+) -> Array:
     """(1 + n,) the mean, and draws of where it may be.
 
-    Repeats that all read the same are as uncertain as what they were read to.
+    Repeats that all read the same are as uncertain as what they were read to; one alone is as uncertain as `unknown`,
+    the standard deviation of what was thought possible.
     """
     n = len(values)
-    variance = max(float(np.var(values, ddof=1)) if n > 1 else 0.0, step**2 / 12)
-    spread = rng.standard_t(max(n - 1, 1), size=n_draws) * np.sqrt(variance / n)
+    if n == 1:
+        spread = unknown * rng.standard_normal(n_draws)
+    else:
+        variance = max(float(np.var(values, ddof=1)), step**2 / 12)
+        spread = rng.standard_t(n - 1, size=n_draws) * np.sqrt(variance / n)
     mean: Array = np.mean(values) + np.concatenate([[0.0], spread])
     return mean
 
@@ -229,19 +258,19 @@ def _of_a_robot(*numbers: Array) -> NDArray[np.intp]:
 
 def _rows(straight: _Measured, way: Array, expected: float, gain: Array, uneven: Array) -> list[Fitted]:
     """What straight paths tell."""
-    repeats, step = len(straight.moved), way / len(straight.trials[0].commands)
+    repeats, step = len(straight.moved), way / straight.n_commands
     return [
         _row("path.step_length", step, "m", (0.01, 0.2), repeats),
         _row("path.jyro_steps", ROBOT_STEPS * step / JYRO_STEP, "", (10.0, 200.0), repeats),
         _row("path.sim_steps", ROBOT_STEPS * way / expected, "", (50.0, 150.0), repeats),
         _row("drive.gain", gain, "", (0.5, 1.5), repeats),
-        _row("drive.asymmetry", uneven, "", (-0.2, 0.2), repeats),
+        _row("drive.asymmetry", -uneven, "", (-0.2, 0.2), repeats),  # left less right, as everywhere
     ]
 
 
 def _rows_of_turning(turning: _Measured, turn: Array, track: Array, robot: RobotModel) -> list[Fitted]:
     """What turns on the spot tell."""
-    repeats, step = len(turning.moved), turn / len(turning.trials[0].commands)
+    repeats, step = len(turning.moved), turn / turning.n_commands
     return [
         _row("path.step_turn", step, "rad", (0.0, 3.2), repeats),
         _row("drive.track", track, "m", _track_prior(robot), repeats),

@@ -15,6 +15,7 @@ from realitygap.errors import DescriptionError, StudyError
 from ._camera import CAMERA_HELP, under_camera
 
 if TYPE_CHECKING:
+    from realitygap.trials import OnLost
     from realitygap.world import Calibration
 
 _OBSERVE = ("cells", "encoders", "track")
@@ -211,9 +212,12 @@ def _measured(
     try:
         beside = TerminalAttendant(where) if is_led else None
         guide = TerminalGuide(where, model) if is_led else None
+        on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
         with (
             under_camera(camera, where, beside) as attendant,
-            open_target(robot, where, key=seed, witness=witness, attendant=attendant) as target,
+            open_target(
+                robot, where, key=seed, witness=witness, attendant=attendant, on_lost=on_lost
+            ) as target,
         ):
             return calibrate(
                 what,

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from realitygap.trials import TrialPlan
     from realitygap.world import Arena, Pose
 
-_NO_LINE = ("path", "sensors")
-"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
-
 
 class TerminalAttendant(RobotsOwnSenses):
     """Counts the cells of trials that are drawn; that the robot stands at its start is asked before."""
@@ -56,7 +53,9 @@ class TerminalAttendant(RobotsOwnSenses):
 
     def cells(self) -> tuple[int, ...]:
         """Those that its line crosses, as they are picked in the terminal."""
-        if self._plan is None or self._plan.purpose in _NO_LINE:
+        from realitygap.study import NO_LINE
+
+        if self._plan is None or self._plan.purpose in NO_LINE:
             return ()
         while True:
             cells = pick_cells(self._arena)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from realitygap.study import TransferResult
+    from realitygap.study import Estimate, TransferResult
 
 
 def transfer(
@@ -91,7 +91,7 @@ def transfer(
     arena = choose_condition(study, condition, seed).arena.arena()
     folder = out or Path("results/transfer")
     try:
-        with opened_target(to, arena, witness=witness, processes=processes) as target:
+        with opened_target(to, arena, witness=witness, processes=processes, seed=seed) as target:
             result = carry_out(
                 study,
                 target,
@@ -118,6 +118,11 @@ def transfer(
     typer.echo(f"Results: {folder}   champions: {folder / 'champions'}")
 
 
+def _with_interval(found: Estimate) -> str:
+    ends = "" if found.low is None else f" ({found.low:.3f} to {found.high:.3f})"
+    return f"{found.estimate:.3f}{ends}"
+
+
 def _print(result: TransferResult) -> None:
     typer.echo(
         f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
@@ -125,9 +130,7 @@ def _print(result: TransferResult) -> None:
     )
     typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:
-        quality, regret = (
-            f"{each.estimate:.3f} ({each.low:.3f} to {each.high:.3f})" for each in (row.quality, row.regret)
-        )
+        quality, regret = map(_with_interval, (row.quality, row.regret))
         simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
         typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
     if result.replicates == 1:

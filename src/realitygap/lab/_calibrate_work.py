@@ -13,6 +13,7 @@ from realitygap.report import save_sensor_figure
 from realitygap.robots import Clock, Robot
 from realitygap.robots.scribbler import is_in_this_program
 from realitygap.study import (
+    NO_LINE,
     StoppedByPerson,
     calibrate,
     open_target,
@@ -21,14 +22,12 @@ from realitygap.study import (
     save_calibration,
     with_ruled_end,
 )
-from realitygap.trials import RobotsOwnSenses, TrialPlan
+from realitygap.trials import OnLost, RobotsOwnSenses, TrialPlan
 from realitygap.world import INCH, Arena, Calibration, Pose, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
 
 ROBOT = "scribbler:"
-_NO_LINE = ("path", "sensors")
-"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
 _QUESTIONS = {
     "ahead": "How far ahead of its start does it stand [in]?",
     "left": "How far to the left of it [in]?",
@@ -56,8 +55,11 @@ def work(channel: Channel, order: Message) -> None:
     attendant = _Attendant(channel, arena) if is_led else None
     guide = _Guide(channel, arena, robot, growing) if is_led else None
     seed = int(order.get("seed") or 0)
+    on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
     try:
-        with open_target(platform, arena, key=seed, witness=witness, attendant=attendant) as target:
+        with open_target(
+            platform, arena, key=seed, witness=witness, attendant=attendant, on_lost=on_lost
+        ) as target:
             made = calibrate(
                 order["kind"],
                 target,
@@ -174,7 +176,7 @@ class _Attendant(RobotsOwnSenses):
 
     def cells(self) -> tuple[int, ...]:
         """Those that its line crosses, as they are tapped."""
-        while self._purpose not in _NO_LINE:
+        while self._purpose not in NO_LINE:
             given = self._channel.ask("cells").get("cells") or []
             cells = sorted({each for each in given if type(each) is int and 0 <= each < self._n_cells})
             if cells:

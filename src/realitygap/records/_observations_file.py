@@ -124,6 +124,9 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
     for name, n in rows.items():
         if n != t:
             raise ValueError(f"a trial with {t} commands whose {name} are of {n}")
+    for name in ("start", "commands", "readings", "wheels", "poses"):
+        if not np.all(np.isfinite(getattr(trial, name))):
+            raise ValueError(f"a trial whose {name} are not all numbers")
     return trial
 
 
@@ -187,6 +190,8 @@ class ObservationsFile:
         there, wanted = found.head.to_dict(), self.head.to_dict()
         of_no_matter = not_compared(there, wanted)
         other = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
+        if other and not found.trials:
+            return 0  # nobody's yet
         if other:
             what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
             raise RecordError(

@@ -3,6 +3,7 @@
 from ._bench import measure_speed
 from ._calibrate import calibrate, calibrate_from, save_calibration
 from ._calibrate_all import calibrate_all
+from ._calibrate_kinds import NO_LINE
 from ._camera_attendant import CameraAttendant, Looking
 from ._camera_operator import CameraOperator
 from ._camera_spec import marks_of, read_camera, tag_of
@@ -13,7 +14,7 @@ from ._closing_summary import summarize_closing
 from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
-from ._gap import GapStudy, run_gap, study_gap
+from ._gap import MOST_CONTROLLERS, GapStudy, run_gap, study_gap
 from ._gap_between import GapBetween, gap_between
 from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._mazes import MAZE_SEEDS, measure_maze
@@ -47,6 +48,8 @@ __all__ = [
     "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
+    "MOST_CONTROLLERS",
+    "NO_LINE",
     "PARTS",
     "SECTIONS",
     "SMALL",

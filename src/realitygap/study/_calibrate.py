@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import datetime
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from realitygap.calibration import ruled, step_of
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.calibration import of_one_length, ruled, step_of
+from realitygap.errors import RecordError, StudyError, did_you_mean
 from realitygap.records import (
     OBSERVATIONS,
     Observations,
@@ -22,11 +23,11 @@ from realitygap.records import (
     write_whole,
 )
 from realitygap.robots import DEFAULT_ROBOT
-from realitygap.trials import Target, TrialPlan
-from realitygap.world import Arena, Calibration, RobotModel, load_robot, read_calibration
+from realitygap.trials import Target, TrialPlan, is_taken_back, is_whole
+from realitygap.world import Arena, Calibration, Fitted, RobotModel, load_robot, read_calibration
 
 from ._calibrate_kinds import ALL_TRIALS, KINDS, LEAST_TO_CHOOSE, SOFTWARE, Kind, Parts
-from ._targets import observations_head
+from ._targets import observations_head, refuse_more_than_is_seen
 from ._wrapped_targets import (
     PATH,
     CountingTarget,
@@ -34,7 +35,6 @@ from ._wrapped_targets import (
     GuidedTarget,
     ResumableTarget,
     RuledTarget,
-    is_whole,
 )
 
 SEED_STRIDE = 10_000
@@ -106,7 +106,8 @@ def _calibrated(
 ) -> Calibration:
     if choose:
         return _chosen(target, robot, observe, ALL_TRIALS if budget is None else budget, seed, tell)
-    plans = _plans(KINDS[kind], target.arena, load_robot(robot), budget)
+    paced = load_robot(robot).model_copy(update={"step_s": target.step_s})
+    plans = _plans(KINDS[kind], target.arena, paced, budget)
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
@@ -157,6 +158,7 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
             f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
             f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
         )
+    refuse_more_than_is_seen(target, observe)
     refuse_other_sensors(base, target)
 
 
@@ -192,16 +194,35 @@ def calibrate_from(
     _check_kind(kind)
     found = read_observations(data)
     robot = found.head.robot if robot is None else robot
-    arena = Arena.from_dict(dict(found.head.arena))
+    arena = _arena_of(data, found)
     seen = observe or found.head.observe
     if OBSERVATIONS.index(seen) > OBSERVATIONS.index(found.head.observe):
         raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
     trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
+    _refuse_other_readings(trials, load_robot(robot))
     parts = _fit(kind, trials, robot, arena, seen, seed)
     made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials, arena, seed)
     last = datetime.datetime.fromtimestamp(data.stat().st_mtime, datetime.UTC)
     more = {"measured": last.isoformat(timespec="seconds")}
     return made.model_copy(update=more | ({"notes": (*made.notes, found.problem)} if found.problem else {}))
+
+
+def _arena_of(path: Path, found: Observations) -> Arena:
+    try:
+        return Arena.from_dict(dict(found.head.arena))
+    except (KeyError, TypeError, ValueError) as error:
+        raise RecordError(
+            f"{path} is damaged: its first line has no arena that can be read ({error})."
+        ) from None
+
+
+def _refuse_other_readings(trials: Sequence[ObservedTrial], robot: RobotModel) -> None:
+    others = {trial.readings.shape[1] for trial in trials if len(trial.readings)} - {len(robot.range)}
+    if others:
+        raise StudyError(
+            f"The trials have {min(others)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on the "
+            "robot that it was (--base ROBOT)."
+        )
 
 
 def save_calibration(path: Path, calibration: Calibration) -> None:
@@ -239,16 +260,24 @@ def _fit(
     seed: int,
 ) -> Parts:
     base = load_robot(robot)
+    alike, left_out = (trials, "") if kind == "sensors" else of_one_length(trials)
     try:
-        return KINDS[kind].fit(trials, base, arena, observe, seed)
+        parts = KINDS[kind].fit(alike, base, arena, observe, seed)
     except ValueError as error:
         raise StudyError(str(error)) from error
+    return replace(parts, notes=(*parts.notes, left_out)) if left_out else parts
 
 
 def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:
-    """Trials that were cut off, and those of which a later one with the same number took the place, are left out."""
-    whole = [trial for trial in found.trials if is_whole(trial)]
-    return list({(trial.purpose, trial.number, trial.start): trial for trial in whole}.values())
+    """Trials that were cut off or taken back are left out, and those whose place a later one took."""
+    last: dict[object, ObservedTrial] = {}
+    for trial in found.trials:
+        what = (trial.purpose, trial.number, trial.start)
+        if is_whole(trial):
+            last[what] = trial
+        elif is_taken_back(trial):
+            last.pop(what, None)
+    return list(last.values())
 
 
 def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
@@ -276,14 +305,13 @@ def _calibration(
     flagged, p = parts.misspecified, parts.misspecification_p
     name = str(robot)
     _refuse_no_robot(parts, robot, target)
-    step_s = round(step_of(trials), 4) if trials and kind != "sensors" else 0.0
+    step_s = round(step_of(of_one_length(trials)[0]), 4) if trials and kind != "sensors" else 0.0
     if below is not None:
         step_s = step_s or below.step_s
         name = below.robot
         numbers = {**below.numbers, **numbers}
         draws = _paired(below.draws, draws)
-        names = {each.name for each in fitted}
-        fitted = (*(each for each in below.fitted if each.name not in names), *fitted)
+        fitted = (*_still_said(below.fitted, parts), *fitted)
         notes = (*notes, f"Builds on {Path(robot).name}: {below.kind} of {below.target}, {below.date}.")
         if below.misspecified and kind != "all":  # which fits all numbers anew
             flagged, p = True, min(p, below.misspecification_p)
@@ -309,6 +337,25 @@ def _calibration(
         notes=tuple(notes),
         evidence=parts.evidence,
     )
+
+
+def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
+    """What an earlier calibration says of numbers that a later one has not fitted anew.
+
+    `range.amplitude` is that of all sensors together, and `range.0.amplitude` of one; steps of a path follow from
+    gains.
+    """
+
+    def of_all(name: str) -> str:
+        return re.sub(r"\.\d+\.", ".", name)
+
+    anew = {of_all(name) for name in (*(each.name for each in parts.fitted), *parts.numbers)}
+    has_other_gains = "drive.gain_left" in anew
+    return [
+        each
+        for each in below
+        if of_all(each.name) not in anew and not (has_other_gains and each.name.startswith("path."))
+    ]
 
 
 def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:

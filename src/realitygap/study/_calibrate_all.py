@@ -26,6 +26,7 @@ from realitygap.calibration import (
     mixed,
     next_trials,
     numbers_of,
+    of_one_length,
     random_controllers,
     ranges_of,
     scribbler_prior,
@@ -99,14 +100,16 @@ def calibrate_all(
     is_chosen = choose and budget >= LEAST_TO_CHOOSE
     first = round(BEFORE_CHOICE * budget) if is_chosen else budget
     say(f"{first} trials on {target.name}, {observe} observed")
-    trials = list(target.carry_out(plans[:first], observe, told))
+    carried_out = list(target.carry_out(plans[:first], observe, told))
+    trials, left_out = of_one_length(carried_out)
     if trials:
         platform = platform.model_copy(update={"step_s": step_of(trials)})
     fit = _Fit(platform, target.arena, seed, say, threads)
     if is_chosen:
         chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
         say(f"{len(chosen)} more trials, chosen")
-        trials += target.carry_out(chosen, observe, told)
+        carried_out += target.carry_out(chosen, observe, told)
+        trials, left_out = of_one_length(carried_out)
     parts = fit.parts(trials, effort)
     return Calibration(
         kind="all",
@@ -114,7 +117,7 @@ def calibrate_all(
         target=target.name,
         label=target.label,
         observe=observe,
-        trials=len(trials),
+        trials=len(carried_out),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         arena=target.arena.name,
         seed=seed,
@@ -126,7 +129,7 @@ def calibrate_all(
         step_s=step_of(trials) if trials else 0.0,
         misspecified=parts.misspecified,
         misspecification_p=parts.misspecification_p,
-        notes=parts.notes,
+        notes=(*parts.notes, left_out) if left_out else parts.notes,
         evidence=parts.evidence,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,6 +26,7 @@ from realitygap.calibration import (
     fit_path,
     fit_sensor,
     motion_plans,
+    moved_in,
     path_plans,
     placements_of,
     ranges_of,
@@ -35,7 +37,7 @@ from realitygap.calibration import (
 from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
 from realitygap.robots import Command, SimPlatform
 from realitygap.trials import SimEnsemble, SimRobot, TrialPlan
-from realitygap.world import Arena, Fitted, Pose, RobotModel
+from realitygap.world import Arena, Fitted, Pose, RobotModel, distance_to_segment
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,18 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
 
 # path
 
+AT_A_WALL = 0.01
+"""Robots that end so near to a wall beside their radius may have been stopped by it [m]."""
+
+MOST_TURN = 0.9 * math.pi
+"""By a command, of which a camera sees the beginning and the end [rad]."""
+
+FAR_M = 20.0
+"""Nothing stands nearer where a path is simulated [m]."""
+
+NO_LINE = ("path", "sensors", "motion")
+"""Purposes of trials of which no cells are counted: a ruler, readings or encoders tell what there is to tell."""
+
 _PATH_METHOD = (
     "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
     "simulated robot; Student's intervals from repeats and from the step to which was read."
@@ -107,17 +121,55 @@ def _fit_path(
     def simulate(trial: ObservedTrial) -> Moved:
         return _moved_in_sim(trial, robot, arena)
 
-    fit = fit_path(trials, simulate, robot, np.random.default_rng(seed))
+    free = [trial for trial in trials if not _ends_at_a_wall(trial, robot, arena)]
+    if trials and not free:
+        raise ValueError(
+            f"All {len(trials)} paths ended at a wall, expected room for them: is arena {arena.name!r} the right one, "
+            f"and is a command of {trials[0].step_s:g} s right?"
+        )
+    fit = fit_path(free, simulate, robot, np.random.default_rng(seed))
+    n = len(trials) - len(free)
+    left_out = (f"{n} of {len(trials)} paths ended at a wall, and were left out.",) if n else ()
+    notes = (*fit.notes, *left_out)
     return _told_of_ends(
-        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, fit.notes, evidence={"path": fit.evidence}),
+        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, notes, evidence={"path": fit.evidence}),
         is_cut=False,
     )
 
 
+def _ends_at_a_wall(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> bool:
+    """Whether something stopped the robot in a trial; where nobody saw its end, by what it said itself.
+
+    One that went back has been told wrongly which of its ends is ahead: that is said elsewhere.
+    """
+    moved = moved_in(trial)
+    if moved is not None and moved.ahead < 0:
+        return False
+    ends = trial.poses[-1] if len(trial.poses) else trial.end_pose
+    if ends is None:
+        return bool(len(trial.stalled)) and float(np.mean(trial.stalled)) > 0.5
+    near = min((distance_to_segment(ends[0], ends[1], wall) for wall in arena.segments), default=math.inf)
+    return near < robot.radius + AT_A_WALL
+
+
 def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
-    """How the simulated robot moves in a trial, without noise."""
+    """How the simulated robot moves in a trial, without noise, where nothing stands in its way.
+
+    Raises:
+        ValueError: A command turns it by so much that turns cannot be counted.
+    """
     platform = SimPlatform(robot=robot, noise=False, step_s=trial.step_s, precision="double")
-    with SimRobot(platform, arena) as simulated:
+    most = float(np.abs(trial.commands[:, 1]).max(initial=0.0))
+    turned_by = 2 * robot.drive.speed * trial.step_s / robot.drive.track * most
+    if turned_by > MOST_TURN:
+        raise ValueError(
+            f"A command of {trial.step_s:g} s turns the robot by {math.degrees(turned_by):.0f} degrees, expected at "
+            f"most {math.degrees(MOST_TURN):.0f}: turns cannot be counted. Let commands be shorter."
+        )
+    walls = [x for wall in arena.walls for x in wall] or [0.0]
+    low, high = min(walls) - FAR_M, max(walls) + FAR_M
+    around = ((low, low, high, low), (high, low, high, high), (high, high, low, high), (low, high, low, low))
+    with SimRobot(platform, replace(arena, walls=around, obstacles=())) as simulated:
         simulated.reset(Pose(*trial.start))
         headings = [trial.start[2]]
         for move, turn in trial.commands:
@@ -206,11 +258,7 @@ def _said_of(fit: SensorFit) -> str:
 
 
 def _said_of_placements(placements: Sequence[Placement]) -> tuple[str, ...]:
-    at: dict[float, int] = {}
-    for placement in placements:
-        near = round(float(placement.distances.min()), 3)
-        at[near] = at.get(near, 0) + 1
-    if min(at.values()) >= LEAST_PLACEMENTS:
+    if min(Counter(placement.group for placement in placements).values()) >= LEAST_PLACEMENTS:
         return ()
     return (
         f"Some distances have fewer than {LEAST_PLACEMENTS} placements: what lies between placements cannot be told "

@@ -23,7 +23,7 @@ from realitygap.gap import (
     replay_error,
 )
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import SimTarget, Target, TrialPlan
+from realitygap.trials import SimTarget, Target, TrialPlan, is_whole
 from realitygap.world import Arena, Pose
 
 from ._controllers import Controller
@@ -171,7 +171,7 @@ def study_gap(
     result = replace(
         result,
         luck=_luck(controllers),
-        reevolved=_reevolved(controllers, one, reevolved, on_target[len(plans) :], target),
+        reevolved=_reevolved(controllers, source, one, reevolved, on_target[len(plans) :], target),
         notes=(*_notes([*in_source, *on_target]), *said),
     )
     return GapStudy(
@@ -240,12 +240,14 @@ def _carry_out_kept(
     if results is None:
         return _carry_out(target, plans, observe, tell)
     with ObservationsFile(results, observations_head(target, observe)) as file:
-        kept = {(trial.number, trial.genome): trial for trial in file.trials}
+        kept = {(trial.number, trial.genome): trial for trial in file.trials if is_whole(trial)}
         keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
         missing = [k for k, key in enumerate(keys) if key not in kept]
 
         def keep(k: int, trial: ObservedTrial) -> None:
             file.append(trial)
+            if not is_whole(trial):
+                return
             kept[keys[missing[k]]] = trial
             if tell is not None:
                 tell(target.name, len(plans) - len(missing) + k + 1, len(plans))
@@ -320,6 +322,7 @@ def _luck(controllers: Sequence[Controller]) -> Estimate:
 
 def _reevolved(
     controllers: Sequence[Controller],
+    source: Target,
     in_source: GapSide,
     reevolved: Sequence[Controller],
     on_target: Sequence[ObservedTrial],
@@ -328,12 +331,19 @@ def _reevolved(
     """Quality of what was evolved on the target, there, less that of what was evolved in simulation, in simulation."""
     if not reevolved:
         return Estimate.refusal(0, "Nothing was evolved on the target (--reevolved).")
-    here = in_source.means[[k for k, each in enumerate(controllers) if each.kind == "champion"]]
-    if not len(here):
+    champions = [(k, each) for k, each in enumerate(controllers) if each.kind == "champion"]
+    if not champions:
         return Estimate.refusal(
             0,
             "The controllers are no champions of a simulator (--controllers STUDY), so nothing was evolved there.",
         )
+    family = source.name.partition(":")[0]
+    elsewhere = {each.selected_on for _, each in champions if each.selected_on.partition(":")[0] != family}
+    if elsewhere:
+        return Estimate.refusal(
+            0, f"The controllers were evolved on {', '.join(sorted(elsewhere))}, and not on {source.name}."
+        )
+    here = in_source.means[[k for k, _ in champions]]
     there = side_of(target, on_target, len(reevolved)).means
     return difference_of_groups(here, there)
 

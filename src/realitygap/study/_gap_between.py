@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,7 @@ from realitygap.records import Observe
 from realitygap.trials import Attendant, RecordedTarget, Target
 from realitygap.world import Arena, Calibration, load_arena
 
-from ._controllers import recorded_controllers, sample_controllers
+from ._controllers import Controller, recorded_controllers, sample_controllers
 from ._gap import STEPS, GapStudy, Tell, study_gap
 from ._targets import open_target, refuse_more_than_is_seen
 from ._why import calibration_of, why_gap
@@ -88,6 +88,11 @@ def gap_between(
     """
     recorded = recorded_controllers(target) if controllers == "random" else []
     steps = STEPS
+    if len(recorded) == 1:
+        raise StudyError(
+            f"The trials in {target.partition(':')[2]} are of one controller, expected at least 2: a gap is told from "
+            "how several differ. Record more, such as with: realitygap gap SIM TARGET -o FILE"
+        )
     if recorded:
         n_controllers, trials = min(n_controllers, len(recorded)), min(trials, recorded[0][1])
         there_before = RecordedTarget(target.partition(":")[2])
@@ -98,6 +103,10 @@ def gap_between(
         raise StudyError(
             f"Parts of the model are switched in from a calibration, and {sim} is none. Make one with: realitygap "
             f"calibrate all --robot {target} --observe {observe} -o fit.toml; then measure the gap of sim:fit.toml."
+        )
+    if why and noise and sim != "jyro":
+        raise StudyError(
+            f"--why switches parts of the model in without the paper's noise, and --noise is {noise:g}. Leave one out."
         )
     if why and trials < 2:
         raise StudyError(
@@ -111,11 +120,17 @@ def gap_between(
         tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
         chosen = sample_controllers(controllers, n_controllers, seed)
     there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
+    _refuse_elsewhere(there, str(reevolved), target)
     with (
         _open(sim, place, noise, 2 * seed, randomize=randomize) as source,
         _open(target, place, noise, 2 * seed + 1, processes, witness, attendant) as costly,
     ):
         refuse_more_than_is_seen(costly, observe)
+        if costly.label == "REAL" and results is None:
+            raise StudyError(
+                f"{n_controllers * trials} trials on {target} would be kept nowhere, and lost where anything goes "
+                "wrong. Name a file for them (-o FILE.jsonl): the same command goes on there."
+            )
         found = study_gap(
             source,
             costly,
@@ -139,6 +154,21 @@ def gap_between(
             calibration, place, genomes, found.target, steps=steps, step_s=found.step_s, seed=seed
         )
     return GapBetween(found, parts)
+
+
+def _refuse_elsewhere(reevolved: Sequence[Controller], named: str, target: str) -> None:
+    """Return where all were evolved on the target, before trials are spent on them.
+
+    Raises:
+        StudyError: One was not.
+    """
+    for each in reevolved:
+        where = each.selected_on or "nowhere"
+        if each.kind != "champion" or where.partition(":")[0] != target.partition(":")[0]:
+            raise StudyError(
+                f"{each.name} of --reevolved {named} was evolved {'on ' if each.selected_on else ''}{where}, expected "
+                f"champions evolved on {target}."
+            )
 
 
 def _misspecified(calibration: Calibration | None) -> bool | None:

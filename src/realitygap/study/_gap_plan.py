@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from realitygap.errors import StudyError
 from realitygap.gap import Needed, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.records import read_observations
+from realitygap.trials import is_whole
 from realitygap.world import Arena, load_arena
 
 from ._controllers import sample_controllers
-from ._gap import plans_of, side_of
+from ._gap import MOST_CONTROLLERS, plans_of, side_of
 from ._targets import open_target
 
 TRIALS = (1, 2, 5, 10, 20, 50)
@@ -62,8 +63,8 @@ class GapPlan:
 
     @property
     def best(self) -> Needed | None:
-        """The row with the fewest trials on the target in all; None where nothing would do."""
-        there = [row for row in self.needed if row.on_target is not None]
+        """The row with the fewest trials on the target in all; None where no gap can be measured by so many."""
+        there = [row for row in self.needed if row.controllers and row.controllers <= MOST_CONTROLLERS]
         return min(there, key=lambda row: row.on_target or 0) if there else None
 
 
@@ -88,7 +89,7 @@ def recorded_spreads(path: str) -> Spreads:
     n_cells = Arena.from_dict(dict(found.head.arena)).grid.n_cells
     by_genome: dict[str, list[float]] = {}
     for trial in found.trials:
-        if trial.genome:
+        if trial.genome and is_whole(trial):
             by_genome.setdefault(trial.genome, []).append(len(trial.cells) / n_cells)
     repeated = [values for values in by_genome.values() if len(values) > 1]
     if len(repeated) < 2:

@@ -6,6 +6,8 @@ import math
 import re
 from dataclasses import replace
 
+import numpy as np
+
 from realitygap.calibration import distance_of, end_pose_of
 from realitygap.records import ObservedTrial
 from realitygap.trials import TrialPlan
@@ -22,13 +24,10 @@ def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
             f"put it square to a wall, its sensors {inches:g} in from it and nothing else near. It reads "
             f"{len(plan.commands)} times and does not move."
         )
+    n = int(np.any(plan.commands != 0, axis=1).sum())
     if plan.purpose == "path" and plan.commands[0, 0] != 0:
-        return (
-            f"put it with 24 in free ahead, and mark where it stands. It drives {len(plan.commands)} full steps "
-            "ahead."
-        )
+        return f"put it with 24 in free ahead, and mark where it stands. It drives {n} full steps ahead."
     if plan.purpose == "path":
-        n = len(plan.commands)
         return f"put it free on all sides, and mark which way it faces. It turns for {n} full steps."
     start = plan.start or arena.start
     left = min(x for wall in arena.walls for x in wall[::2])
@@ -46,7 +45,7 @@ def parse_length(text: str) -> float | None:
     if found is None:
         return None
     sign, whole, over, under, alone_over, alone_under = found.groups()
-    if "0" in (under or "1", alone_under or "1"):
+    if 0 in (int(under or 1), int(alone_under or 1)):
         return None
     value = float(whole) if whole else int(alone_over) / int(alone_under)
     value += int(over) / int(under) if over else 0.0

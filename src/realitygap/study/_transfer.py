@@ -9,12 +9,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, not_compared, write_whole
+from realitygap.records import OBSERVATIONS, Observe, not_compared, read_observations, write_whole
 from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
-from realitygap.trials import Target
+from realitygap.trials import Target, is_whole
 from realitygap.world import load_calibration, load_robot
 
 from ._file import load_study
@@ -51,6 +53,9 @@ NEED_SIM = ("randomized", *CALIBRATE)
 
 WITHOUT_TRIALS = ("plain",)
 """Strategies that spend nothing: carried out once for all budgets."""
+
+SEED_STRIDE = 1_000
+"""Between the seeds of calibrations of transfers with different seeds: there are at most so many replicates."""
 
 NUMBERS = 10_000
 """Trials of a replicate have numbers of their own, so many apart; the fresh ones are in the upper half."""
@@ -169,7 +174,7 @@ def transfer(
     champions = [
         work.carry_out(name, n, r) for name in names for n in budgets for r in range(plan.replicates)
     ]
-    rows, best = summarize_transfer(champions)
+    rows, best = summarize_transfer(champions, work.known())
     result = TransferResult(
         plan.study,
         plan.condition,
@@ -284,12 +289,23 @@ class _Work:
         genome = champion.genome.to_json()
         return Transferred(strategy, budget, kept.spent, replicate, genome, simulated, coverage)
 
+    def known(self) -> list[float]:
+        """Mean shares of cells of all champions that were tried in this folder, by this call or an earlier one."""
+        files = sorted((self.folder / "fresh").glob("*.jsonl"))
+        tried = [[each for each in read_observations(file).trials if is_whole(each)] for file in files]
+        return [
+            float(np.mean([coverage_of(trial, self.target) for trial in trials]))
+            for trials in tried
+            if len(trials) >= self.plan.fresh_trials
+        ]
+
     def _calibration(self, replicate: int) -> Calibrating:
         """How the replicate's calibrations come about."""
         file = Path(self.plan.calibration) if self.plan.calibration else None
         first, observe = replicate * NUMBERS, self.plan.observe
+        seed = SEED_STRIDE * self.plan.seed + replicate
         return Calibrating(
-            self.target, self.folder / "calibrations", first, replicate, observe, file, self.tell
+            self.target, self.folder / "calibrations", first, replicate, seed, observe, file, self.tell
         )
 
     def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:

@@ -75,7 +75,8 @@ class Calibrating:
         target: What is observed.
         folder: Where calibrations and their trials are kept.
         first_number: Of the trials.
-        seed: Of what is drawn while fitting.
+        replicate: Of the transfer.
+        seed: Of the trials' commands, and of what is drawn while fitting.
         observe: How much is seen.
         file: The calibration that was given; None where there is none.
         tell: Told what is going on.
@@ -84,6 +85,7 @@ class Calibrating:
     target: Target
     folder: Path
     first_number: int
+    replicate: int
     seed: int
     observe: Observe
     file: Path | None
@@ -114,15 +116,18 @@ class Calibrating:
 
     def _on_budget(self, condition: Condition, n: int) -> Calibration:
         """A calibration by n trials, or the one that is there."""
-        name = f"{n}-{self.observe}-{self.seed}"
+        name = f"{n}-{self.observe}-{self.replicate}"
         path = self.folder / f"{name}.toml"
         if path.exists():
             return load_calibration(path)
         self.tell(f"calibrating by {n} trials, {self.observe} observed")
         trials = self.folder / f"{name}.jsonl"
         with KeptTarget(self.target, trials, n, self.first_number, observe=self.observe) as kept:
-            calibration = calibrate_all(
-                kept, robot=condition.sim.robot, observe=self.observe, budget=n, seed=self.seed
-            )
+            try:
+                calibration = calibrate_all(
+                    kept, robot=condition.sim.robot, observe=self.observe, budget=n, seed=self.seed
+                )
+            except ValueError as error:
+                raise StudyError(f"{error} The trials are kept in {trials}.") from error
         write_whole(path, calibration.to_toml().encode())
         return calibration

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
@@ -9,10 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap import _special as special
+
 CONFIDENCE = 0.95
-RESAMPLES = 4000
-SEED = 7
-"""Of the resampling: the same figures each time."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class Transferred:
 
 
 class Estimate(NamedTuple):
-    """A number with its 95 % interval; n champions stand behind it."""
+    """A number with its 95 % interval, None where there is none; n champions stand behind it."""
 
     estimate: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     n: int
 
 
@@ -106,20 +106,27 @@ class TransferResult:
         return found
 
 
-def summarize_transfer(champions: Sequence[Transferred]) -> tuple[tuple[Strategist, ...], float]:
+def summarize_transfer(
+    champions: Sequence[Transferred], known: Sequence[float] = ()
+) -> tuple[tuple[Strategist, ...], float]:
     """Quality and regret by strategy and budget, in the order in which they come, and the best known quality.
 
-    Intervals are of a bootstrap that resamples replicates, and within each its fresh trials; of a single replicate only
-    the trials, so that nothing is said of another evolution.
+    Intervals are of means over replicates; of a single replicate they are of its fresh trials, and nothing is said of
+    another evolution. Regret is to the best, taken as it is.
+
+    Args:
+        champions: With their fresh trials.
+        known: Qualities of others on the same target.
     """
-    best = max(champion.quality for champion in champions)
+    best = max([*known, *(champion.quality for champion in champions)])
     groups: dict[tuple[str, int], list[Transferred]] = {}
     for champion in champions:
         groups.setdefault((champion.strategy, champion.budget), []).append(champion)
     rows = []
     for (strategy, budget), group in groups.items():
         quality = estimate_mean(np.array([champion.coverage for champion in group]))
-        regret = Estimate(best - quality.estimate, best - quality.high, best - quality.low, quality.n)
+        low, high = (None if end is None else best - end for end in (quality.high, quality.low))
+        regret = Estimate(best - quality.estimate, low, high, quality.n)
         simulated = [champion.simulated for champion in group if champion.simulated is not None]
         mean = float(np.mean(simulated)) if simulated else None
         rows.append(Strategist(strategy, budget, quality, regret, mean))
@@ -127,10 +134,17 @@ def summarize_transfer(champions: Sequence[Transferred]) -> tuple[tuple[Strategi
 
 
 def estimate_mean(values: NDArray[np.float64]) -> Estimate:
-    """The mean of values (r, t), t trials of each of r replicates, by a bootstrap over replicates and trials."""
-    rng = np.random.default_rng(SEED)
+    """The mean of values (r, t), t trials of each of r replicates, with Student's interval over replicates.
+
+    A resampling of two or three would repeat each of them, and end at the extremes. Replicates that happen to be alike
+    are as uncertain as their trials make them. Of one replicate the interval is over its trials; of one trial there is
+    none.
+    """
     r, t = values.shape
-    who = rng.integers(r, size=(RESAMPLES, r, 1))
-    means = values[who, rng.integers(t, size=(RESAMPLES, r, t))].mean(axis=(1, 2))
-    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return Estimate(float(values.mean()), float(low), float(high), r)
+    mean, means = float(values.mean()), values.mean(axis=1)
+    if r * t == 1:
+        return Estimate(mean, None, None, r)
+    of_trials = float(values.var(axis=1, ddof=1).mean()) / (r * t) if t > 1 else 0.0
+    variance = max(float(means.var(ddof=1)) / r, of_trials) if r > 1 else of_trials
+    reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2)) * math.sqrt(variance)
+    return Estimate(mean, mean - reach, mean + reach, r)

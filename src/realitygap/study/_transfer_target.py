@@ -10,7 +10,7 @@ from typing import Self
 
 from realitygap.errors import RecordError
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import Target, TrialPlan
+from realitygap.trials import Target, TrialPlan, is_whole
 
 from ._targets import observations_head
 
@@ -19,7 +19,7 @@ class KeptTarget:
     """A target with a file beside it, and a number of trials that it allows.
 
     A trial is known by its number: who asks for the same trials in the same order, after whatever interruption, gets
-    what is in the file, and the rest is carried out.
+    what is in the file, and the rest is carried out. One that was cut off is kept, too, and carried out again.
 
     Args:
         target: What carries out trials.
@@ -40,7 +40,7 @@ class KeptTarget:
         self._target = target
         self._first_number = first_number
         self._file = ObservationsFile(path, observations_head(target, observe))
-        self._kept = {trial.number: trial for trial in self._file.trials}
+        self._kept = {trial.number: trial for trial in self._file.trials if is_whole(trial)}
 
     def carry_out(
         self,
@@ -64,9 +64,10 @@ class KeptTarget:
 
         def keep(k: int, trial: ObservedTrial) -> None:
             self._file.append(trial)
-            self._kept[trial.number] = trial
-            if tell is not None:
-                tell(missing[k], trial)
+            if is_whole(trial):
+                self._kept[trial.number] = trial
+                if tell is not None:
+                    tell(missing[k], trial)
 
         if missing:
             self._target.carry_out([numbered[k] for k in missing], observe, keep)

@@ -7,7 +7,7 @@ from pathlib import Path
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import Target, TrialPlan
+from realitygap.trials import Target, TrialPlan, is_whole
 
 from ._targets import observations_head, refuse_more_than_is_seen
 
@@ -38,7 +38,7 @@ def try_on(
     """
     refuse_more_than_is_seen(target, observe)
     file = None if out is None else ObservationsFile(out, observations_head(target, observe))
-    done = {} if file is None else {trial.number: trial for trial in file.trials}
+    done = {} if file is None else {trial.number: trial for trial in file.trials if is_whole(trial)}
     if any(trial.genome != genome.to_json() for trial in done.values()):
         raise RecordError(f"{out} has trials of another controller. Name another file.")
     missing = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials) if k not in done]

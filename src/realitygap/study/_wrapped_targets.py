@@ -12,7 +12,7 @@ import numpy as np
 from realitygap.calibration import ruled
 from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import EndReason, Target, TrialPlan
+from realitygap.trials import Target, TrialPlan, is_taken_back, is_whole, taken_back
 
 Tell = Callable[[int, ObservedTrial], None]
 
@@ -131,7 +131,7 @@ class GuidedTarget(_Around):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[ObservedTrial]:
-        """As `Target.carry_out`; a trial that is taken back is told of again.
+        """As `Target.carry_out`; a trial that is taken back is told of as such, and again when it was driven anew.
 
         Raises:
             StoppedByPerson: What was told of is all that was recorded.
@@ -144,6 +144,8 @@ class GuidedTarget(_Around):
                 raise StoppedByPerson
             if answer == "redo":
                 k = max(k - 1, 0)
+                if k in trials and tell is not None:  # should somebody stop before it is driven again
+                    tell(k, taken_back(trials.pop(k)))
                 continue
             (trial,) = self.target.carry_out([plans[k]], observe)
             measured = self._guide.measure(plans[k], trial)
@@ -165,8 +167,16 @@ class ResumableTarget(_Around):
     def __init__(self, target: Target, file: ObservationsFile) -> None:
         super().__init__(target)
         self._file = file
-        self.trials = {_what(trial): trial for trial in file.trials if is_whole(trial)}
+        self.trials: dict[tuple[object, ...], ObservedTrial] = {}
+        for trial in file.trials:
+            self._note(_what(trial), trial)
         self.n_found = 0
+
+    def _note(self, what: tuple[object, ...], trial: ObservedTrial) -> None:
+        if is_whole(trial):
+            self.trials[what] = trial
+        elif is_taken_back(trial):
+            self.trials.pop(what, None)
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
@@ -181,19 +191,13 @@ class ResumableTarget(_Around):
 
         def keep(k: int, trial: ObservedTrial) -> None:
             self._file.append(trial)
-            if is_whole(trial):
-                self.trials[wanted[missing[k]]] = trial
-                if tell is not None:
-                    tell(missing[k], trial)
+            self._note(wanted[missing[k]], trial)
+            if is_whole(trial) and tell is not None:
+                tell(missing[k], trial)
 
         if missing:
             self.target.carry_out([plans[k] for k in missing], observe, keep)
         return [self.trials[what] for what in wanted]
-
-
-def is_whole(trial: ObservedTrial) -> bool:
-    """Whether a trial came to its own end, and was not cut off."""
-    return trial.end == EndReason.STEP_LIMIT
 
 
 def _what(trial: ObservedTrial) -> tuple[object, ...]:

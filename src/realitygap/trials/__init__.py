@@ -19,7 +19,15 @@ from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
 from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, start_words, trial_seed
-from ._physical import DrivenTrial, EndReason, TrialInterrupted, drive_trial
+from ._physical import (
+    DrivenTrial,
+    EndReason,
+    TrialInterrupted,
+    drive_trial,
+    is_taken_back,
+    is_whole,
+    taken_back,
+)
 from ._preflight import Preflight, preflight
 from ._processors import usable_processors
 from ._repeats import retry_genomes
@@ -84,6 +92,8 @@ __all__ = [
     "close_twins",
     "counters_of",
     "drive_trial",
+    "is_taken_back",
+    "is_whole",
     "jyro_rules",
     "jyro_scene",
     "open_trials",
@@ -98,6 +108,7 @@ __all__ = [
     "simulate_case",
     "simulate_file",
     "start_words",
+    "taken_back",
     "trace_genome",
     "trace_genomes",
     "trajectories_of",

@@ -118,6 +118,8 @@ def carry_out_on_robot(
         return _with_what_is_seen(trial, observe, onlooker), problem
     except RobotError as error:
         return _kept(plan, start, robot, seen, EndReason.LOST), problem or str(error)
+    except (KeyboardInterrupt, SystemExit) as error:  # while somebody is asked for cells
+        raise TrialStopped(_kept(plan, start, robot, seen, EndReason.INTERRUPTED)) from error
 
 
 def _stop(robot: Robot) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from realitygap.errors import RobotError
 from realitygap.evolution import Network
-from realitygap.records import Step
+from realitygap.records import ObservedTrial, Step
 from realitygap.robots import Clock, Command, Observation, Robot, SystemClock
 
 
@@ -24,6 +24,21 @@ class EndReason(StrEnum):
     """The robot, or the link to it, failed."""
     INTERRUPTED = "interrupted"
     """The program was stopped."""
+
+
+def is_whole(trial: ObservedTrial) -> bool:
+    """Whether a trial came to its own end, and was not cut off."""
+    return trial.end == EndReason.STEP_LIMIT
+
+
+def taken_back(trial: ObservedTrial) -> ObservedTrial:
+    """A trial that somebody does not let count."""
+    return replace(trial, end=str(EndReason.ABORTED))
+
+
+def is_taken_back(trial: ObservedTrial) -> bool:
+    """Whether a trial is the word that the one before it, of the same plan, does not count."""
+    return trial.end == EndReason.ABORTED
 
 
 @dataclass(frozen=True)

@@ -53,12 +53,16 @@ class Target(Protocol):
     """
 
     name: str
-    identity: str
     label: Label
     arena: Arena
     step_s: float
     n_sensors: int
     observes: Observe
+
+    @property
+    def identity(self) -> str:
+        """As above."""
+        ...
 
     def carry_out(
         self,

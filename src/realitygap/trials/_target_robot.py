@@ -180,7 +180,7 @@ class RobotTarget:
         again = "twice " if attempts > 1 else ""
         raise RobotError(
             f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: {problem} "
-            "The trials before it are kept. Put the robot right, then go on with the rest."
+            "Trials that were kept in a file are safe. Put the robot right, then go on with the rest."
         )
 
     def _try(

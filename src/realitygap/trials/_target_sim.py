@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from types import TracebackType
 from typing import Any, Self
 
@@ -48,7 +51,6 @@ class SimTarget:
         name: As the user named it; the platform's when not given.
     """
 
-    identity = ""
     label: Label = "SIM"
     observes: Observe = "track"
 
@@ -66,6 +68,14 @@ class SimTarget:
         numbers = [*arena.vary, *(platform.arena_numbers if isinstance(platform, SimPlatform) else ())]
         self._is_start_set = any(name.startswith("arena.start.") for name in numbers)
         self.n_sensors = self._robot.n_sensors
+
+    @cached_property
+    def identity(self) -> str:
+        """Equal where the same trials come out."""
+        settings = json.dumps(self.platform.model_dump(mode="json"), sort_keys=True)
+        digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
+        kind = "sim" if isinstance(self.platform, SimPlatform) else "jyro"
+        return f"{kind} {digest}, noise {self.noise:g}, key {self.key}"
 
     def carry_out(
         self,

@@ -14,7 +14,7 @@ from ._distribution import Distribution
 from ._drawn_places import check_drawn_starts
 from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._library import arena_names, load_arena, load_calibration, load_robot, read_calibration, robot_names
-from ._obstacle import Goal, Light, Obstacle
+from ._obstacle import Goal, Light, Obstacle, distance_to_segment
 from ._part import Part
 from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
 from ._placing import check_start, is_inside
@@ -52,6 +52,7 @@ __all__ = [
     "arena_picture",
     "check_drawn_starts",
     "check_start",
+    "distance_to_segment",
     "floor_shapes",
     "goal_shapes",
     "is_inside",

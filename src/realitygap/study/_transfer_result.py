@@ -134,7 +134,7 @@ def summarize_transfer(
 
 
 def estimate_mean(values: NDArray[np.float64]) -> Estimate:
-    """The mean of values (r, t), t trials of each of r replicates, with Student's interval over replicates.
+    """The mean of shares (r, t), t trials of each of r replicates, with Student's interval over replicates.
 
     A resampling of two or three would repeat each of them, and end at the extremes. Replicates that happen to be alike
     are as uncertain as their trials make them. Of one replicate the interval is over its trials; of one trial there is
@@ -147,4 +147,4 @@ def estimate_mean(values: NDArray[np.float64]) -> Estimate:
     of_trials = float(values.var(axis=1, ddof=1).mean()) / (r * t) if t > 1 else 0.0
     variance = max(float(means.var(ddof=1)) / r, of_trials) if r > 1 else of_trials
     reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2)) * math.sqrt(variance)
-    return Estimate(mean, mean - reach, mean + reach, r)
+    return Estimate(mean, max(mean - reach, 0.0), min(mean + reach, 1.0), r)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realitygap.calibration import end_pose_of, fit_path, moved_in, path_plans, ruled
+from realitygap.calibration import end_pose_of, fit_path, moved_in, of_one_length, path_plans, ruled
 from realitygap.calibration._path import STRAIGHT, TURNING
 from realitygap.records import ObservedTrial
 from realitygap.robots import SimPlatform
@@ -167,3 +167,17 @@ def test_a_robot_that_stands_still_or_does_not_turn_is_told():
         fitted([measured(0.0, 0.0, STRAIGHT), measured(0.0, 0.0, TURNING)])
     with pytest.raises(ValueError, match="did not turn in any trial"):
         fitted([measured(13.75, 0.0, STRAIGHT), measured(0.0, 0.0, TURNING)])
+
+
+def test_the_most_trials_of_about_one_length_are_kept():
+    def lasting(*lengths):
+        return [replace(measured(13.0, 0.0, STRAIGHT), step_s=length) for length in lengths]
+
+    trials = lasting(*[0.5] * 5, *[0.53] * 4, 0.56)
+    kept, said = of_one_length(trials)
+    assert len(kept) == 9
+    assert (
+        "1 of 10 trials were left out: their commands lasted 0.56 to 0.56 s, and most 0.5 to 0.53 s." in said
+    )
+    assert of_one_length(lasting(0.5, 0.549))[1] == ""
+    assert of_one_length([]) == ([], "")

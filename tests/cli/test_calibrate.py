@@ -373,10 +373,16 @@ def test_paths_that_end_at_a_wall_are_left_out(tmp_path):
     write_observations(file, found.head, [*found.trials, stopped])
     run("path", "--from", file, "-o", tmp_path / "fit.toml")
     made = load_calibration(tmp_path / "fit.toml")
-    assert "1 of 5 paths ended at a wall, and were left out." in made.notes
+    assert "1 of 3 straight paths ended at a wall, and were left out." in made.notes
     assert made.numbers["drive.gain_left"] == pytest.approx(1.0, abs=0.1)
-    write_observations(file, found.head, [stopped, replace(stopped, number=10)])
-    assert "All 2 paths ended at a wall" in refused("path", "--from", file, "-o", tmp_path / "x.toml")
+    write_observations(
+        file, found.head, [found.trials[1], stopped, replace(stopped, number=10), found.trials[3]]
+    )
+    assert "All 2 straight paths ended at a wall" in refused(
+        "path", "--from", file, "-o", tmp_path / "x.toml"
+    )
+    # a wall beside the path, 0.1 m from its line, stops nothing
+    run("path", "--robot", "sim", "--arena", "wall", "--budget", 4, "-o", tmp_path / "beside.toml")
     slow = [replace(trial, step_s=2.0) for trial in found.trials]
     write_observations(file, found.head, slow)
     assert "turns cannot be counted" in refused("path", "--from", file, "-o", tmp_path / "x.toml")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from realitygap.errors import RecordError, StudyError
+from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.gap import GapSide
 from realitygap.records import read_observations
 from realitygap.robots import SimPlatform
@@ -299,6 +299,25 @@ def test_a_trial_that_was_cut_off_does_not_count_and_is_carried_out_again(some, 
     )
 
 
+def test_a_trial_that_is_lost_for_good_is_no_trial_that_visited_nothing(some, tmp_path):
+    class Skipping(Counted):
+        def carry_out(self, plans, observe, tell=None):
+            def told(k, trial):
+                tell(k, trial if k else replace(trial, cells=(), end=str(EndReason.LOST)))
+
+            trials = super().carry_out(plans, observe, told)
+            return [replace(trials[0], cells=(), end=str(EndReason.LOST)), *trials[1:]]
+
+    path = tmp_path / "trials.jsonl"
+    with pytest.raises(RobotError, match="A trial on sim was lost"):
+        run_gap(sim(), Skipping(sim()), some, trials=2)
+    with pytest.raises(RobotError, match=r"The others are kept in .*trials.jsonl"):
+        run_gap(sim(), Skipping(sim()), some, trials=2, results=path)
+    again = Counted(sim())
+    run_gap(sim(), again, some, trials=2, results=path)
+    assert len(again.asked) == 1
+
+
 def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
     real = sim()
     real.label = "REAL"
@@ -312,6 +331,8 @@ def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
         gap_between("sim", "robot", n_controllers=6, trials=2)
     found = gap_between("sim", "robot", n_controllers=6, trials=2, results=tmp_path / "trials.jsonl")
     assert found.study.target.label == "REAL"
+    recorded = gap_between("sim", f"recorded:{tmp_path / 'trials.jsonl'}", n_controllers=6, trials=2)
+    assert recorded.study.target.label == "REAL"  # they are in a file already
 
 
 def test_trials_of_one_controller_tell_no_gap(some, tmp_path):
@@ -326,6 +347,8 @@ def test_re_evolved_is_only_what_evolved_there(some):
         StudyError, match="random-0 of --reevolved random was evolved nowhere, expected champions"
     ):
         gap_between("sim", "jyro", n_controllers=3, trials=1, reevolved="random")
+    with pytest.raises(StudyError, match="random-0 of --controllers random was evolved nowhere"):
+        gap_between("sim", "jyro", n_controllers=2, trials=1, reevolved="paper")
     elsewhere = [
         replace(each, kind="champion", selected_score=0.5, fresh_score=0.4, selected_on="jyro")
         for each in some

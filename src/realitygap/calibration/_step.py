@@ -13,16 +13,16 @@ ALIKE = 0.1
 
 
 def of_one_length(trials: Sequence[ObservedTrial]) -> tuple[list[ObservedTrial], str]:
-    """Trials whose commands lasted as long as most did, and in words which were left out; empty where none was."""
+    """The most trials whose commands lasted about as long, and in words which were left out; empty where none was."""
     lengths = sorted(trial.step_s for trial in trials)
     if not lengths or lengths[-1] <= (1 + ALIKE) * lengths[0]:
         return list(trials), ""
-    middle, most = lengths[(len(lengths) - 1) // 2], 0.999 * (1 + ALIKE) ** 0.5
-    kept = [trial for trial in trials if middle / most <= trial.step_s <= middle * most]
-    others = [trial.step_s for trial in trials if not middle / most <= trial.step_s <= middle * most]
+    least = max(lengths, key=lambda length: sum(length <= each <= (1 + ALIKE) * length for each in lengths))
+    kept = [trial for trial in trials if least <= trial.step_s <= (1 + ALIKE) * least]
+    others = [length for length in lengths if not least <= length <= (1 + ALIKE) * least]
     return kept, (
-        f"{len(others)} of {len(trials)} trials were left out: their commands lasted {min(others):.3g} to "
-        f"{max(others):.3g} s, and most {middle:.3g} s."
+        f"{len(others)} of {len(trials)} trials were left out: their commands lasted {others[0]:.3g} to "
+        f"{others[-1]:.3g} s, and most {least:.3g} to {max(trial.step_s for trial in kept):.3g} s."
     )
 
 

@@ -51,7 +51,9 @@ def transfer(
     ] = 20,
     runs: Annotated[int, typer.Option(min=1, help="Evolutions in simulation of each replicate.")] = 100,
     repeats: Annotated[int, typer.Option(min=1, help="Trials of each individual in simulation.")] = 8,
-    seed: Annotated[int, typer.Option(min=0, max=2**63 - 1, help="Of all random numbers but a twin's own.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**63 - 1, help="Of all random numbers but a twin's own.")
+    ] = 1,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -22,7 +22,7 @@ from realitygap.study import (
     save_calibration,
     with_ruled_end,
 )
-from realitygap.trials import OnLost, RobotsOwnSenses, TrialPlan
+from realitygap.trials import OnLost, RobotsOwnSenses, TrialPlan, those_that_count
 from realitygap.world import INCH, Arena, Calibration, Pose, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
@@ -96,7 +96,7 @@ class _Growing:
 
     def tell(self, done: int, n: int) -> None:
         """So many of so many trials are there."""
-        trials = list(read_observations(self._kept).trials) if self._kept.exists() else []
+        trials = those_that_count(read_observations(self._kept).trials) if self._kept.exists() else []
         self._channel.say(
             "trials", done=done, n=n, readings=[self._point(k, each) for k, each in enumerate(trials)]
         )

@@ -23,7 +23,7 @@ from realitygap.records import (
     write_whole,
 )
 from realitygap.robots import DEFAULT_ROBOT
-from realitygap.trials import Target, TrialPlan, is_taken_back, is_whole
+from realitygap.trials import Target, TrialPlan, those_that_count
 from realitygap.world import Arena, Calibration, Fitted, RobotModel, load_robot, read_calibration
 
 from ._calibrate_kinds import ALL_TRIALS, KINDS, LEAST_TO_CHOOSE, SOFTWARE, Kind, Parts
@@ -198,7 +198,7 @@ def calibrate_from(
     seen = observe or found.head.observe
     if OBSERVATIONS.index(seen) > OBSERVATIONS.index(found.head.observe):
         raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
-    trials = [_seen_as(trial, seen) for trial in _last_of_each(found)]
+    trials = [_seen_as(trial, seen) for trial in those_that_count(found.trials)]
     _refuse_other_readings(trials, load_robot(robot))
     parts = _fit(kind, trials, robot, arena, seen, seed)
     made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials, arena, seed)
@@ -266,18 +266,6 @@ def _fit(
     except ValueError as error:
         raise StudyError(str(error)) from error
     return replace(parts, notes=(*parts.notes, left_out)) if left_out else parts
-
-
-def _last_of_each(found: Observations) -> Sequence[ObservedTrial]:
-    """Trials that were cut off or taken back are left out, and those whose place a later one took."""
-    last: dict[object, ObservedTrial] = {}
-    for trial in found.trials:
-        what = (trial.purpose, trial.number, trial.start)
-        if is_whole(trial):
-            last[what] = trial
-        elif is_taken_back(trial):
-            last.pop(what, None)
-    return list(last.values())
 
 
 def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:

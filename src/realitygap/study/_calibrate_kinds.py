@@ -94,7 +94,10 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
 # path
 
 AT_A_WALL = 0.01
-"""Robots that end so near to a wall beside their radius may have been stopped by it [m]."""
+"""What is less than twice so far ahead of a robot may have stopped it [m]."""
+
+FRONT_M = 0.03
+"""What of a robot's outline lies at most so far behind its foremost point is its front [m]."""
 
 MOST_TURN = 0.9 * math.pi
 """By a command, of which a camera sees the beginning and the end [rad]."""
@@ -102,8 +105,8 @@ MOST_TURN = 0.9 * math.pi
 FAR_M = 20.0
 """Nothing stands nearer where a path is simulated [m]."""
 
-NO_LINE = ("path", "sensors", "motion")
-"""Purposes of trials of which no cells are counted: a ruler, readings or encoders tell what there is to tell."""
+NO_LINE = ("path", "sensors")
+"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
 
 _PATH_METHOD = (
     "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
@@ -121,15 +124,17 @@ def _fit_path(
     def simulate(trial: ObservedTrial) -> Moved:
         return _moved_in_sim(trial, robot, arena)
 
-    free = [trial for trial in trials if not _ends_at_a_wall(trial, robot, arena)]
-    if trials and not free:
+    straight = [trial for trial in trials if _is_straight(trial)]
+    stopped = [id(trial) for trial in straight if _ends_at_a_wall(trial, robot, arena)]
+    n = len(stopped)
+    if n and n == len(straight):
         raise ValueError(
-            f"All {len(trials)} paths ended at a wall, expected room for them: is arena {arena.name!r} the right one, "
-            f"and is a command of {trials[0].step_s:g} s right?"
+            f"All {n} straight paths ended at a wall, expected room for them: is arena {arena.name!r} the right one, "
+            f"and is a command of {straight[0].step_s:g} s right?"
         )
+    free = [trial for trial in trials if id(trial) not in stopped]
     fit = fit_path(free, simulate, robot, np.random.default_rng(seed))
-    n = len(trials) - len(free)
-    left_out = (f"{n} of {len(trials)} paths ended at a wall, and were left out.",) if n else ()
+    left_out = (f"{n} of {len(straight)} straight paths ended at a wall, and were left out.",) if n else ()
     notes = (*fit.notes, *left_out)
     return _told_of_ends(
         Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, notes, evidence={"path": fit.evidence}),
@@ -137,19 +142,31 @@ def _fit_path(
     )
 
 
+def _is_straight(trial: ObservedTrial) -> bool:
+    """Whether it was to go straight ahead."""
+    return bool(np.any(trial.commands[:, 0] > 0)) and not np.any(trial.commands[:, 1])
+
+
 def _ends_at_a_wall(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> bool:
-    """Whether something stopped the robot in a trial; where nobody saw its end, by what it said itself.
+    """Whether something ahead stopped the robot; where nobody saw its end, by what it said itself.
 
     One that went back has been told wrongly which of its ends is ahead: that is said elsewhere.
     """
     moved = moved_in(trial)
     if moved is not None and moved.ahead < 0:
         return False
-    ends = trial.poses[-1] if len(trial.poses) else trial.end_pose
-    if ends is None:
+    end = trial.poses[-1] if len(trial.poses) else trial.end_pose
+    if end is None:
         return bool(len(trial.stalled)) and float(np.mean(trial.stalled)) > 0.5
-    near = min((distance_to_segment(ends[0], ends[1], wall) for wall in arena.segments), default=math.inf)
-    return near < robot.radius + AT_A_WALL
+    outline = np.array([point for part in robot.body for point in part.outline()])
+    front = outline[outline[:, 0] > outline[:, 0].max() - FRONT_M]
+    ahead, sine, cosine = outline[:, 0].max() + AT_A_WALL, math.sin(end[2]), math.cos(end[2])
+    return any(
+        distance_to_segment(end[0] + ahead * cosine - y * sine, end[1] + ahead * sine + y * cosine, wall)
+        < AT_A_WALL
+        for y in np.linspace(front[:, 1].min(), front[:, 1].max(), 9)
+        for wall in arena.segments
+    )
 
 
 def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
@@ -169,7 +186,7 @@ def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Move
     walls = [x for wall in arena.walls for x in wall] or [0.0]
     low, high = min(walls) - FAR_M, max(walls) + FAR_M
     around = ((low, low, high, low), (high, low, high, high), (high, high, low, high), (low, high, low, low))
-    with SimRobot(platform, replace(arena, walls=around, obstacles=())) as simulated:
+    with SimRobot(platform, replace(arena, walls=around, obstacles=(), vary={})) as simulated:
         simulated.reset(Pose(*trial.start))
         headings = [trial.start[2]]
         for move, turn in trial.commands:

@@ -27,7 +27,7 @@ from realitygap.trials import SimTarget, Target, TrialPlan, is_whole
 from realitygap.world import Arena, Pose
 
 from ._controllers import Controller
-from ._targets import observations_head, steps_as_a_robot
+from ._targets import observations_head, refuse_lost, steps_as_a_robot
 
 Tell = Callable[[str, int, int], None]
 """Called with what is being done, the trials done, and the trials in all."""
@@ -172,7 +172,7 @@ def study_gap(
         result,
         luck=_luck(controllers),
         reevolved=_reevolved(controllers, source, one, reevolved, on_target[len(plans) :], target),
-        notes=(*_notes([*in_source, *on_target]), *said),
+        notes=said,
     )
     return GapStudy(
         result,
@@ -226,7 +226,9 @@ def _carry_out(
         if tell is not None:
             tell(platform.name, k + 1, len(plans))
 
-    return platform.carry_out(plans, observe, told)
+    trials = platform.carry_out(plans, observe, told)
+    refuse_lost(sum(not is_whole(trial) for trial in trials), platform.name)
+    return trials
 
 
 def _carry_out_kept(
@@ -254,6 +256,7 @@ def _carry_out_kept(
 
         if missing:
             target.carry_out([plans[k] for k in missing], observe, keep)
+    refuse_lost(sum(key not in kept for key in keys), target.name, f" The others are kept in {results}.")
     return [kept[key] for key in keys]
 
 
@@ -337,7 +340,9 @@ def _reevolved(
             0,
             "The controllers are no champions of a simulator (--controllers STUDY), so nothing was evolved there.",
         )
-    family = source.name.partition(":")[0]
+    family = (
+        source.identity.partition(" ")[0] if isinstance(source, SimTarget) else source.name.partition(":")[0]
+    )
     elsewhere = {each.selected_on for _, each in champions if each.selected_on.partition(":")[0] != family}
     if elsewhere:
         return Estimate.refusal(
@@ -346,11 +351,3 @@ def _reevolved(
     here = in_source.means[[k for k, _ in champions]]
     there = side_of(target, on_target, len(reevolved)).means
     return difference_of_groups(here, there)
-
-
-def _notes(trials: Sequence[ObservedTrial]) -> tuple[str, ...]:
-    ends: dict[str, int] = {}
-    for trial in trials:
-        ends[trial.end] = ends.get(trial.end, 0) + 1
-    others = [f"{count} ended by {end}" for end, count in ends.items() if end != "step limit"]
-    return (f"Of {len(trials)} trials {', '.join(others)}.",) if others else ()

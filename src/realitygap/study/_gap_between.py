@@ -104,7 +104,7 @@ def gap_between(
             f"Parts of the model are switched in from a calibration, and {sim} is none. Make one with: realitygap "
             f"calibrate all --robot {target} --observe {observe} -o fit.toml; then measure the gap of sim:fit.toml."
         )
-    if why and noise and sim != "jyro":
+    if why and noise:
         raise StudyError(
             f"--why switches parts of the model in without the paper's noise, and --noise is {noise:g}. Leave one out."
         )
@@ -120,13 +120,16 @@ def gap_between(
         tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
         chosen = sample_controllers(controllers, n_controllers, seed)
     there = [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed)
-    _refuse_elsewhere(there, str(reevolved), target)
+    if there and not recorded:
+        _refuse_elsewhere(there, f"--reevolved {reevolved}", target)
+    if there:
+        _refuse_elsewhere(chosen, f"--controllers {controllers}", sim)
     with (
         _open(sim, place, noise, 2 * seed, randomize=randomize) as source,
         _open(target, place, noise, 2 * seed + 1, processes, witness, attendant) as costly,
     ):
         refuse_more_than_is_seen(costly, observe)
-        if costly.label == "REAL" and results is None:
+        if costly.label == "REAL" and results is None and not isinstance(costly, RecordedTarget):
             raise StudyError(
                 f"{n_controllers * trials} trials on {target} would be kept nowhere, and lost where anything goes "
                 "wrong. Name a file for them (-o FILE.jsonl): the same command goes on there."
@@ -156,18 +159,18 @@ def gap_between(
     return GapBetween(found, parts)
 
 
-def _refuse_elsewhere(reevolved: Sequence[Controller], named: str, target: str) -> None:
-    """Return where all were evolved on the target, before trials are spent on them.
+def _refuse_elsewhere(evolved: Sequence[Controller], named: str, platform: str) -> None:
+    """Return where all were evolved on the platform, before trials are spent on them.
 
     Raises:
         StudyError: One was not.
     """
-    for each in reevolved:
+    for each in evolved:
         where = each.selected_on or "nowhere"
-        if each.kind != "champion" or where.partition(":")[0] != target.partition(":")[0]:
+        if each.kind != "champion" or where.partition(":")[0] != platform.partition(":")[0]:
             raise StudyError(
-                f"{each.name} of --reevolved {named} was evolved {'on ' if each.selected_on else ''}{where}, expected "
-                f"champions evolved on {target}."
+                f"{each.name} of {named} was evolved {'on ' if each.selected_on else ''}{where}, expected champions "
+                f"evolved on {platform}: the re-evolved gap is between such of both platforms."
             )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from realitygap.errors import StudyError
 from realitygap.gap import Needed, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.records import read_observations
-from realitygap.trials import is_whole
+from realitygap.trials import those_that_count
 from realitygap.world import Arena, load_arena
 
 from ._controllers import sample_controllers
@@ -88,8 +88,8 @@ def recorded_spreads(path: str) -> Spreads:
     found = read_observations(path)
     n_cells = Arena.from_dict(dict(found.head.arena)).grid.n_cells
     by_genome: dict[str, list[float]] = {}
-    for trial in found.trials:
-        if trial.genome and is_whole(trial):
+    for trial in those_that_count(found.trials):
+        if trial.genome:
             by_genome.setdefault(trial.genome, []).append(len(trial.cells) / n_cells)
     repeated = [values for values in by_genome.values() if len(values) > 1]
     if len(repeated) < 2:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from typing import Literal
 
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.errors import RobotError, StudyError, did_you_mean
 from realitygap.records import OBSERVATIONS, ObservationsHead, Observe
 from realitygap.robots import DEFAULT_ROBOT, JyroPlatform, ScribblerPlatform, SimPlatform
 from realitygap.robots.scribbler import is_in_this_program
@@ -107,6 +107,17 @@ def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
             f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
             "or name a witness that sees more."
         )
+
+
+def refuse_lost(n: int, name: str, kept: str = "") -> None:
+    """Return where no trial was lost for good, as where lost ones are skipped.
+
+    Raises:
+        RobotError: So many were.
+    """
+    if n:
+        lost = f"{n} trials on {name} were" if n > 1 else f"A trial on {name} was"
+        raise RobotError(f"{lost} lost, and cannot be done without.{kept} Carry out what is missing.")
 
 
 def _witness(port: str, address: str | None) -> Attendant:

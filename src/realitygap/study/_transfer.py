@@ -303,7 +303,7 @@ class _Work:
         """How the replicate's calibrations come about."""
         file = Path(self.plan.calibration) if self.plan.calibration else None
         first, observe = replicate * NUMBERS, self.plan.observe
-        seed = SEED_STRIDE * self.plan.seed + replicate
+        seed = (SEED_STRIDE * self.plan.seed + replicate) % 2**53
         return Calibrating(
             self.target, self.folder / "calibrations", first, replicate, seed, observe, file, self.tell
         )

@@ -8,11 +8,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+
 from realitygap.errors import RecordError
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan, is_whole
 
-from ._targets import observations_head
+from ._targets import observations_head, refuse_lost
 
 
 class KeptTarget:
@@ -53,6 +55,7 @@ class KeptTarget:
         Raises:
             ValueError: More trials than the budget has.
             RecordError: The file has another trial of this number.
+            RobotError: A trial was lost for good.
         """
         if self.spent + len(plans) > self.budget:
             raise ValueError(
@@ -61,6 +64,8 @@ class KeptTarget:
         self.spent += len(plans)
         numbered = [replace(plan, number=self._first_number + plan.number) for plan in plans]
         missing = [k for k, plan in enumerate(numbered) if plan.number not in self._kept]
+        for k in set(range(len(plans))) - set(missing):  # before anything more is spent
+            self._checked(numbered[k], observe)
 
         def keep(k: int, trial: ObservedTrial) -> None:
             self._file.append(trial)
@@ -71,6 +76,8 @@ class KeptTarget:
 
         if missing:
             self._target.carry_out([numbered[k] for k in missing], observe, keep)
+        n_lost = sum(plan.number not in self._kept for plan in numbered)
+        refuse_lost(n_lost, self.name, f" The others are kept in {self._file.path}.")
         return [self._checked(plan, observe) for plan in numbered]
 
     def _checked(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:
@@ -78,8 +85,12 @@ class KeptTarget:
         trial = self._kept[plan.number]
         genome = "" if plan.genome is None else plan.genome.to_json()
         enough = OBSERVATIONS.index(trial.observe) >= OBSERVATIONS.index(observe)
-        if trial.genome != genome or not enough:
-            what = "another controller" if enough else f"only {trial.observe} observed"
+        is_driven_so = genome or (
+            trial.commands.shape == np.shape(plan.commands)
+            and np.allclose(trial.commands, plan.commands, atol=1e-6)
+        )
+        if trial.genome != genome or not is_driven_so or not enough:
+            what = "another controller or other commands" if enough else f"only {trial.observe} observed"
             raise RecordError(
                 f"{self._file.path}: trial {plan.number} there has {what}; nothing was lost. Name another folder."
             )

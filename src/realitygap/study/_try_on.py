@@ -9,7 +9,7 @@ from realitygap.evolution import Genome
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan, is_whole
 
-from ._targets import observations_head, refuse_more_than_is_seen
+from ._targets import observations_head, refuse_lost, refuse_more_than_is_seen
 
 
 def try_on(
@@ -43,5 +43,7 @@ def try_on(
         raise RecordError(f"{out} has trials of another controller. Name another file.")
     missing = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials) if k not in done]
     keep = None if file is None else lambda _, trial: file.append(trial)
-    done |= {trial.number: trial for trial in target.carry_out(missing, observe, keep)}
+    found = target.carry_out(missing, observe, keep)
+    refuse_lost(sum(not is_whole(trial) for trial in found), target.name)
+    done |= {trial.number: trial for trial in found}
     return [done[k] for k in range(trials)]

@@ -14,6 +14,8 @@ from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan, is_taken_back, is_whole, taken_back
 
+from ._targets import refuse_lost
+
 Tell = Callable[[int, ObservedTrial], None]
 
 PATH = "path"
@@ -197,6 +199,8 @@ class ResumableTarget(_Around):
 
         if missing:
             self.target.carry_out([plans[k] for k in missing], observe, keep)
+        n_lost = sum(what not in self.trials for what in wanted)
+        refuse_lost(n_lost, self.name, f" The others are kept in {self._file.path}.")
         return [self.trials[what] for what in wanted]
 
 

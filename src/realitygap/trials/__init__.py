@@ -27,6 +27,7 @@ from ._physical import (
     is_taken_back,
     is_whole,
     taken_back,
+    those_that_count,
 )
 from ._preflight import Preflight, preflight
 from ._processors import usable_processors
@@ -109,6 +110,7 @@ __all__ = [
     "simulate_file",
     "start_words",
     "taken_back",
+    "those_that_count",
     "trace_genome",
     "trace_genomes",
     "trajectories_of",

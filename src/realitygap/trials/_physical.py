@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -39,6 +39,18 @@ def taken_back(trial: ObservedTrial) -> ObservedTrial:
 def is_taken_back(trial: ObservedTrial) -> bool:
     """Whether a trial is the word that the one before it, of the same plan, does not count."""
     return trial.end == EndReason.ABORTED
+
+
+def those_that_count(trials: Iterable[ObservedTrial]) -> list[ObservedTrial]:
+    """Trials that came to their own end and were not taken back; of those of one plan, driven again, the last."""
+    last: dict[object, ObservedTrial] = {}
+    for trial in trials:
+        what = (trial.purpose, trial.number, trial.start, trial.genome)
+        if is_whole(trial):
+            last[what] = trial
+        elif is_taken_back(trial):
+            last.pop(what, None)
+    return list(last.values())
 
 
 @dataclass(frozen=True)

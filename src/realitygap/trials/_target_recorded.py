@@ -17,7 +17,7 @@ from realitygap.records import OBSERVATIONS, Observe, ObservedTrial, read_observ
 from realitygap.robots import Label
 from realitygap.world import Arena
 
-from ._physical import is_whole
+from ._physical import those_that_count
 from ._target import TrialPlan, check_plans
 
 MOST_NUMBER = 2**63 - 1
@@ -45,7 +45,7 @@ class RecordedTarget:
     def __init__(self, path: str | Path, name: str = "") -> None:
         found = read_observations(path)
         whole = {
-            (trial.genome, trial.number): trial for trial in found.trials if trial.genome and is_whole(trial)
+            (trial.genome, trial.number): trial for trial in those_that_count(found.trials) if trial.genome
         }
         if not whole:
             raise RecordError(f"{path} has no whole trial of a controller.")

@@ -71,11 +71,11 @@ class SimTarget:
 
     @cached_property
     def identity(self) -> str:
-        """Equal where the same trials come out."""
+        """Equal where the same robot is simulated, whatever random numbers it draws."""
         settings = json.dumps(self.platform.model_dump(mode="json"), sort_keys=True)
         digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
         kind = "sim" if isinstance(self.platform, SimPlatform) else "jyro"
-        return f"{kind} {digest}, noise {self.noise:g}, key {self.key}"
+        return f"{kind} {digest}, noise {self.noise:g}"
 
     def carry_out(
         self,

@@ -128,6 +128,14 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def visible(text: str) -> str:
+    r"""Return a text in printable ASCII, with an escape such as \x1b or \u202e for every other character.
+
+    So no sequence that controls a terminal, no invisible letter and no lookalike can hide what a text says.
+    """
+    return "".join(c if " " <= c <= "~" else c.encode("unicode_escape").decode() for c in text)
+
+
 def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str, type[BaseModel]]:
     """A problem's place as text, the last name in it, and the model that this belongs to.
 

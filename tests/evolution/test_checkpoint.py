@@ -222,3 +222,49 @@ def test_a_pickled_recurrent_network_remembers():
     copy = pickle.loads(pickle.dumps(network))
     for given in ([0.0, 1.0], [0.5, 0.5]):
         assert copy.activate(given).tolist() == network.activate(given).tolist()
+
+
+def out_of_bounds() -> dict[str, tuple[int, ...]]:
+    """Numbers that kernels use as indices, or count by: an array and the place in it."""
+    return {
+        "genomes.n_connections": (0,),
+        "genomes.n_hidden": (0,),
+        "genomes.source": (0, 0),
+        "genomes.target": (0, 0),
+        "genomes.innovation": (0, 1),
+        "innovations.counters": (0,),
+        "species.counts": (0,),
+        "species.identity": (0,),
+        "species_of": (0,),
+    }
+
+
+@pytest.mark.parametrize("name", out_of_bounds())
+@pytest.mark.parametrize("number", [-1, 2**31 - 1])
+def test_load_refuses_numbers_that_lead_kernels_out_of_bounds(tmp_path, name, number):
+    path = tmp_path / "p.npz"
+    population = new_population()
+    step(population)
+    population.save(path)
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    arrays[name][out_of_bounds()[name]] = number
+    np.savez(path, **arrays)
+    with pytest.raises(RecordError, match="not one of a population"):
+        Population.load(path)
+
+
+def test_load_refuses_rows_of_different_widths_and_a_species_without_members(tmp_path):
+    path = tmp_path / "p.npz"
+    population = new_population()
+    step(population)
+    population.save(path)
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    np.savez(path, **{**arrays, "genomes.source": arrays["genomes.source"][:, :3].copy()})
+    with pytest.raises(RecordError, match=r"genomes.source has shape"):
+        Population.load(path)
+    arrays["species.counts"][0] += 1
+    np.savez(path, **arrays)
+    with pytest.raises(RecordError, match="species and their members do not agree"):
+        Population.load(path)

@@ -8,6 +8,7 @@ import random
 
 import pytest
 
+from realitygap.errors import RecordError
 from realitygap.evolution import (
     ConnectionGene,
     Genome,
@@ -161,6 +162,28 @@ def test_a_genome_comes_back_from_its_record(node_bias: bool) -> None:
         again = genome_from_record(record, genome.rules, 0.5)
         assert again == genome
         assert again.network().activate([0.1, 0.2]).tolist() == genome.network().activate([0.1, 0.2]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "problem"),
+    [
+        ("source", [-5, 1], "begins at no node"),
+        ("source", [9, 1], "begins at no node"),
+        ("target", [0, 3], "ends at no output"),
+        ("target", [2**40, 3], "damaged"),
+        ("hidden", [1], "not in order"),
+        ("hidden", [4, 4], "not in order"),
+        ("weight", [1.0, 2.0, 3.0], "damaged"),
+        ("innovation", [None, 1], "damaged"),
+    ],
+)
+def test_damaged_row_is_refused_before_kernels_read_it(name: str, values: list, problem: str) -> None:
+    rules = NeatSettings().rules(3, 1)
+    row = {"hidden": [4], "innovation": [0, 1], "source": [0, 1], "target": [4, 3]}
+    record = {**row, "weight": [1.0, 2.0], "enabled": [True, True], "biases": []}
+    assert genome_from_record(record, rules).n_hidden == 1
+    with pytest.raises(RecordError, match=problem):
+        genome_from_record({**record, name: values}, rules)
 
 
 def test_an_asked_genome_stays_what_it_was_when_the_population_goes_on() -> None:

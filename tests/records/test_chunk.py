@@ -1,8 +1,12 @@
 from __future__ import annotations
 
+import polars as pl
 import pytest
 
+from realitygap.errors import RecordError
+from realitygap.records import SCHEMA, _chunk
 from realitygap.records._chunk import ChunkName, check_condition
+from tests.records.rows import make_rows
 
 
 @pytest.mark.parametrize("condition", ["coverage", "a.b-c_1", "x.000000001-000000002", "-", "0", "a" * 150])
@@ -39,3 +43,22 @@ def test_other_names_are_not_those_of_chunks(name):
 def test_conditions_that_cannot_name_a_file_are_refused(name):
     with pytest.raises(ValueError, match="cannot name a file"):
         check_condition(name)
+
+
+@pytest.mark.parametrize("columns", [None, ["replicate", "generation", "individual", "cells"]])
+def test_forged_rows_are_refused_though_they_are_sealed(tmp_path, monkeypatch, columns):
+    rows = make_rows(n=1)
+    forged = {
+        "Column 'cells' holds nulls": rows.with_columns(cells=pl.lit(None, SCHEMA["cells"])),
+        "rows must be sorted": rows.with_columns(generation=pl.col("generation") * 2**31),
+    }
+    with monkeypatch.context() as patch:
+        patch.setattr(_chunk, "check_rows", lambda *_: 0)
+        contents = {
+            problem: _chunk.encode_chunk(tmp_path, "coverage", 0, frame, "0")
+            for problem, frame in forged.items()
+        }
+    for problem, (chunk, content) in contents.items():
+        chunk.path.write_bytes(content)
+        with pytest.raises(RecordError, match=rf"was not written by realitygap: .*{problem}"):
+            _chunk.read_rows(chunk.path, columns)

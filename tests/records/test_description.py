@@ -35,6 +35,7 @@ def test_changing_the_returned_description_changes_nothing(tmp_path):
         ({"conditions": ["a", "a"]}, "differ"),
         ({"conditions": ["../a"]}, "cannot name a file"),
         ({"conditions": [], "noise": math.nan}, "JSON"),
+        ({"conditions": ["a"], "title": "\ud800"}, "half of a letter"),
     ],
 )
 def test_descriptions_without_a_proper_list_of_conditions_are_refused(tmp_path, study, message):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import shutil
 import sqlite3
 import threading
@@ -298,6 +299,42 @@ def test_a_ledger_cut_off_is_refused(tmp_path):
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(LedgerError, match="is torn"):
         Ledger.open(path)
+
+
+def test_random_bytes_are_refused_in_one_message_or_harmless(tmp_path):
+    """Bytes changed anywhere, within texts too: opening and reading end in our error or in values."""
+    with new_ledger(tmp_path) as ledger:
+        drive(ledger, 1)
+    whole = (tmp_path / "ledger.sqlite").read_bytes()
+    n_refused = 0
+    for seed in range(60):
+        rng = random.Random(seed)
+        data = bytearray(whole)
+        for _ in range(rng.choice([1, 20])):
+            at = rng.randrange(len(data))
+            data[at : at + 4] = rng.randbytes(4)
+        path = tmp_path / "changed.sqlite"
+        path.write_bytes(data)
+        said = "Restore"
+        try:
+            with Ledger.open(path, writable=False) as ledger:
+                read = (ledger.trials(), ledger.scores(), ledger.sittings(), ledger.steps(1))
+                read += (ledger.individuals("a", 0, 0), ledger.notes())
+        except LedgerError as error:
+            n_refused += 1
+            said = str(error)
+        assert "Restore" in said, seed
+        assert path.read_bytes() == data
+    assert n_refused >= 20
+
+
+@pytest.mark.parametrize("changed", ["[13,", b"[13,\xff]"])
+def test_text_that_is_no_json_is_a_torn_ledger(ledger, changed):
+    drive(ledger, 1)
+    with sqlite3.connect(ledger.path) as other:
+        other.execute("UPDATE scores SET cells = CAST(? AS TEXT)", (changed,))
+    with pytest.raises(LedgerError, match=r"is torn .*, and was left as it is\. Restore"):
+        Ledger.open(ledger.path)
 
 
 def test_another_format_is_refused(ledger):

@@ -357,10 +357,26 @@ def genome_from_record(
         record: The row's `genome`: lists hidden, biases, innovation, source, target, weight, enabled.
         rules: Sizes and activation, from the condition's settings.
         bias_value: Of the constant input.
+
+    Raises:
+        RecordError: The lists do not fit together, or lead kernels to a node that is not there.
+    """
+    try:
+        genomes = _arrays_of(record, rules)
+    except (OverflowError, TypeError, ValueError) as error:
+        raise RecordError(f"The genome of a row of results is damaged ({error}).") from error
+    return Genome(genomes, 0, rules, bias_value)
+
+
+def _arrays_of(record: Mapping[str, Sequence[Any]], rules: NeatRules) -> Genomes:
+    """The genome of a row of results in arrays.
+
+    Raises:
+        ValueError: The lists do not fit together, or a gene leads to a node that is not there.
     """
     n = len(record["innovation"])
     h = len(record["hidden"])
-    genomes = make_genomes(1, rules.n_outputs, max(n, 1), max(h, 1))
+    genomes: Genomes = make_genomes(1, rules.n_outputs, max(n, 1), max(h, 1))
     genomes.n_connections[0] = n
     genomes.n_hidden[0] = h
     genomes.innovation[0, :n] = record["innovation"]
@@ -371,7 +387,16 @@ def genome_from_record(
     genomes.hidden[0, :h] = record["hidden"]
     biases = record["biases"]
     genomes.bias[0, : len(biases)] = biases
-    return Genome(genomes, 0, rules, bias_value)
+    first_hidden = rules.n_inputs + rules.n_outputs
+    hidden = genomes.hidden[0, :h]
+    if h and (hidden[0] < first_hidden or (np.diff(hidden.astype(np.int64)) <= 0).any()):
+        raise ValueError("its hidden nodes are not in order")
+    nodes = np.concatenate([np.arange(first_hidden), hidden])
+    if not np.isin(genomes.source[0, :n], nodes).all():
+        raise ValueError("a connection begins at no node")
+    if not np.isin(genomes.target[0, :n], nodes[rules.n_inputs :]).all():
+        raise ValueError("a connection ends at no output or hidden node")
+    return genomes
 
 
 def genome_record(genome: Genome) -> dict[str, list[Any]]:

@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.kernels._genome import NeatRules
 
@@ -118,8 +119,8 @@ def from_text(text: str | bytes, kind: Kind, where: str) -> Any:
         RecordError: it is no JSON, or cut off.
     """
     try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
+        return parse_json(text)
+    except ValueError as error:
         raise RecordError(f"{where} is no JSON, or cut off ({error}), expected a {kind}.") from error
 
 
@@ -130,7 +131,7 @@ def from_file(path: Path, kind: Kind) -> Any:
         RecordError: it cannot be read, is no JSON, or cut off.
     """
     try:
-        text = path.read_bytes()
+        text = read_file(path, MOST_JSON_BYTES)
     except OSError as error:
         raise RecordError(f"Could not read {path}: {error.strerror or error}. Check the path.") from error
     return from_text(text, kind, str(path))

@@ -25,6 +25,9 @@ FIRST_ROOM = 32
 FIRST_HIDDEN_ROOM = 8
 
 
+_MOST_NUMBER = 2**31 - 2**16
+"""Numbers of genes, nodes and species have 32 bits. A run never counts this far."""
+
 # What kernels write to before they read it.
 _ROOM = {"genomes.reached", "genomes.cursor", "species.numbers", "species.shares"}
 
@@ -219,8 +222,8 @@ class Population:
                 key=about["key"],
             )
             population._restore(arrays)
-            population.generation = about["generation"]
-        except (KeyError, TypeError, ValueError) as error:
+            population.generation = whole_number("generation", about["generation"], 0, _MOST_NUMBER)
+        except (IndexError, KeyError, OverflowError, RecordError, TypeError, ValueError) as error:
             raise RecordError(
                 f"{path} is a checkpoint, but not one of a population as this version has it ({error})."
             ) from error
@@ -241,18 +244,25 @@ class Population:
     def _restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Put `_arrays` back; only the room for genes may differ.
 
+        Kernels trust indices. So everything is checked here: the file may come from elsewhere.
+
         Raises:
-            ValueError: Names, types or sizes do not fit.
+            RecordError: A genome is not one that evolution can make.
+            ValueError: Names, types, sizes or numbers do not fit.
         """
         own = self._arrays()
         if arrays.keys() != own.keys():
             raise ValueError(f"it lacks {sorted(own.keys() - arrays.keys())} or holds something else")
+        room, hidden_room = (arrays[f"genomes.{name}"].shape[-1] for name in ("innovation", "hidden"))
+        widths = {"genomes.hidden": hidden_room, "genomes.bias": self._rules.n_outputs + hidden_room}
         for name, array in arrays.items():
-            fixed = 1 if name.startswith("genomes.") else array.ndim
             if array.dtype != own[name].dtype or array.ndim != own[name].ndim:
                 raise ValueError(f"{name} is {array.dtype} with {array.ndim} dimensions")
-            if array.shape[:fixed] != own[name].shape[:fixed]:
-                raise ValueError(f"{name} has shape {array.shape}")
+            expected = own[name].shape
+            if name.startswith("genomes.") and array.ndim == 2:
+                expected = (expected[0], widths.get(name, room))
+            if array.shape != expected:
+                raise ValueError(f"{name} has shape {array.shape}, expected {expected}")
 
         def table(like: Any, prefix: str) -> Any:
             names = [name for name in like._fields if f"{prefix}.{name}" not in _ROOM]
@@ -260,10 +270,22 @@ class Population:
 
         genomes: Genomes = table(self._genomes, "genomes")
         genomes = genomes._replace(reached=np.zeros(genomes.innovation.shape[1] + 1, np.int32))
-        room, hidden_room = genomes.innovation.shape[1], genomes.hidden.shape[1]
         for count, most in ((genomes.n_connections, room), (genomes.n_hidden, hidden_room)):
             if count.min() < 0 or count.max() > most:
                 raise ValueError("a genome has more genes than room")
+        for row in range(len(self)):
+            Genome.from_dict(Genome(genomes, row, self._rules).to_dict())
+        next_number, next_node = (int(number) for number in arrays["innovations.counters"][:2])
+        if not (genomes.innovation.max(initial=0) < next_number < _MOST_NUMBER):
+            raise ValueError(f"the next innovation number is {next_number}")
+        if not (genomes.hidden.max(initial=0) < next_node < _MOST_NUMBER):
+            raise ValueError(f"the next node is {next_node}")
+        n_species, next_identity = (int(number) for number in arrays["species.counts"])
+        identities = arrays["species.identity"][: max(n_species, 0)].tolist()
+        if len(identities) != n_species or sorted(identities) != sorted({*arrays["species_of"].tolist()}):
+            raise ValueError("species and their members do not agree")
+        if not (max(identities) < next_identity < _MOST_NUMBER):
+            raise ValueError(f"the next species is {next_identity}")
         self._genomes = genomes
         self._innovations = table(self._innovations, "innovations")
         self._species = table(self._species, "species")

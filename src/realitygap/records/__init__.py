@@ -23,6 +23,8 @@ from realitygap.records._ctrl_c import wake_on_ctrl_c
 from realitygap.records._derived import DerivedFrame, derived_table
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
+from realitygap.records._inside import refuse_links, refuse_links_in
+from realitygap.records._json_file import read_object
 from realitygap.records._ledger import Ledger
 from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
 from realitygap.records._ledger_kinds import (
@@ -112,6 +114,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # other files, written whole
     "write_checkpoint",
     "read_checkpoint",
+    "read_object",
+    "refuse_links",
+    "refuse_links_in",
     "write_whole",
     "refuse_results",
     "is_special",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import struct
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._limits import MOST_CHECKPOINT_BYTES, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records._files import reading
@@ -66,27 +69,56 @@ def read_checkpoint(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, np
         if path.is_dir() or not path.exists():
             what = "is a folder" if path.is_dir() else "does not exist"
             raise RecordError(f"{path} {what}, expected the checkpoint of a {kind}. Check the path.")
-        data = path.read_bytes()
+        data = read_file(path, MOST_CHECKPOINT_BYTES)
     if not data.startswith(_FIRST_BYTES):
         raise RecordError(f"{path} is no checkpoint of a {kind}. Check the path.")
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files}
-        about = json.loads(arrays.pop(_ABOUT).tobytes()) if _ABOUT in arrays else {}
+        arrays = _arrays(data)
+        about = parse_json(arrays.pop(_ABOUT).tobytes()) if _ABOUT in arrays else {}
     except (
         zipfile.BadZipFile,
+        zipfile.LargeZipFile,
         ValueError,
         EOFError,
         OSError,
-        KeyError,
-        NotImplementedError,
+        LookupError,
+        MemoryError,
+        RuntimeError,
+        SyntaxError,
         TypeError,
+        struct.error,
     ) as error:
         raise RecordError(
             f"{path} is cut off or damaged, or was not written by realitygap ({error}). Take an earlier checkpoint."
         ) from error
     _check(path, kind, about)
     return about, arrays
+
+
+def _arrays(data: bytes) -> dict[str, npt.NDArray[Any]]:
+    """The arrays in a file that `np.savez` wrote, none of which can be larger than the file.
+
+    Raises:
+        ValueError: one is compressed, or says that it is of another size than it is.
+    """
+    arrays: dict[str, npt.NDArray[Any]] = {}
+    with zipfile.ZipFile(io.BytesIO(data)) as file:
+        for member in file.infolist():
+            if member.compress_type != zipfile.ZIP_STORED or member.file_size > len(data):
+                raise ValueError(f"{member.filename[:60]!r} in it is compressed")
+            stream = io.BytesIO(file.read(member))
+            version = np.lib.format.read_magic(stream)
+            read_header = {
+                (1, 0): np.lib.format.read_array_header_1_0,
+                (2, 0): np.lib.format.read_array_header_2_0,
+            }[version]
+            shape, _, dtype = read_header(stream)
+            if math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
+                raise ValueError(f"{member.filename[:60]!r} in it is not of the size that it says")
+            stream.seek(0)
+            name = member.filename.removesuffix(".npy")
+            arrays[name] = np.lib.format.read_array(stream, allow_pickle=False)
+    return arrays
 
 
 def _check(path: Path, kind: str, about: Any) -> None:

@@ -11,10 +11,12 @@ from pathlib import Path
 
 import polars as pl
 
+from realitygap._limits import MOST_CHUNK_BYTES, read_file
 from realitygap.errors import RecordError, RecordVersionError
-from realitygap.records._columns import EXTRA_SCHEMA, check_rows, schema_with
+from realitygap.records._columns import EXTRA_SCHEMA, SCHEMA, check_part, check_rows, schema_with
 from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest
 from realitygap.records._files import reading
+from realitygap.records._parquet_size import check_size
 from realitygap.records._seal import BrokenSeal, check_seal, seal
 from realitygap.records._version import RESULTS_VERSION
 
@@ -131,14 +133,17 @@ def load_chunk(path: Path) -> Chunk:
 
 
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> tuple[Chunk, pl.DataFrame]:
-    """A chunk and its rows, or some columns of them; all columns are held to the digest in the file.
+    """Return a chunk and its rows, or some columns of them; only whole rows are checked against the digest in the file.
 
     Raises:
         RecordError: the file is torn, foreign, or not what its name says.
     """
     chunk, sealed = _open(path)
     if columns is not None:
-        return chunk, _decode(chunk, sealed, columns)
+        frame = _decode(chunk, sealed, columns)
+        with _checking(path):
+            check_part(frame.select(name for name in frame.columns if name in SCHEMA), chunk.first)
+        return chunk, frame
     return chunk, _read_checked(chunk, sealed)[0]
 
 
@@ -156,11 +161,15 @@ def digest_rows(path: Path, digest: RowsDigest) -> Chunk:
 
 def _open(path: Path) -> tuple[Chunk, bytes]:
     with reading(path):
-        sealed = path.read_bytes()
+        sealed = read_file(path, MOST_CHUNK_BYTES, plain=True)
     try:
         check_seal(sealed)
     except BrokenSeal as error:
         raise RecordError(f"{path} {error}. {_AGAIN}") from None
+    try:
+        check_size(sealed)
+    except ValueError as error:
+        raise RecordError(f"{path} cannot be read: {error}. {_AGAIN}") from None
     with _decoding(path):
         metadata = pl.read_parquet_metadata(io.BytesIO(sealed))
     chunk = _from_metadata(path, metadata)
@@ -202,7 +211,7 @@ def _decoding(path: Path) -> Iterator[None]:
     """What the decoder says against an intact file: it can only be about versions."""
     try:
         yield
-    except pl.exceptions.PolarsError as error:
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise RecordError(
             f"{path} is intact, but polars {pl.__version__} cannot read it ({error}). "
             "Was it written with a newer polars? Install that one."
@@ -220,7 +229,18 @@ def _read_checked(chunk: Chunk, sealed: bytes) -> tuple[pl.DataFrame, list[Strea
             f"{chunk.path} reads as other values than were written, though its bytes are intact. "
             "Does the same command give this again? Then please report it, with the version of polars."
         )
+    with _checking(chunk.path):
+        check_rows(frame, chunk.condition, chunk.first)
     return frame, streams
+
+
+@contextlib.contextmanager
+def _checking(path: Path) -> Iterator[None]:
+    """Refuse rows that realitygap never publishes: whoever made them sealed them, too."""
+    try:
+        yield
+    except ValueError as error:
+        raise RecordError(f"{path} was not written by realitygap: {error} {_AGAIN}") from error
 
 
 def _to_metadata(chunk: Chunk) -> dict[str, str]:

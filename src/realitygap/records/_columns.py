@@ -173,12 +173,27 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
     _check_schema(frame)
     if frame.is_empty():
         raise ValueError("The frame has no rows, expected at least one replicate.")
-    _check_nulls(frame)
+    _check_nulls(frame, columns_in(frame))
     if (frame["condition"] != condition).any():
         raise ValueError(
             f"Every row's condition must be {condition!r}, found {frame['condition'].unique().to_list()}."
         )
     return _check_order(frame, first)
+
+
+def check_part(frame: pl.DataFrame, first: int) -> None:
+    """Check some columns of a chunk that is read: nulls, and the order of the rows if their keys are among them.
+
+    Args:
+        frame: Columns of a published chunk.
+        first: The first row's replicate.
+
+    Raises:
+        ValueError: A value is missing, or rows are not in order.
+    """
+    _check_nulls(frame, [column for column in (*COLUMNS, *EXTRA) if column.name in frame.columns])
+    if set(KEYS) <= set(frame.columns) and not frame.is_empty():
+        _check_order(frame, first)
 
 
 def _check_schema(frame: pl.DataFrame) -> None:
@@ -195,8 +210,8 @@ def _check_schema(frame: pl.DataFrame) -> None:
         raise ValueError(f"The frame's columns do not fit: {'; '.join(problems)}.")
 
 
-def _check_nulls(frame: pl.DataFrame) -> None:
-    for column in columns_in(frame):
+def _check_nulls(frame: pl.DataFrame, columns: Iterable[Column]) -> None:
+    for column in columns:
         series = frame[column.name]
         parts = [(column, series)]
         parts += [(field, series.struct.field(field.name)) for field in column.fields]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.errors import RecordError
 from realitygap.records._chunk import check_condition
 from realitygap.records._files import reading, write_durably
@@ -30,9 +31,10 @@ class Description:
 
         Raises:
             TypeError: a value is not JSON's.
-            ValueError: a number is not finite, or `conditions` does not list names, or tables with a `name`.
+            ValueError: a value is beyond the limits of what is read, a number is not finite, or `conditions` does not
+                list names, or tables with a `name`.
         """
-        plain = json.loads(json.dumps(dict(study), allow_nan=False))
+        plain = parse_json(json.dumps(dict(study), allow_nan=False))  # so that what is written can be read
         description = cls(plain, results_version)
         names = description.conditions
         for name in names:
@@ -49,12 +51,12 @@ class Description:
             RecordError: the file is torn, edited or foreign.
         """
         with reading(path):
-            data = path.read_bytes()
+            data = read_file(path, MOST_JSON_BYTES, plain=True)
         try:
-            document = json.loads(data)
-        except ValueError:
+            document = parse_json(data)
+        except ValueError as error:
             raise RecordError(
-                f"{path} is torn: it is not JSON. Restore it from a copy, or move the whole folder elsewhere."
+                f"{path} is torn: it is not JSON ({error}). Restore it from a copy, or move the whole folder elsewhere."
             ) from None
         if not isinstance(document, dict) or document.get("format") != _FORMAT:
             raise RecordError(

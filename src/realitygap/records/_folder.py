@@ -19,8 +19,10 @@ from realitygap.records._chunk import (
 from realitygap.records._description import DESCRIPTION_NAME, Description
 from realitygap.records._files import reading, sync_folder, write_durably, writing
 from realitygap.records._inbox import Delivery, is_inbox, make_inbox, remove_inbox
+from realitygap.records._inside import refuse_links
 from realitygap.records._listing import (
     LEDGER_NAME,
+    TRIALS_NAME,
     is_temporary,
     is_trace,
     list_chunks,
@@ -261,6 +263,8 @@ class ResultsFolder(PublishedResults):
     def _sweep(self) -> None:
         """Remove what killed writers left; the lock says that nobody is writing."""
         self._published = None
+        own = (DESCRIPTION_NAME, LOG_NAME, TRIALS_NAME, LEDGER_NAME)
+        refuse_links(self._path, *(self._path / name for name in own))
         with writing(self._path):
             for entry in self._path.iterdir():
                 if is_inbox(entry.name):

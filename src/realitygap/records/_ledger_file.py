@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import secrets
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
+from realitygap._limits import MOST_TEXT_BYTES
 from realitygap.errors import LedgerError, RecordVersionError
 from realitygap.records._files import sync_folder
+from realitygap.records._inside import refuse_links, refuse_other_names
 
 LEDGER_FORMAT = 1
 """Raised whenever the tables change; a ledger of another format is refused."""
+
+_ENDINGS = ("", "-wal", "-shm", "-journal")
+"""Of the names of a ledger and of the files that SQLite writes beside it."""
 
 _APPLICATION = 0x52474C31
 """Marks the file as a ledger of ours ("RGL1"), in SQLite's `application_id`."""
@@ -134,6 +140,16 @@ _NAMES = (
     "conditions", "sittings", "generations", "individuals", "trials", "steps", "scores", "notes", "events"
 )  # fmt: skip
 
+_JSON = {
+    "conditions": ("settings",),
+    "sittings": ("robot", "preflight"),
+    "individuals": ("parents", "genome"),
+    "steps": ("raw", "readings"),
+    "scores": ("cells", "path"),
+    "events": ("details",),
+}
+"""Columns with JSON, which SQLite's own check does not look into."""
+
 _NO_DELETING = "".join(
     f"CREATE TRIGGER {name}_stay BEFORE DELETE ON {name} "
     "BEGIN SELECT RAISE(ABORT, 'nothing is ever deleted from a ledger'); END;\n"
@@ -159,7 +175,9 @@ def create_file(path: Path) -> None:
 
     Raises:
         LedgerError: something is there, or it cannot be written.
+        RecordError: it is a link, a pipe or a device.
     """
+    refuse_links(path.parent, path)
     temporary = path.with_name(f".{path.name}.{secrets.randbits(63)}.tmp")
     try:
         with speaking(path):
@@ -177,7 +195,7 @@ def create_file(path: Path) -> None:
             temporary.replace(path)
             sync_folder(path.parent)
     finally:
-        for ending in ("", "-wal", "-shm", "-journal"):
+        for ending in _ENDINGS:
             with contextlib.suppress(OSError):
                 temporary.with_name(temporary.name + ending).unlink(missing_ok=True)
 
@@ -187,16 +205,23 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
 
     Raises:
         LedgerError: it is missing, torn, foreign or locked.
+        RecordError: it, or a file of SQLite's beside it, is a link, a pipe or a device.
         RecordVersionError: it has another format.
     """
     if not path.exists():
         raise LedgerError(f"There is no ledger at {path}. A study begins one when it first drives a robot.")
+    # SQLite follows links, also for the files beside the ledger, which it writes even when it only reads
+    refuse_links(path.parent, *(path.with_name(path.name + ending) for ending in _ENDINGS))
+    if writable:
+        refuse_other_names(path, path.stat())
     with speaking(path):
         connection = sqlite3.connect(
             _address(path, writable=writable), uri=True, isolation_level=None, timeout=_PATIENCE_S
         )
         try:
             connection.row_factory = sqlite3.Row
+            connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_TEXT_BYTES)
+            connection.execute("PRAGMA trusted_schema = OFF")
             _check(connection, path)
             connection.execute("PRAGMA foreign_keys = ON")
             connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
@@ -232,6 +257,44 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
     (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if said != "ok":
         raise LedgerError(_torn(path, str(said)))
+    _check_schema(connection, path)
+    _check_types(connection, path)
+    _check_json(connection, path)
+
+
+def _check_schema(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse what could run when the ledger is read or written: views, virtual tables and foreign triggers."""
+    ours = {part.strip() for part in (_NO_DELETING + _FROZEN).split("END;")}
+    for kind, name, sql in connection.execute("SELECT type, name, sql FROM sqlite_schema"):
+        is_table = kind == "table" and not str(sql).upper().startswith("CREATE VIRTUAL")
+        is_our_trigger = kind == "trigger" and str(sql).removesuffix("END").strip() in ours
+        if not (is_table or is_our_trigger or kind == "index"):
+            raise LedgerError(_torn(path, f"it has a {kind} {str(name)[:60]!r} that realitygap did not make"))
+
+
+def _check_json(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse texts that are no JSON."""
+    for table, columns in _JSON.items():
+        broken = " OR ".join(f"NOT json_valid(coalesce({column}, 'null'))" for column in columns)
+        if connection.execute(f"SELECT 1 FROM {table} WHERE {broken} LIMIT 1").fetchone():
+            raise LedgerError(_torn(path, f"a text in its table {table} is not JSON, or is too deep"))
+
+
+def _check_types(connection: sqlite3.Connection, path: Path) -> None:
+    """Refuse values of another type than their columns have, which SQLite itself allows."""
+    for table, types in _types().items():
+        wrong = " OR ".join(f"typeof({name}) NOT IN ('{kind}', 'null')" for name, kind in types.items())
+        if connection.execute(f"SELECT 1 FROM {table} WHERE {wrong} LIMIT 1").fetchone():
+            raise LedgerError(_torn(path, f"a value in its table {table} is of another type than its column"))
+
+
+@functools.cache
+def _types() -> dict[str, dict[str, str]]:
+    """The type of each column of each table, as SQLite calls those of values."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as connection:
+        connection.executescript(TABLES)
+        columns = {name: connection.execute(f"PRAGMA table_info({name})").fetchall() for name in _NAMES}
+    return {table: {row[1]: str(row[2]).lower() for row in rows} for table, rows in columns.items()}
 
 
 def _torn(path: Path, said: str) -> str:
@@ -254,8 +317,12 @@ def speaking(path: Path) -> Iterator[None]:
         raise LedgerError(f"{path} does not allow that: {error}. Nothing was changed.") from error
     except sqlite3.OperationalError as error:
         raise LedgerError(_explain(path, error)) from error
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise LedgerError(_torn(path, str(error))) from error
+    except OverflowError as error:
+        raise LedgerError(
+            f"{path} cannot hold a number beyond 64 bits ({error}). Nothing was changed."
+        ) from error
     except OSError as error:
         raise LedgerError(
             f"Could not write {path}: {error.strerror or error}. What was written before is safe."
@@ -277,6 +344,6 @@ def _explain(path: Path, error: sqlite3.OperationalError) -> str:
         )
     if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
         return f"Could not write {path}: {error}. {safe}. Make the folder writable for this account."
-    if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")):
+    if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")) or "Could not decode" in str(error):
         return _torn(path, str(error))
     return f"{path}: {error}. {safe}."

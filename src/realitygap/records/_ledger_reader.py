@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from realitygap._limits import parse_json
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
@@ -16,6 +16,7 @@ from realitygap.records._ledger_kinds import (
     Trial,
     TrialState,
 )
+from realitygap.settings import shown
 
 _TRIALS = """
 SELECT trials.*, generations.closed IS NOT NULL AS is_closed, (
@@ -62,17 +63,14 @@ class LedgerReader:
     def sittings(self) -> list[dict[str, Any]]:
         """All sittings, oldest first; `robot` and `preflight` as they were given."""
         rows = self._all("SELECT * FROM sittings ORDER BY id")
-        return [
-            {**dict(row), "robot": json.loads(row["robot"]), "preflight": json.loads(row["preflight"])}
-            for row in rows
-        ]
+        return [self._decoded(row, "robot", "preflight") for row in rows]
 
     def robots(self) -> list[dict[str, str]]:
         """What each robot that drove a trial was told by, every one once, oldest first."""
         rows = self._all(
             "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
         )
-        return [json.loads(text) for text in dict.fromkeys(row["robot"] for row in rows)]
+        return [self._value(text) for text in dict.fromkeys(row["robot"] for row in rows)]
 
     # generations
 
@@ -91,11 +89,7 @@ class LedgerReader:
             "WHERE condition = ? AND replicate = ? AND generation = ? ORDER BY individual",
             *(condition, replicate, generation),
         )
-        found = []
-        for row in rows:
-            one = dict(row) | {name: json.loads(row[name]) for name in ("parents", "genome")}
-            found.append(one | {"cells": None if row["cells"] is None else json.loads(row["cells"])})
-        return found
+        return [self._decoded(row, "parents", "genome", "cells") for row in rows]
 
     # trials
 
@@ -117,7 +111,7 @@ class LedgerReader:
             clauses.append(f"state IN ({', '.join('?' * len(chosen))})")
             values += chosen
         where = f"WHERE {' AND '.join(clauses)} " if clauses else ""
-        return [_trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
+        return [self._trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
 
     def trial(self, number: int) -> Trial:
         """A trial by its number.
@@ -130,7 +124,7 @@ class LedgerReader:
             (most,) = self._one("SELECT max(id) FROM trials") or (None,)
             has = f"its trials are 1 to {most}" if most else "it has none yet"
             raise LedgerError(f"{self.path} has no trial {number}: {has}.")
-        return _trial(row)
+        return self._trial(row)
 
     def notes(self, number: int | None = None) -> list[dict[str, Any]]:
         """Notes, oldest first; of one trial, or all."""
@@ -143,8 +137,8 @@ class LedgerReader:
         return [
             Step(
                 row["time"],
-                tuple(json.loads(row["raw"])),
-                tuple(json.loads(row["readings"])),
+                self._numbers(row["raw"]),
+                self._numbers(row["readings"]),
                 bool(row["stalled"]),
                 row["move"],
                 row["turn"],
@@ -155,17 +149,11 @@ class LedgerReader:
     def scores(self) -> list[dict[str, Any]]:
         """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
         rows = self._all("SELECT * FROM scores ORDER BY id")
-        return [
-            {**dict(row), "cells": json.loads(row["cells"]), "path": json.loads(row["path"] or "null")}
-            for row in rows
-        ]
+        return [self._decoded(row, "cells", "path") for row in rows]
 
     def events(self) -> list[dict[str, Any]]:
         """Everything that changed a trial, oldest first."""
-        return [
-            {**dict(row), "details": json.loads(row["details"])}
-            for row in self._all("SELECT * FROM events ORDER BY id")
-        ]
+        return [self._decoded(row, "details") for row in self._all("SELECT * FROM events ORDER BY id")]
 
     def used_codes(self) -> set[str]:
         """Codes that stand for a trial."""
@@ -191,12 +179,37 @@ class LedgerReader:
         with speaking(self.path):
             return self._connection.execute(query, values).fetchall()
 
+    def _trial(self, row: sqlite3.Row) -> Trial:
+        names = (
+            *(
+                "condition",
+                "replicate",
+                "generation",
+                "individual",
+                "attempt",
+                "place",
+                "sheet",
+                "pen",
+                "code",
+            ),
+            *("state", "reason", "end", "problem", "n_steps", "stalls"),
+        )
+        cells = None if row["cells"] is None else self._numbers(row["cells"])
+        given = {name: row[name] for name in names}
+        return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
-def _trial(row: sqlite3.Row) -> Trial:
-    cells = None if row["cells"] is None else tuple(json.loads(row["cells"]))
-    names = (
-        *("condition", "replicate", "generation", "individual", "attempt", "place", "sheet", "pen", "code"),
-        *("state", "reason", "end", "problem", "n_steps", "stalls"),
-    )
-    given = {name: row[name] for name in names}
-    return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
+    def _decoded(self, row: sqlite3.Row, *names: str) -> dict[str, Any]:
+        """The values of a row, some of which are written as JSON."""
+        return dict(row) | {name: None if row[name] is None else self._value(row[name]) for name in names}
+
+    def _value(self, text: str) -> Any:
+        try:
+            return parse_json(text, nan=True)
+        except ValueError as error:
+            raise LedgerError(f"{self.path} is damaged: a value is not JSON ({error}).") from None
+
+    def _numbers(self, text: str) -> tuple[Any, ...]:
+        values = self._value(text)
+        if not isinstance(values, list) or not all(isinstance(each, int | float) for each in values):
+            raise LedgerError(f"{self.path} is damaged: {shown(text)} is no list of numbers.")
+        return tuple(values)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import polars as pl
 
+from realitygap._limits import parse_json
+from realitygap.errors import LedgerError
 from realitygap.records._columns import SCHEMA
 from realitygap.records._ledger import Ledger
 
@@ -42,16 +43,30 @@ def ledger_frame(ledger: Ledger, condition: str) -> pl.DataFrame:
     """
     runs = complete_runs(ledger, condition)
     query = _ROWS.format(runs=", ".join(map(str, runs)))
-    return pl.DataFrame([_row(dict(row)) for row in ledger._all(query, condition)], schema=SCHEMA)
+    rows = ledger._all(query, condition)
+    try:
+        return pl.DataFrame([_row(dict(row)) for row in rows], schema=SCHEMA)
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        ValueError,
+        pl.exceptions.PolarsError,
+    ) as error:
+        raise LedgerError(
+            f"{ledger.path} is damaged: an individual of condition {condition!r} is not as it was written ({error}). "
+            "Restore it from a copy."
+        ) from error
 
 
 def _row(row: dict[str, Any]) -> dict[str, Any]:
-    genome = json.loads(row["genome"])
-    cells = json.loads(row["cells"])
+    genome = parse_json(row["genome"])
+    cells = parse_json(row["cells"])
     n_ends = row["n_ends"]
     return {
         **{name: row[name] for name in ("condition", "replicate", "generation", "individual", "species")},
-        "parents": json.loads(row["parents"]),
+        "parents": parse_json(row["parents"]),
         "fitness": row["fitness"],
         "novelty": row["novelty"],
         "coverage_line": len(cells) / row["n_cells"],

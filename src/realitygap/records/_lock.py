@@ -13,6 +13,7 @@ from pathlib import Path
 
 from realitygap.errors import RecordError
 from realitygap.records._files import writing
+from realitygap.records._inside import open_inside
 from realitygap.records._version import RecordWarning
 
 LOCK_NAME = ".lock"
@@ -36,7 +37,7 @@ class FolderLock:
         """Take the lock; `on_first` is called under it unless it was held already.
 
         Raises:
-            RecordError: another writer holds it, or the folder cannot be written.
+            RecordError: another writer holds it, the folder cannot be written, or the file is a link.
         """
         with self._mutex:
             if self._depth == 0:
@@ -57,7 +58,7 @@ class FolderLock:
 
     def _take(self) -> None:
         with writing(self._path):
-            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
+            descriptor = open_inside(self._folder, self._path, os.O_RDWR | os.O_CREAT)
         try:
             _lock(descriptor)
         except (BlockingIOError, PermissionError) as error:

@@ -16,20 +16,27 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from realitygap._limits import MOST_LINES_BYTES, parse_json, read_file
 from realitygap.records._files import reading
+from realitygap.records._inside import open_inside
 from realitygap.records._version import RecordWarning
 
 LOG_NAME = "log.jsonl"
 
 
 def append_line(path: Path, event: Mapping[str, Any]) -> bool:
-    """Append one event, with `time` (UTC) and `host` unless given; False, with a warning, when it failed."""
+    """Append one event, with `time` (UTC) and `host` unless given; False, with a warning, when it failed.
+
+    Raises:
+        RecordError: the file is a link, a pipe or a device.
+    """
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
     line = json.dumps(
         {"time": now, "host": socket.gethostname(), **event}, default=_plain, ensure_ascii=False
     )
     try:
-        with path.open("a+b", buffering=0) as file:
+        descriptor = open_inside(path.parent, path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
+        with os.fdopen(descriptor, "a+b", buffering=0) as file:
             start = b"" if _ends_a_line(file.fileno()) else b"\n"
             data = start + line.encode("utf-8", "backslashreplace") + b"\n"
             # in one call, so that lines of several processes do not mix; a full disk may take a part of it
@@ -50,12 +57,12 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     with reading(path):
-        lines = path.read_bytes().splitlines()
+        lines = read_file(path, MOST_LINES_BYTES, plain=True).splitlines()
     events: list[dict[str, Any]] = []
     n_torn = 0
     for line in filter(None, lines):
         try:
-            event = json.loads(line)
+            event = parse_json(line, nan=True)
         except ValueError:
             event = None
         if isinstance(event, dict):

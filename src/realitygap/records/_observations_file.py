@@ -18,10 +18,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import MOST_LINES_BYTES, LimitError, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError
 
 from ._files import reading
+from ._inside import open_inside
 from ._observed import OBSERVATIONS, Observe, ObservedTrial
 from ._output import refuse_results, write_whole
 
@@ -151,6 +153,7 @@ class ObservationsFile:
     Args:
         path: Where; made where there is none.
         head: What its trials have in common.
+        within: The folder that the user named, if the name of the file in it is not the user's.
 
     Attributes:
         trials: Those that it had when it was opened.
@@ -160,15 +163,19 @@ class ObservationsFile:
         RecordError: It is another file, of another target, damaged, or cannot be written.
     """
 
-    def __init__(self, path: Path | str, head: ObservationsHead) -> None:
+    def __init__(self, path: Path | str, head: ObservationsHead, *, within: Path | None = None) -> None:
         self.path = Path(path)
+        if within is None and self.path.is_symlink():  # the user named it
+            self.path = self.path.resolve()
+        self._within = self.path.parent if within is None else within
         self.head = head
         self.trials: tuple[ObservedTrial, ...] = ()
         self.problem = ""
         refuse_results(self.path)
         held = self._take_up()
         try:
-            self._file = self.path.open("r+b" if self.path.exists() else "xb", buffering=0)
+            descriptor = open_inside(self._within, self.path, os.O_RDWR | os.O_CREAT)
+            self._file = os.fdopen(descriptor, "r+b", buffering=0)
             self._file.truncate(held)
             self._file.seek(max(held - 1, 0))
             if not held:
@@ -183,7 +190,7 @@ class ObservationsFile:
         if not self.path.exists():
             return 0
         with reading(self.path):
-            data = self.path.read_bytes()
+            data = read_file(self.path, MOST_LINES_BYTES, plain=True)
         if b"\n" not in data and _first_line(self.head).startswith(data):
             return 0  # a crash while the first line was written
         found, held = _parse(self.path, data)
@@ -255,7 +262,7 @@ def read_observations(path: Path | str) -> Observations:
     if not path.exists():
         raise RecordError(f"There is no file {path}. Name one with observed trials.")
     with reading(path):
-        data = path.read_bytes()
+        data = read_file(path, MOST_LINES_BYTES)
     return _parse(path, data)[0]
 
 
@@ -286,7 +293,9 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
 
 def _object(line: bytes) -> dict[str, Any]:
     try:
-        values = json.loads(line)
+        values = parse_json(line, nan=True)
+    except LimitError:
+        raise
     except ValueError:
         raise ValueError("no JSON") from None
     if not isinstance(values, dict):

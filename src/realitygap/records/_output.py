@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 from collections.abc import Iterable
 from pathlib import Path
 
 from realitygap.errors import RecordError
 from realitygap.records._description import DESCRIPTION_NAME
+from realitygap.records._inside import refuse_links
 from realitygap.records._listing import LEDGER_NAME, TRIALS_NAME
 from realitygap.records._lock import LOCK_NAME
 from realitygap.records._log import LOG_NAME
@@ -40,15 +42,22 @@ def is_special(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def write_whole(path: Path, data: bytes | Iterable[bytes]) -> None:
+def write_whole(path: Path, data: bytes | Iterable[bytes], *, within: Path | None = None) -> None:
     """Write a file beside its place and rename it, so that the place holds the old file or the new one.
 
-    A link stays and what it leads to is written; a terminal, a device or a pipe is written to as it is.
+    Args:
+        path: The file. If the user named it, a link stays and what it leads to is written, and a terminal, a device or
+            a pipe is written to as it is.
+        data: All of its bytes.
+        within: The folder that the user named, if the name of the file in it is not the user's. Links, pipes and
+            devices there are refused.
 
     Raises:
         RecordError: it belongs to a study's results, or cannot be written; a file that was there is as it was.
     """
     refuse_results(path)
+    if within is not None:
+        refuse_links(within, path)
     parts = [data] if isinstance(data, bytes) else data
     try:
         if is_special(path):
@@ -66,9 +75,10 @@ def write_whole(path: Path, data: bytes | Iterable[bytes]) -> None:
 def _replace(place: Path, parts: Iterable[bytes]) -> None:
     if place.is_dir():
         raise IsADirectoryError(0, "it is a folder")
-    beside = place.with_name(f".{place.name}.{os.getpid()}.tmp")
+    # nobody can guess the name and put a link there
+    beside = place.with_name(f".{place.name}.{secrets.randbits(63)}.tmp")
     try:
-        with beside.open("wb") as file:
+        with beside.open("xb") as file:
             file.writelines(parts)
             file.flush()
             os.fsync(file.fileno())

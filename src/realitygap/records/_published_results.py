@@ -76,6 +76,16 @@ class PublishedResults:
 
     # what it is
 
+    def __repr__(self) -> str:
+        what = f"{type(self).__name__} {str(self._path)!r}: study {self._description.study.get('name')!r}"
+        try:
+            n_conditions = len(self.conditions)
+            n_there, n_runs = self._count_runs()
+        except (RecordError, ValueError):  # it is shown in messages, too
+            return f"<{what}, damaged>"
+        of = "" if n_runs is None else f" of {n_runs:,}"
+        return f"<{what}, {n_conditions} condition{'s' * (n_conditions != 1)}, {n_there:,}{of} runs>"
+
     @property
     def path(self) -> Path:
         """The folder."""
@@ -109,18 +119,21 @@ class PublishedResults:
     @property
     def missing_note(self) -> str | None:
         """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
-        replicates = self._description.study.get("replicates")
-        if not isinstance(replicates, int):
-            return None
-        n_runs = replicates * len(self.conditions)
-        n_there = sum(max(0, min(name.last + 1, replicates) - name.first) for name in self._names())
-        n_there += sum(run < replicates for runs in self._complete_runs().values() for run in runs)
-        if n_there >= n_runs:
+        n_there, n_runs = self._count_runs()
+        if n_runs is None or n_there >= n_runs:
             return None
         return (
             f"{n_there:,} of {n_runs:,} runs are there, and the digest is theirs alone. The command that ran the study "
             "goes on with what is missing."
         )
+
+    def _count_runs(self) -> tuple[int, int | None]:
+        """Runs that are there, by the names of chunks, and of how many; None if the description does not say."""
+        replicates = self._description.study.get("replicates")
+        n = replicates if isinstance(replicates, int) else MAX_REPLICATE + 1
+        n_there = sum(max(0, min(name.last + 1, n) - name.first) for name in self._names())
+        n_there += sum(run < n for runs in self._complete_runs().values() for run in runs)
+        return n_there, replicates * len(self.conditions) if isinstance(replicates, int) else None
 
     # chunks
 

@@ -14,8 +14,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from realitygap._limits import MOST_LINES_BYTES, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError, RecordVersionError
+from realitygap.settings import shown
 
 from ._clock import Clock
 
@@ -180,7 +182,7 @@ def read_recording(path: Path | str) -> Recording:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = read_file(path, MOST_LINES_BYTES)
     except OSError as error:
         raise RecordError(f"Could not read {path}: {error.strerror or error}.") from error
     whole, newline, rest = data.rpartition(b"\n")
@@ -195,14 +197,30 @@ def read_recording(path: Path | str) -> Recording:
             f"release of realitygap that wrote it ({lines[0].get('software')})."
         )
     for number, line in enumerate(lines[1:], 2):
-        if not {"t", "kind", "name"} <= line.keys() or line["kind"] not in KINDS:
+        if not {"t", "kind", "name"} <= line.keys() or line["kind"] not in tuple(KINDS):
             raise RecordError(f"{path} is damaged: line {number} has no time, kind or name.")
+        wrong = [name for name, value in line.items() if not _is_of_column(name, value)]
+        if wrong:
+            raise RecordError(
+                f"{path} is damaged: in line {number} {wrong[0]} is {shown(line[wrong[0]])}, expected "
+                f"{_EXPECTED[COLUMNS[wrong[0]]]}."
+            )
     return Recording(path, lines[0], tuple(lines[1:]), not rest)
+
+
+_EXPECTED = {float: "a number", str: "a text"}
+
+
+def _is_of_column(name: str, value: Any) -> bool:
+    """Whether a value of a line is of the type that its column has; `values` is written as JSON."""
+    if name not in COLUMNS or name == "values":
+        return True
+    return isinstance(value, int | float if COLUMNS[name] is float else str) and not isinstance(value, bool)
 
 
 def _line(path: Path, number: int, text: bytes) -> dict[str, Any]:
     try:
-        line = json.loads(text)
+        line = parse_json(text, nan=True)
     except ValueError as error:
         raise RecordError(f"{path} is damaged: line {number} is no JSON ({error}).") from error
     if not isinstance(line, dict):

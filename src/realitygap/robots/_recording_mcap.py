@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import secrets
 from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
@@ -36,9 +37,9 @@ def export_mcap(recording: Path | str, out: Path | str) -> int:
     source = read_recording(recording)
     out = Path(out)
     began = int(datetime.fromisoformat(source.header["started"]).timestamp() * NANOSECONDS)
-    temporary = out.with_name(f".{out.name}.tmp")
+    temporary = out.with_name(f".{out.name}.{secrets.randbits(63)}.tmp")
     try:
-        with temporary.open("wb") as file:
+        with temporary.open("xb") as file:
             writer = writer_of(file)
             writer.start(profile="", library="realitygap")
             writer.add_metadata("set-up", {key: _text(value) for key, value in source.header.items()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
 from realitygap.errors import VisionError, from_extra
 
 Floats = NDArray[np.float64]
@@ -106,8 +107,8 @@ def read_lens(path: Path | str) -> Lens:
         VisionError: There is no such file, or it is none.
     """
     try:
-        values = tomllib.loads(Path(path).read_text("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        values = parse_toml(read_file(Path(path), MOST_TOML_BYTES).decode("utf-8"))
+    except (OSError, ValueError) as error:
         raise VisionError(
             f"{path} cannot be read as the file of a lens ({error}). Make one: realitygap lens"
         ) from None
@@ -120,9 +121,11 @@ def read_lens(path: Path | str) -> Lens:
         made = Lens(
             int(values["width"]), int(values["height"]), (fx, fy), (cx, cy), (k1, k2, p1, p2, k3), float(values["rms"])
         )  # fmt: skip
+        if not all(map(math.isfinite, (fx, fy, cx, cy, *made.distortion, made.rms))):
+            raise ValueError("a number of it is not finite")
         if not all(value > 0 for value in (made.width, made.height, fx, fy)):
-            raise ValueError("its size and focal length are above 0")
-    except (KeyError, TypeError, ValueError) as error:
+            raise ValueError("its size or focal length is not above 0")
+    except (KeyError, OverflowError, TypeError, ValueError) as error:  # OverflowError: an infinite width
         raise VisionError(f"{path} is no file of a lens: {error}. Make one: realitygap lens") from None
     return made
 

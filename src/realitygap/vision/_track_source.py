@@ -12,6 +12,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import MOST_VIDEO_PIXELS
 from realitygap.errors import VisionError, from_extra
 
 Image = NDArray[np.uint8]
@@ -73,6 +74,12 @@ class VideoFile:
             )
         capture = self._open()
         cv2 = from_extra("cv2", "vision")
+        width, height = (capture.get(key) for key in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+        if width * height > MOST_VIDEO_PIXELS:  # there may be no room to read even one
+            raise VisionError(
+                f"{self.path} has pictures of {width:.0f} x {height:.0f} pixels, expected at most "
+                f"{MOST_VIDEO_PIXELS:,} pixels. Make them smaller."
+            )
         is_read, image = capture.read()
         rate = capture.get(cv2.CAP_PROP_FPS)
         self.n_frames = max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))

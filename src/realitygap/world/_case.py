@@ -34,13 +34,14 @@ Other keys are notes and are passed over, unless they look like a misspelt one o
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Iterator, Mapping
+from json import JSONDecodeError
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from .._limits import MOST_JSON_BYTES, parse_json, read_file
 from ..errors import CaseError, did_you_mean
 from ._case_mistakes import contradictions, explained, listed, objects, place_of, shown
 from ._jyro_stock import (
@@ -298,7 +299,7 @@ class Case(_Part):
 def _read_json(path: Path) -> object:
     """The value in a JSON file; a key given twice is a mistake, like everything that is not JSON."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_file(path, MOST_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CaseError(
             f"{path}: not a text file (byte {error.start} is not UTF-8). Give a case in JSON."
@@ -306,15 +307,15 @@ def _read_json(path: Path) -> object:
     except OSError as error:
         raise CaseError(f"{path}: cannot be read ({error.strerror}). Give a case file in JSON.") from None
     try:
-        return json.loads(text, object_pairs_hook=_without_doubles)
-    except json.JSONDecodeError as error:
+        return parse_json(text, pairs=_without_doubles)
+    except JSONDecodeError as error:
         raise CaseError(
             f"{path}: not JSON, at line {error.lineno}, column {error.colno}: {error.msg}."
             + (" The file is empty." if not text.strip() else "")
         ) from None
     except _DoubleKeyError as error:
         raise CaseError(f"{path}: the key {error} is given twice in one object. Keep one of them.") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise CaseError(f"{path}: cannot be read as JSON ({error}).") from None
 
 

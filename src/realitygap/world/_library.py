@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -13,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import MOST_TOML_BYTES, is_file, open_image, parse_toml
 from realitygap.errors import DescriptionError, did_you_mean
 
 from ._arena import NAMED_STARTS, Arena, paper_arena
@@ -25,7 +25,7 @@ from ._svg import svg_values
 
 T = TypeVar("T")
 
-LARGEST = 4_000_000  # of a file [bytes]: a drawing of a large maze has some 100,000
+LONGEST_NAME = 500  # in a message
 MOST_BASES = 8  # robots that build on robots
 BOARDS = ("fluke1", "fluke2")  # what may be plugged into a Scribbler
 CARDBOARD = "cardboard"  # what may be put around it, last
@@ -83,7 +83,7 @@ def load_calibration(path: str | Path) -> Calibration:
         DescriptionError: There is no such file, or it is no calibration: every mistake with its place.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise DescriptionError(f"There is no calibration {file}. `realitygap calibrate` writes one.")
     values = read_toml(file, str(file))
     if not is_calibration(values):
@@ -101,7 +101,7 @@ def read_calibration(robot: str | Path) -> Calibration | None:
         DescriptionError: It is a calibration with mistakes.
     """
     path = Path(robot)
-    if str(robot) in robot_names() or not str(robot) or not path.is_file():
+    if str(robot) in robot_names() or not str(robot) or not is_file(path):
         return None
     values = read_toml(path, str(path))
     return _as_calibration(values, str(path)) if is_calibration(values) else None
@@ -141,7 +141,7 @@ def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[st
 def _beside(robot: str, origin: str) -> str | Path:
     """The file of a robot, looked for beside the file that names it first, or the robot's name."""
     beside = Path(origin).parent / robot
-    return beside if Path(origin).is_file() and beside.is_file() else robot
+    return beside if is_file(origin) and is_file(beside) else robot
 
 
 def _taken_apart(name: str) -> tuple[str, str]:
@@ -271,21 +271,12 @@ def _read_image(values: dict[str, Any], origin: str) -> None:
 
 def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
     """The brightness of an image file."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
-        with Image.open(path) as picture:
-            if max(picture.size) > MOST_PIXELS:
-                raise DescriptionError(
-                    f"{origin}: floor.image.file: {path.name} is {picture.width} x {picture.height} pixels, expected "
-                    f"at most {MOST_PIXELS} each way. Make it smaller."
-                )
+        with open_image(path, MOST_PIXELS) as picture:
             return np.asarray(picture.convert("L"), dtype=np.uint8)
-    except (OSError, UnidentifiedImageError, ValueError) as error:
-        if isinstance(error, DescriptionError):
-            raise
+    except (OSError, ValueError) as error:
         raise DescriptionError(
-            f"{origin}: floor.image.file: {path.name} is no image that can be read."
+            f"{origin}: floor.image.file: {path.name} is no image that can be read ({error})."
         ) from None
 
 
@@ -297,23 +288,21 @@ def read_toml(file: Traversable, origin: str) -> dict[str, Any]:
     """
     text = read_text(file, origin)
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return parse_toml(text)
+    except ValueError as error:
         raise DescriptionError(f"{origin}: not TOML ({error}).") from None
-    except RecursionError:
-        raise DescriptionError(f"{origin}: its lists or tables lie too deep in each other.") from None
 
 
 def read_text(file: Traversable, origin: str) -> str:
     """The text of a file of sensible size."""
     try:
         with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
+            data = stream.read(MOST_TOML_BYTES + 1)
     except OSError as error:
         raise DescriptionError(f"{origin} cannot be read: {error.strerror or error}.") from None
-    if len(data) > LARGEST:
+    if len(data) > MOST_TOML_BYTES:
         raise DescriptionError(
-            f"{origin} is larger than {LARGEST:,} bytes. Expected the file of a robot or arena."
+            f"{origin} is larger than {MOST_TOML_BYTES:,} bytes. Expected the file of a robot or arena."
         )
     try:
         return data.decode("utf-8")
@@ -335,14 +324,18 @@ def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, s
     if str(name) in known:
         return resources.files(__package__) / f"{what}s" / f"{name}.toml", str(name)
     path = Path(name)
-    if str(name) and path.is_file():
+    if str(name) and is_file(path):
         return path, str(path)
     if path.suffix or len(path.parts) > 1:
-        raise DescriptionError(f"There is no {what} file {path}.")
+        raise DescriptionError(f"There is no {what} file {_short(str(path))}.")
     endings = ".toml or .svg" if what == "arena" else ".toml"
     raise DescriptionError(
-        f"Unknown {what} {str(name)!r}. {did_you_mean(str(name), known)} A file ends in {endings}."
+        f"Unknown {what} {_short(str(name))!r}. {did_you_mean(str(name), known)} A file ends in {endings}."
     )
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
 
 
 _OURS = ("RobotModel.", "ArenaFile.", "Calibration.")

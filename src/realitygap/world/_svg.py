@@ -27,6 +27,7 @@ SHAPES = ("line", "rect", "circle", "polyline", "polygon", "path")
 ROUND = 32  # walls that stand for a circle that is not filled
 SAME = 1e-9  # of lengths that should be one, relative: rounding of a drawing program's numbers
 MOST_SHAPES = 5000
+MOST_LETTERS = 2000  # of an attribute that is not a list of points
 DEEPEST = 50  # groups in groups
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
@@ -138,12 +139,19 @@ def svg_values(text: str) -> dict[str, Any]:
 
 def _root(text: str) -> ElementTree.Element:
     """The drawing; entities, which can make a small file huge, are refused."""
-    if "<!ENTITY" in text or re.search(r"<!DOCTYPE[^>]*\[", text):
+    declared = text.partition("<!DOCTYPE")[2].partition(">")[0]
+    if "<!ENTITY" in text or "[" in declared:
         raise ValueError("it declares entities of its own, which are not read. Save it as plain SVG")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         raise ValueError(f"it is no SVG: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"it is no SVG: {error}") from None
+    for element in root.iter():
+        for key, value in element.attrib.items():
+            if len(value) > MOST_LETTERS and key not in ("d", "points"):
+                raise ValueError(f"{_name(element)}: {key[:60]} has more than {MOST_LETTERS:,} letters")
     if root.tag.removeprefix(SVG) != "svg":
         raise ValueError(f"it is no SVG: expected <svg>, came <{_tag(root)}>")
     return root

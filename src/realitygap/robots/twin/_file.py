@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from realitygap._limits import is_file
 from realitygap.errors import DescriptionError
 from realitygap.settings import Settings
 from realitygap.world._library import read_toml
@@ -28,7 +29,7 @@ def load_twin(path: str | Path) -> TwinModel:
         DescriptionError: There is no such file, or it cannot be used: every mistake with its place.
     """
     file = Path(path)
-    if not file.is_file():
+    if not is_file(file):
         raise DescriptionError(
             f"There is no twin file {file}. Draw one: realitygap twin sample --family close -o {file.name or 'FILE'}"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import tomllib
 from importlib import resources
 from numbers import Integral
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.robots import ARENA, JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, as_numbers
@@ -88,7 +88,7 @@ def _load_study(study: str | Path, seed: int | None, replicates: int | None) -> 
             "`realitygap new-study` writes one."
         )
     try:
-        text = path.read_text("utf-8")
+        text = read_file(path, MOST_TOML_BYTES).decode("utf-8")
     except UnicodeDecodeError as error:
         raise StudyError(
             f"{path} is not a text file in UTF-8 (byte {error.start} is not). Expected a study file, as "
@@ -111,11 +111,11 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
         seed, replicates: In place of the file's.
     """
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        data = parse_toml(text)
+    except ValueError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
     problems = Problems()
-    find_files(data, Path(origin).parent)
+    find_files(data, Path(origin).parent, problems)
     study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
     if problems.lines or study is None:
         count = len(problems.lines)
@@ -243,7 +243,9 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
 
 def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     """A section of a condition over that of the study: key by key, and numbers by name; another task has its own."""
-    if section == "task" and above.get("kind", below.get("kind")) != below.get("kind"):
+    if section == "task" and any(
+        above.get(key, below.get(key)) != below.get(key) for key in ("kind", "source")
+    ):
         return above
     merged = {**below, **above}
     if section == "sim" and isinstance(below.get("set"), dict) and isinstance(above.get("set"), dict):

@@ -1,4 +1,4 @@
-"""Files that a study names: looked for beside the study's own file first."""
+"""Files that a study names: looked for beside the study's own file first, Python files only there."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from realitygap.tasks import PYTHON
+from realitygap._limits import is_file
+from realitygap.errors import TaskError
+from realitygap.tasks import PYTHON, read_task_file
+
+from ._problems import Problems
 
 
-def find_files(data: dict[str, Any], folder: Path) -> None:
-    """Put the folder in front of the files of robots, arenas and tasks that are there.
+def find_files(data: dict[str, Any], folder: Path, problems: Problems) -> None:
+    """Put the folder in front of the files of robots and arenas that are there, and read the files of Python tasks.
 
     Args:
         data: The study as its file has it; changed. What is no table there is left alone.
         folder: Of the study's file.
+        problems: Takes what is wrong with Python files.
     """
     platforms = data.get("platform")
     if isinstance(platforms, dict):
@@ -23,11 +28,26 @@ def find_files(data: dict[str, Any], folder: Path) -> None:
         _find(table.get("arena"), "file", folder)
         _find(table.get("sim"), "robot", folder)
         _find(table, "platform", folder, "sim:")
-        task = table.get("task")
-        kind = task.get("kind") if isinstance(task, dict) else None
-        if isinstance(task, dict) and isinstance(kind, str) and kind.startswith(PYTHON):
-            file, _, function = kind.removeprefix(PYTHON).rpartition(":")
-            task["kind"] = f"{PYTHON}{_beside(file, folder)}:{function}"
+        if isinstance(task := table.get("task"), dict):
+            _read_task(task, folder, problems)
+
+
+def _read_task(task: dict[str, Any], folder: Path, problems: Problems) -> None:
+    """Put the text of its Python file into a task that names one."""
+    if task.pop("source", None) is not None:
+        problems.add(
+            "task.source",
+            "code in a study file is not run. Put it into a Python file beside the study file, and name that: "
+            'kind = "python:FILE.py:FUNCTION".',
+        )
+    kind = task.get("kind")
+    if not isinstance(kind, str) or not kind.startswith(PYTHON) or kind.count(":") < 2:
+        return
+    task["source"] = ""  # so that a file that cannot be read is one mistake
+    try:
+        task["kind"], task["source"] = read_task_file(kind, folder)
+    except TaskError as error:
+        problems.add("task", str(error))
 
 
 def _tables(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -46,4 +66,4 @@ def _find(table: Any, key: str, folder: Path, prefix: str = "") -> None:
 
 
 def _beside(file: str, folder: Path) -> str:
-    return str(folder / file) if Path(file).suffix and (folder / file).is_file() else file
+    return str(folder / file) if Path(file).suffix and is_file(folder / file) else file

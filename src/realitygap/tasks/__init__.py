@@ -1,5 +1,6 @@
 """What is rewarded."""
 
+from ._allowed import is_allowed, remember_allowed, source_hash
 from ._avoid import AvoidTask
 from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
@@ -7,7 +8,7 @@ from ._goal import GoalTask
 from ._kinds import TASKS, as_task, task_model
 from ._light import LightTask
 from ._mazes import MAZE_TASKS, MazeAgent, MazeTask
-from ._python import PYTHON, PythonTask
+from ._python import PYTHON, PythonTask, not_allowed, read_task_file
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
 from ._wall import WallTask
@@ -30,5 +31,10 @@ __all__ = [
     "Trajectories",
     "WallTask",
     "as_task",
+    "is_allowed",
+    "not_allowed",
+    "read_task_file",
+    "remember_allowed",
+    "source_hash",
     "task_model",
 ]

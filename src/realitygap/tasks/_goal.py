@@ -11,7 +11,7 @@ from pydantic import Field
 from realitygap.errors import TaskError
 from realitygap.kernels._scores import goal_scores
 from realitygap.settings import Settings
-from realitygap.world import Arena
+from realitygap.world import Arena, Goal
 
 from ._inputs import Inputs
 from ._trajectories import Trajectories
@@ -48,8 +48,8 @@ class GoalTask(Settings):
         """Always: the goal may be reached at any step."""
         return True
 
-    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) at most 1; below 0 where the robot ended farther away than it began.
+    def check_arena(self, arena: Arena) -> Goal:
+        """Return the arena's goal.
 
         Raises:
             TaskError: The arena has no goal, or it is where trials start.
@@ -59,15 +59,23 @@ class GoalTask(Settings):
                 f"Task 'goal' wants a goal, and arena {arena.name!r} has none. Choose another arena, such as 'goal', "
                 "or put a [goal] into its file."
             )
-        x, y, radii = (
-            trajectories.number(f"arena.goal.{name}", getattr(arena.goal, name))
-            for name in ("x", "y", "radius")
-        )
-        goals = np.stack([x - arena.start.x, y - arena.start.y], axis=1)
         if np.hypot(arena.goal.x - arena.start.x, arena.goal.y - arena.start.y) <= arena.goal.radius:
             raise TaskError(
                 f"Trials in arena {arena.name!r} start at its goal, expected one to be reached. Move the start."
             )
+        return arena.goal
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) at most 1; below 0 where the robot ended farther away than it began.
+
+        Raises:
+            TaskError: The arena has no goal, or it is where trials start.
+        """
+        goal = self.check_arena(arena)
+        x, y, radii = (
+            trajectories.number(f"arena.goal.{name}", getattr(goal, name)) for name in ("x", "y", "radius")
+        )
+        goals = np.stack([x - arena.start.x, y - arena.start.y], axis=1)
         scores = np.empty(len(trajectories))
         goal_scores(trajectories.arrays.poses, goals, radii, scores)
         return scores

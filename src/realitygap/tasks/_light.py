@@ -40,16 +40,12 @@ class LightTask(Settings):
         """Always: every step counts."""
         return True
 
-    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) 0 to 1.
+    def check_arena(self, arena: Arena) -> None:
+        """Refuse an arena in which nothing can be sought.
 
         Raises:
             TaskError: The arena has no light, or one at the start.
         """
-        places = np.empty((len(trajectories), len(arena.lights), 2))
-        for k, light in enumerate(arena.lights):
-            places[:, k, 0] = trajectories.number(f"arena.light.{k}.x", light.x) - arena.start.x
-            places[:, k, 1] = trajectories.number(f"arena.light.{k}.y", light.y) - arena.start.y
         if not arena.lights:
             raise TaskError(
                 f"Task 'light' wants a light, and arena {arena.name!r} has none. Choose another arena, such as "
@@ -60,6 +56,18 @@ class LightTask(Settings):
                 f"A light of arena {arena.name!r} is where trials start, expected one to be sought. Move the start or "
                 "the light."
             )
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) 0 to 1.
+
+        Raises:
+            TaskError: The arena has no light, or one at the start.
+        """
+        self.check_arena(arena)
+        places = np.empty((len(trajectories), len(arena.lights), 2))
+        for k, light in enumerate(arena.lights):
+            places[:, k, 0] = trajectories.number(f"arena.light.{k}.x", light.x) - arena.start.x
+            places[:, k, 1] = trajectories.number(f"arena.light.{k}.y", light.y) - arena.start.y
         scores = np.empty(len(trajectories))
         nearness_scores(trajectories.arrays.poses, trajectories.arrays.stalled, places, scores)
         return scores

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import linecache
 import traceback
 from collections.abc import Callable
@@ -12,24 +11,29 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
+from realitygap._limits import MOST_TOML_BYTES, read_file
 from realitygap.errors import TaskError
-from realitygap.settings import Settings
+from realitygap.settings import Settings, visible
 from realitygap.world import Arena
 
+from ._allowed import source_hash
 from ._trajectories import Trajectories
 
 PYTHON = "python:"
 
 
 class PythonTask(Settings):
-    """What a function of one's own says that trials are worth.
+    """A function of a Python file that says what trials are worth.
 
     `kind = "python:FILE.py:function"` names it. The function gets `Trajectories` of n trials and returns n numbers,
     more for what is better. One that Numba compiled (`numba.njit`) gets the kernels' own arrays, `TraceArrays`, the
     length of a step [s] and an array of n numbers to write to: nothing is converted for it. The text of the file is
     part of the condition, its folder is not: results stay with the function that they were computed with.
+
+    The settings are data. Making a task, copying it, or reading it back from a folder of results runs nothing and opens
+    no file: `from_file` reads a file, and only what `allowed` returns runs it.
     """
 
     kind: str = Field(
@@ -44,35 +48,59 @@ class PythonTask(Settings):
     )
     source: str = Field(
         "",
-        description="The file's text; read from the file where it is empty.",
+        description="Text of the file. Study files name the file instead.",
         json_schema_extra={"hidden": True},
         repr=False,
     )
+    # Not a setting: no file and no folder of results can give this permission.
+    _may_run: bool = PrivateAttr(default=False)
+
+    @classmethod
+    def from_file(cls, kind: str, **settings: Any) -> Self:
+        """Read a task's file.
+
+        Args:
+            kind: `python:FILE.py:function`, with the file's path as seen from the current folder.
+            settings: `inputs`.
+
+        Raises:
+            TaskError: The file cannot be read.
+            ValueError: A setting is wrong.
+        """
+        bare, source = read_task_file(kind, Path())
+        return cls(kind=bare, source=source, **settings)
 
     @model_validator(mode="before")
     @classmethod
-    def _read_the_file(cls, values: Any) -> Any:
-        if not isinstance(values, dict):
-            return values
-        if isinstance(values.get("inputs"), list):
-            values = {**values, "inputs": tuple(values["inputs"])}
-        if values.get("source") or str(values.get("kind")).count(":") < 2:
-            return values
-        path = Path(str(values["kind"]).removeprefix(PYTHON).rpartition(":")[0])
-        bare = f"{PYTHON}{path.name}:{str(values['kind']).rpartition(':')[2]}"
-        try:
-            return {**values, "kind": bare, "source": path.read_text("utf-8")}
-        except (OSError, UnicodeDecodeError) as error:
-            said = getattr(error, "strerror", None) or error
-            raise ValueError(f"task file {path} cannot be read: {said}") from None
+    def _take_a_list_of_inputs(cls, values: Any) -> Any:
+        if isinstance(values, dict) and isinstance(values.get("inputs"), list):
+            return {**values, "inputs": tuple(values["inputs"])}
+        return values
 
     @model_validator(mode="after")
-    def _has_the_function(self) -> Self:
-        try:
-            self._function()
-        except TaskError as error:
-            raise ValueError(str(error).rstrip(".")) from None
+    def _has_a_text(self) -> Self:
+        if "source" not in self.model_fields_set:
+            raise ValueError(f"{self.kind} has no text. PythonTask.from_file({self.kind!r}) reads its file")
         return self
+
+    def allowed(self) -> Self:
+        """Return this task with the permission to run its code.
+
+        `realitygap.run_study` calls it after the user has agreed. Call it for a file that you trust.
+        """
+        task = self.model_copy()
+        task._may_run = True
+        return task
+
+    @property
+    def may_run(self) -> bool:
+        """Whether it has the permission to run its code."""
+        return self._may_run
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the file's text."""
+        return source_hash(self.source)
 
     @property
     def name(self) -> str:
@@ -94,16 +122,23 @@ class PythonTask(Settings):
         """The function's name."""
         return self.kind.rpartition(":")[2]
 
-    def _function(self) -> Callable[..., Any]:
+    def function(self) -> Callable[..., Any]:
+        """Run the file's text and return its function.
+
+        Raises:
+            TaskError: The task may not run code, the text cannot be run, or it has no such function.
+        """
+        if not self._may_run:
+            raise TaskError(not_allowed(self))
         return _load(self.source, self.file, self.function_name)
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """(n,) what the function says.
 
         Raises:
-            TaskError: It failed, or did not return n finite numbers.
+            TaskError: It may not run, it failed, or it did not return n finite numbers.
         """
-        function, n = self._function(), len(trajectories)
+        function, n = self.function(), len(trajectories)
         try:
             if hasattr(function, "py_func"):
                 told = np.full(n, np.nan)
@@ -125,6 +160,38 @@ class PythonTask(Settings):
         return told
 
 
+def read_task_file(kind: str, folder: Path) -> tuple[str, str]:
+    """Read the Python file of a task.
+
+    Args:
+        kind: `python:FILE.py:function`.
+        folder: Where a relative FILE is.
+
+    Returns:
+        `kind` with the file's name alone, and the file's text.
+
+    Raises:
+        TaskError: The file cannot be read.
+    """
+    file, _, function = kind.removeprefix(PYTHON).rpartition(":")
+    path = folder / file
+    try:
+        text = read_file(path, MOST_TOML_BYTES, plain=True).decode("utf-8")
+        return f"{PYTHON}{path.name}:{function}", text.replace("\r\n", "\n").replace("\r", "\n")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise TaskError(f"task file {visible(str(path))} cannot be read: {reason}.") from None
+
+
+def not_allowed(task: PythonTask) -> str:
+    """Return the message of a task that may not run."""
+    return (
+        f"The task {visible(task.kind)} runs the code of a Python file (SHA-256 {task.sha256}), and you have not "
+        "allowed this file. Nothing was run. Read the file. If you trust it, answer the question that `realitygap run` "
+        "asks in a terminal, or give --allow-code (in Python: allow_code=True)."
+    )
+
+
 @functools.lru_cache(maxsize=32)
 def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     """A function of a file's text.
@@ -132,7 +199,7 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     Raises:
         TaskError: The text cannot be run, or has no such function.
     """
-    digest = hashlib.sha256(source.encode()).hexdigest()[:16]
+    digest = source_hash(source)[:16]
     shown_as = f"<{file} {digest}>"
     linecache.cache[shown_as] = (len(source), None, source.splitlines(keepends=True), shown_as)
     space: dict[str, Any] = {"__name__": f"realitygap_task_{digest}", "__file__": shown_as}
@@ -148,8 +215,7 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
 
 
 def _failed(task: PythonTask, error: Exception) -> str:
-    digest = hashlib.sha256(task.source.encode()).hexdigest()[:16]
-    line = _line_of(error, f"<{task.file} {digest}>")
+    line = _line_of(error, f"<{task.file} {task.sha256[:16]}>")
     return f"{task.function_name} of {task.file} failed: {line}{_said(error)}"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -45,25 +46,37 @@ class WallTask(Settings):
         """Always: every step counts."""
         return True
 
+    def check_arena(self, arena: Arena, drawn: Iterable[str] = ()) -> None:
+        """Refuse an arena in which there is nothing to go along, or not at one place.
+
+        Args:
+            arena: Where.
+            drawn: Names of the numbers that are drawn for each trial.
+
+        Raises:
+            TaskError: The arena has neither walls nor obstacles, or they are drawn.
+        """
+        moved = [name for name in drawn if name.startswith(("arena.wall.", "arena.obstacle."))]
+        if moved:
+            raise TaskError(
+                f"Task 'wall' wants walls and obstacles at one place in all trials, and {moved[0]} is drawn. Set it to "
+                "a number."
+            )
+        if not arena.walls and not arena.obstacles:
+            raise TaskError(
+                f"Task 'wall' wants walls, and arena {arena.name!r} has none. Choose another arena, such as 'wall'."
+            )
+
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """(n,) [m], below 0 where the robot went the wrong way round.
 
         Raises:
             TaskError: The arena has neither walls nor obstacles, or they are drawn.
         """
-        drawn = [name for name in trajectories.drawn if name.startswith(("arena.wall.", "arena.obstacle."))]
-        if drawn:
-            raise TaskError(
-                f"Task 'wall' wants walls and obstacles at one place in all trials, and {drawn[0]} is drawn. Set it to "
-                "a number."
-            )
-        walls = outlines(arena)
-        if not len(walls):
-            raise TaskError(
-                f"Task 'wall' wants walls, and arena {arena.name!r} has none. Choose another arena, such as 'wall'."
-            )
+        self.check_arena(arena, trajectories.drawn)
         scores = np.empty(len(trajectories))
-        wall_scores(trajectories.arrays.poses, walls, SIDES[self.side], float(self.within), scores)
+        walls, side, within = outlines(arena), SIDES[self.side], float(self.within)
+        wall_scores(trajectories.arrays.poses, walls, side, within, scores)
         return scores
 
 

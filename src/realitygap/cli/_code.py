@@ -1,0 +1,76 @@
+"""Asking whether the Python file of a task may run."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import typer
+
+from realitygap.errors import TaskError
+
+from ._keys import read_line
+
+if TYPE_CHECKING:
+    from realitygap.study import AllowCode
+    from realitygap.tasks import PythonTask
+
+ALLOW_CODE_HELP = "Run the Python files of tasks without asking. The answer is not remembered."
+
+
+def code_permission(allow_code: bool) -> AllowCode:
+    """Return what `run_study` takes: True if the option is given, otherwise a function that asks."""
+    return allow_code or _ask_once()
+
+
+def _ask_once() -> AllowCode:
+    answers: set[str] = set()
+
+    def ask(task: PythonTask) -> bool:
+        """Show a file and ask; an answer that cannot be saved holds for this command."""
+        if task.sha256 not in answers:
+            if not _is_terminal():
+                return False
+            _ask(task)
+            answers.add(task.sha256)
+        return True
+
+    return ask
+
+
+def _is_terminal() -> bool:
+    """Return whether the user can see the file and answer."""
+    streams = (sys.stdin, sys.stderr)
+    return all(stream is not None and stream.isatty() for stream in streams)
+
+
+def _ask(task: PythonTask) -> None:
+    """Show the file of a task and remember that it may run.
+
+    Raises:
+        TaskError: It may not.
+    """
+    from realitygap.settings import visible
+    from realitygap.tasks import remember_allowed
+
+    # `splitlines` also splits at letters that do not end a line of Python.
+    lines = task.source.removesuffix("\n").split("\n")
+    typer.echo(
+        f"This study runs {task.function_name} of {visible(task.file)}, which you have not allowed before:\n",
+        err=True,
+    )
+    for number, line in enumerate(lines, 1):
+        typer.echo(f"{number:5d}  {visible(line)}", err=True)
+    typer.echo(
+        f"\n{visible(task.file)}: {len(lines)} lines, SHA-256 {task.sha256}\n"
+        "This code, and the modules that it imports, can do on this machine whatever you can do.\n"
+        "Run it? [y/N] ",
+        err=True,
+        nl=False,
+    )
+    if read_line().lower() not in ("y", "yes"):
+        raise TaskError(f"{visible(task.file)} may not run. Nothing was run, and nothing was written.")
+    try:
+        remember_allowed(task.sha256, task.file)
+    except (OSError, RuntimeError) as error:
+        typer.echo(f"realitygap: note: the answer cannot be saved: {error}.", err=True)

@@ -1,0 +1,73 @@
+"""Permission to run the Python files of a study's tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from realitygap.errors import StudyError, TaskError
+from realitygap.runs import Condition
+from realitygap.tasks import PYTHON, PythonTask, is_allowed, not_allowed, read_task_file, source_hash
+
+from ._study import Study
+
+AllowCode = bool | Callable[[PythonTask], bool]
+"""Whether Python files may run that the user has not allowed before; or who is asked, once for each file."""
+
+
+def python_tasks(study: Study) -> list[PythonTask]:
+    """Return the Python tasks of a study, one for each file and function."""
+    tasks = [each.task for each in study.conditions if isinstance(each.task, PythonTask)]
+    return list({(task.kind, task.source): task for task in tasks}.values())
+
+
+def with_code_allowed(study: Study, allow_code: AllowCode) -> Study:
+    """Return the study with the permission to run its Python files, after running each once.
+
+    Args:
+        study: As resolved from its file.
+        allow_code: Whether files may run that the user has not allowed before, or who is asked.
+
+    Raises:
+        TaskError: A file is not allowed, cannot be run, or lacks its function.
+    """
+    tasks = python_tasks(study)
+    asked: set[str] = set()
+    for task in tasks:
+        if task.may_run or task.sha256 in asked or is_allowed(task.sha256):
+            continue
+        asked.add(task.sha256)
+        if not (allow_code(task) if callable(allow_code) else allow_code):
+            raise TaskError(not_allowed(task))
+    for task in tasks:
+        task.allowed().function()
+    return study.model_copy(update={"conditions": tuple(map(with_code, study.conditions))})
+
+
+def with_code(condition: Condition) -> Condition:
+    """Return a condition whose task may run code, if it is a Python task."""
+    task = condition.task
+    return (
+        condition.model_copy(update={"task": task.allowed()}) if isinstance(task, PythonTask) else condition
+    )
+
+
+def check_files(study: Study, folder: Path) -> None:
+    """Raise an error unless the Python files of a study are in a folder, with the texts that the study has.
+
+    A folder of results keeps the text for the record. What runs is a file that the user has.
+
+    Raises:
+        StudyError: A file is missing, or has another text.
+    """
+    for task in python_tasks(study):
+        try:
+            # Its name alone: results name no file in another folder.
+            _, source = read_task_file(f"{PYTHON}{Path(task.file).name}:{task.function_name}", folder)
+        except TaskError as error:
+            raise StudyError(f"Resuming the study needs its Python file: {error}") from None
+        if source != task.source:
+            raise StudyError(
+                f"{task.file} in {folder} has SHA-256 {source_hash(source)}, and the results were computed with "
+                f"{task.sha256}. Restore the file, or start a new study."
+            )

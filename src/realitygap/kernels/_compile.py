@@ -4,17 +4,10 @@ from __future__ import annotations
 
 import functools
 import gc
-import hashlib
-import os
-import sys
-import tempfile
-import warnings
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import caching
 from numba.core.compiler import CompilerBase, Flags
 from numba.core.compiler_machinery import PassManager
 from numba.core.typed_passes import (
@@ -32,6 +25,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from ._cache import SealedCache, usable_folder
 from ._lower import LowerForCallers, LowerKernel
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -40,69 +34,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 MAKER = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def _sources_hash() -> str:
-    """A hash of all kernel sources.
-
-    Numba's own cache looks at the file of the function alone, so an edit of a kernel in another file would
-    go unseen by its callers.
-    """
-    digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_root() -> Path:
-    """The folder for compiled kernels: `REALITYGAP_CACHE`, or the user's cache folder."""
-    named = os.environ.get("REALITYGAP_CACHE")
-    if named:
-        return Path(named)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "realitygap"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "realitygap"
-    caches = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    if not caches.is_absolute():  # its specification has such a one ignored
-        caches = Path.home() / ".cache"
-    return caches / "realitygap"
-
-
-def _writable_cache() -> Path | None:
-    """The cache folder of exactly these sources, or None (said once) where nothing can be written."""
-    folder = cache_root() / f"kernels-{_sources_hash()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        warnings.warn(
-            f"Compiled kernels cannot be kept in {folder} ({error.strerror}): each start compiles anew. "
-            "Set REALITYGAP_CACHE to a folder that can be written.",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-        return None
-    return folder
-
-
-CACHE_FOLDER = _writable_cache()
-
-
-class _ForgivingCache(caching.FunctionCache):
-    """Numba's cache, for which a torn file or a full disk means compiling again rather than an exception."""
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # unpickling a torn file can raise anything
-            return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)
-        except Exception:  # a torn index is met here too; the kernel itself works
-            self.flush()
+CACHE_FOLDER = usable_folder()
 
 
 def _mark_stage(state: Any) -> None:
@@ -194,12 +126,7 @@ class Kernel:
         self.py_func = function
         self._entry = numba.njit(**options, pipeline_class=_EntryStage if stage else _Entry)(function)
         if CACHE_FOLDER is not None:
-            before = numba.config.CACHE_DIR
-            numba.config.CACHE_DIR = str(CACHE_FOLDER)
-            try:
-                self._entry._cache = _ForgivingCache(function)
-            finally:
-                numba.config.CACHE_DIR = before
+            self._entry._cache = SealedCache(function, CACHE_FOLDER)
         # Python must never call it: without a wrapper that ends the process. Numba's type holds it weakly.
         self._inner = numba.njit(
             **options, no_cpython_wrapper=True, pipeline_class=_InnerStage if stage else _Inner

@@ -111,8 +111,8 @@ def test_the_driver_works_through_a_link_to_a_pseudo_terminal_with_the_platform_
         assert len(robot.observe().readings) == 3
 
 
-def test_two_programs_on_one_port_are_told_apart_by_an_error(server):
-    with Scribbler(server.name), pytest.raises(RobotError, match="Another program holds it; close that one"):
+def test_port_that_is_open_in_this_program_is_refused_with_what_to_do(server):
+    with Scribbler(server.name), pytest.raises(RobotError, match="This program has it open already"):
         Scribbler(server.name)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import secrets
 import warnings
 from pathlib import Path
 from typing import Any
 
+from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.errors import RobotError
 
 NAME = b"Scribby".ljust(16)
@@ -85,9 +87,14 @@ class Memory:
         if self._file is None:
             return
         try:
-            beside = self._file.with_name(f".{self._file.name}.new")
-            beside.write_text(json.dumps(self._to_dict(), indent=2) + "\n", encoding="utf-8")
-            beside.replace(self._file)
+            # nobody can guess the name and put a link there
+            beside = self._file.with_name(f".{self._file.name}.{secrets.randbits(63)}.tmp")
+            try:
+                with beside.open("x", encoding="utf-8") as file:
+                    file.write(json.dumps(self._to_dict(), indent=2) + "\n")
+                beside.replace(self._file)
+            finally:
+                beside.unlink(missing_ok=True)
         except OSError as error:
             raise RobotError(
                 f"{self._file}: the robot's memory cannot be kept ({error.strerror})."
@@ -107,11 +114,11 @@ class Memory:
 
     def _load(self, file: Path) -> None:
         try:
-            text = file.read_text(encoding="utf-8", errors="replace")
+            text = read_file(file, MOST_JSON_BYTES)
         except OSError as error:
             raise RobotError(f"{file}: the robot's memory cannot be read ({error.strerror}).") from error
         try:
-            values = json.loads(text)
+            values = parse_json(text)
             self.name[:] = _bytes(values["name"], 16)
             self.password[:] = _bytes(values["password"], 16)
             self.data[:] = _bytes(values["data"], 8)

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import parse_json
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Grid, Pose
 
@@ -155,7 +156,7 @@ def _cells_at(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> 
 def answer_witness(witness: Witness, line: bytes) -> bytes:
     """The answer to one request over the wire, a line of JSON: {"do": "place", "pose": [x, y, heading], "seed": 1}."""
     try:
-        request = json.loads(line)
+        request = parse_json(line)
         result = _do(witness, request["do"], request)
     except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         reply: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
@@ -219,7 +220,7 @@ class RemoteWitness:
             raise RobotError(f"The witness at {self._address} does not answer ({error}).") from error
         if not line:
             raise RobotError(f"The witness at {self._address} has gone; is the emulator still running?")
-        reply = json.loads(line)
+        reply = parse_json(line)
         if "error" in reply:
             raise RobotError(f"The witness at {self._address} says: {reply['error']}")
         return reply["result"]

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from realitygap._limits import open_image
+
 from ._colors import Color, darker, lighter
 from ._mistakes import MyroError, whole
 
@@ -217,10 +219,10 @@ class Pixel:
 
 def _opened(filename: str) -> Image.Image:
     try:
-        with Image.open(Path(filename).expanduser()) as image:
+        with open_image(Path(filename).expanduser(), _LARGEST) as image:
             return image.convert("RGBA")
-    except OSError as error:
-        reason = error.strerror or "it is no picture that can be read"
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is no picture that can be read"
         raise MyroError(f"The picture {filename!r} cannot be opened: {reason}.") from error
 
 

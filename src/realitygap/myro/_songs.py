@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 
+from realitygap._limits import MOST_TABLE_BYTES, read_file
+
 from ._mistakes import MyroError, number
 
 Note = tuple[float, float] | tuple[float, float, float]
@@ -88,9 +90,10 @@ def readSong(filename: str) -> list[Note]:
         MyroError: There is no such file, or a note cannot be read.
     """
     try:
-        text = Path(filename).read_text()
-    except OSError as error:
-        raise MyroError(f"readSong: {filename!r} cannot be read: {error.strerror}.") from error
+        text = read_file(Path(filename), MOST_TABLE_BYTES).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise MyroError(f"readSong: {filename!r} cannot be read: {reason}.") from error
     return _parse(text.replace(";", "\n").splitlines(), str(filename))
 
 

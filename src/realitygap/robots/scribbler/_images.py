@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
+from realitygap._limits import open_image
 from realitygap.errors import ProtocolError
 
 Pixels = NDArray[np.uint8]
@@ -37,11 +38,9 @@ def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels
         ProtocolError: it is no picture.
     """
     try:
-        with Image.open(io.BytesIO(header + scan[:-12]), formats=("JPEG",)) as file:
-            if file.width > 2 * size.width or file.height > 2 * size.height:
-                raise ValueError(f"it would be {file.width} x {file.height}")
+        with open_image(io.BytesIO(header + scan[:-12]), 2 * max(size), ("JPEG",)) as file:
             picture = file.convert("L" if gray else "RGB")
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
+    except (OSError, ValueError) as error:
         raise ProtocolError(f"The picture cannot be read ({error}): a byte was lost or added") from error
     if picture.size != size:
         picture = picture.resize(size, Image.Resampling.NEAREST)

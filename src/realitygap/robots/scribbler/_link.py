@@ -11,7 +11,9 @@ never forgets, Myro has no way out; see `Link._release_counter`.
 from __future__ import annotations
 
 import contextlib
+import errno
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
@@ -21,6 +23,9 @@ from realitygap.robots._clock import Clock, SystemClock
 
 from . import _codec as codec
 from ._codec import Request
+from ._guardian import Guardian, descriptor_of
+from ._guardian_process import GIVE_UP_S, SILENT_S
+from ._holder import LOCKS, holder_of, holder_words
 from ._opcodes import COUNTED, JPEG_HEADER, PACKET, Op
 from ._reading import GAP_S, Fault, HangUp, Port, read_answer
 
@@ -55,6 +60,10 @@ SILENT_GREETINGS = 3
 """How often if nothing at all comes: one that was reset as its port was opened is back by then."""
 STRANGER_PROBES = 8
 """Enough to release a Fluke, and less than a packet for a robot that has none."""
+LOCKED_S = 0.05
+"""Time between two attempts to open a port that the guardian of an ended program still has [s]."""
+UNKNOWN_HOLDER_S = 2.0
+"""How long to try where the system does not tell who has a port locked [s]."""
 
 
 try:
@@ -80,6 +89,7 @@ class Faults:
         recoveries: Times at which both sides had to find the same step again; the motors stood still meanwhile.
         hang_ups: Times at which the port was gone.
         watchdog_stops: Times at which the motors were stopped because the controlling loop was silent.
+        guardian_stops: Times at which they were because this program was frozen, or because its guardian ended.
     """
 
     retries: int = 0
@@ -87,6 +97,7 @@ class Faults:
     recoveries: int = 0
     hang_ups: int = 0
     watchdog_stops: int = 0
+    guardian_stops: int = 0
 
 
 class Exchange(NamedTuple):
@@ -117,14 +128,37 @@ class _LostStep(Exception):  # noqa: N818
         self.fault = fault
 
 
+class _Locked(Exception):  # noqa: N818
+    """Another process has locked the port."""
+
+
 def open_port(name: str) -> Any:
     """A port as pyserial opens it, with DTR low, as a cabled S2 needs it to speak.
+
+    A port that the guardian of an ended program still has is waited for.
 
     Raises:
         RobotError: it cannot be opened; the text says what to do.
     """
+    give_up_s = time.monotonic() + (GIVE_UP_S + 1.0 if LOCKS.exists() else UNKNOWN_HOLDER_S)
+    while True:
+        try:
+            return _open_once(name)
+        except _Locked as error:
+            holder = holder_of(name)
+            if holder is not None or time.monotonic() > give_up_s:
+                raise RobotError(f"{name} cannot be opened: it is in use. {holder_words(holder)}") from error
+        time.sleep(LOCKED_S)
+
+
+def _open_once(name: str) -> Any:
     import serial
 
+    if name.startswith("rfc2217://"):
+        raise RobotError(
+            f"{name} cannot be opened: RFC 2217 is not supported, as its ports cannot be handed to the process that "
+            "stops a robot whose program was killed. Offer the port as raw TCP and name it socket://HOST:PORT."
+        )
     port: Any = None
     try:
         port = serial.serial_for_url(name, do_not_open=True, baudrate=BAUD, timeout=GAP_S)
@@ -134,6 +168,8 @@ def open_port(name: str) -> Any:
             port.exclusive = True
         port.open()
     except (OSError, ValueError, AttributeError) as error:
+        if getattr(error, "errno", None) == errno.EAGAIN:
+            raise _Locked from error
         raise RobotError(f"{name} cannot be opened: {error}. {_advice(name, error)}") from error
     return port
 
@@ -156,8 +192,6 @@ def _advice(name: str, error: Exception) -> str:
     text = str(error).lower()
     if "permission" in text or "denied" in text:
         return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
-    if "lock" in text or "busy" in text:
-        return "Another program holds it; close that one."
     if name.startswith("emulator://") and "not known" in text:
         return "`import realitygap.emulator` makes such ports known."
     if "://" in name:
@@ -202,7 +236,21 @@ class Link:
         self._fault: Fault | None = None
         self._recoveries = RECOVERIES
         self._is_open = True
+        self._guardian: Guardian | None = None
+        self._stopped = (
+            ""  # why the motors were stopped behind the caller's back, until a command has said it
+        )
         port.timeout = GAP_S
+        try:
+            self._start_guardian()
+        except RobotError:
+            self.close()
+            raise
+
+    @property
+    def guardian_id(self) -> int | None:
+        """Number of the process that stops the motors if this one is killed; None for a robot in this program."""
+        return None if self._guardian is None else self._guardian.process_id
 
     @property
     def is_open(self) -> bool:
@@ -230,6 +278,7 @@ class Link:
                 self.watch()
             fault, lost, n_sent = None, False, 0
             for attempt in range(ATTEMPTS):
+                self._refuse_if_stopped(request)
                 try:
                     if not self._in_step:
                         self._find_step_for(request)
@@ -245,6 +294,7 @@ class Link:
                     fault = happened
                     if not request.repeatable:
                         break
+            self._refuse_if_stopped(request)
             raise self._failure(request, fault, n_sent, lost=lost) from fault
 
     def _exchange(self, request: Request, decode: Callable[[bytes], T]) -> T:
@@ -254,6 +304,7 @@ class Link:
         # A signal may take us out of here at any point, and leave the link in doubt.
         self._in_step, self._fault = False, None
         if request.data[0] in _MOVING:
+            self._expect_motion()
             self.motors_off = False
             self.is_in_motion = request.data[0] in _BY_DISTANCE
         got = b""
@@ -292,6 +343,8 @@ class Link:
         standing = request.data[0] == Op.SET_MOTORS and request.data[1:3] == b"dd"  # 100, 100
         if request.data[0] == Op.SET_MOTORS_OFF or standing:
             self.motors_off, self._motors, self.is_in_motion = True, None, False
+            if self._guardian is not None:
+                self._guardian.expect_rest()
         else:
             self._motors = request if request.data[0] == Op.SET_MOTORS else None
 
@@ -318,6 +371,78 @@ class Link:
             n_bytes += len(self.port.read(n))
         self.faults.strays += n_bytes
         return n_bytes
+
+    # the guardian
+
+    def _start_guardian(self) -> None:
+        """Have another process stop the motors if this one is killed or frozen.
+
+        Raises:
+            RobotError: it cannot be started.
+        """
+        descriptor = descriptor_of(self.port)
+        if descriptor is not None:
+            self._guardian = Guardian(descriptor, self._replace_guardian)
+
+    def _end_guardian(self) -> None:
+        if self._guardian is not None:
+            self._guardian.end()
+            self._guardian = None
+
+    def _expect_motion(self) -> None:
+        """Tell the guardian that the motors will run.
+
+        Raises:
+            RobotError: it cannot be started.
+        """
+        if self._guardian is None:
+            self._start_guardian()
+        if self._guardian is not None:
+            self._guardian.expect_motion()
+
+    def _replace_guardian(self) -> None:
+        """Stop the motors, as nobody would now if this program were killed, and start another guardian."""
+        with self.lock:
+            if not self._is_open:
+                return
+            self._end_guardian()
+            if not self.motors_off:
+                with contextlib.suppress(RobotError):
+                    self.stop_motors()
+                self._stopped = "The process that guards the robot ended, so the motors were stopped"
+            with contextlib.suppress(RobotError):  # before the next motion it is tried again
+                self._start_guardian()
+
+    def stop_motors(self) -> None:
+        """Stop the motors in place of the caller, who still learns from the next command what had stopped them before.
+
+        Raises:
+            RobotError: they could not be stopped.
+        """
+        with self.lock:
+            stopped = self._what_stopped()
+            try:
+                self.ask(codec.STOP, codec.sensor_block)
+            finally:
+                self._stopped = stopped
+
+    def _what_stopped(self) -> str:
+        """Return once why the motors were stopped behind the caller's back; empty if they were not."""
+        if self._guardian is not None and self._guardian.has_stopped_motors():
+            self._stopped = f"This program was silent for {SILENT_S:g} s, so the motors were stopped"
+            self._in_step, self._fault, self.motors_off = False, Fault(self._stopped, RobotError), None
+        stopped, self._stopped = self._stopped, ""
+        return stopped
+
+    def _refuse_if_stopped(self, request: Request) -> None:
+        """Refuse a command once after the motors were stopped behind the caller's back.
+
+        Raises:
+            RobotError: they were.
+        """
+        if stopped := self._what_stopped():
+            self.faults.guardian_stops += 1
+            raise self._failure(request, Fault(stopped, RobotError), 0, lost=False)
 
     # finding the same step again
 
@@ -430,11 +555,13 @@ class Link:
         """
         self.faults.hang_ups += 1
         for _ in range(REOPENINGS if self._recoveries > 1 else 1):
+            self._end_guardian()  # as long as it has the port open, nobody can open it anew
             with contextlib.suppress(*_HANG_UPS):
                 self.port.close()
             self.clock.sleep(1.0)
             with contextlib.suppress(*_HANG_UPS):
                 self.port.open()
+                self._start_guardian()
                 return
         raise _LostStep(fault)
 
@@ -516,6 +643,7 @@ class Link:
         """Let go of the port; safe to call twice. The motors are the caller's business."""
         with self.lock:
             self._is_open = False
+            self._end_guardian()
             with contextlib.suppress(*_HANG_UPS):
                 self.port.close()
 

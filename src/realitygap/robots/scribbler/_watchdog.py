@@ -9,7 +9,6 @@ import weakref
 from realitygap.errors import RecordError, RobotError
 from realitygap.robots._clock import Clock, SystemClock
 
-from . import _codec as codec
 from ._link import Link
 
 LOOK_S = 0.02
@@ -60,7 +59,7 @@ class Watchdog:
             self._is_stopping = True
             link.faults.watchdog_stops += 1
             try:
-                link.ask(codec.STOP, codec.sensor_block)
+                link.stop_motors()
             except RobotError:
                 pass  # whoever speaks next will meet it too
             except RecordError as error:

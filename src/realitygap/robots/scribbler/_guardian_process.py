@@ -1,0 +1,118 @@
+"""A process that stops a robot's motors when the program that drives it is killed or frozen.
+
+It is run as `python -I -S FILE PORT PROGRAM`: the descriptor of the open port, which it inherits, and the process
+number of the program. Standard input is a pipe from the program, standard output one to it; each message is one byte.
+
+A run of bytes `SET_MOTORS_OFF` is the packet "motors off" wherever a packet begins, as the robot ignores the bytes that
+follow its opcode. So the motors stop at once even if the program wrote only a part of its last packet: the first bytes
+complete that packet, the next nine are a packet of their own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import sys
+import time
+
+MOVING, STANDING, QUIT = b"m", b"s", b"q"
+"""From the program: the motors may be running, sent again every `BEAT_S`; they are off; the port is being closed."""
+READY, STOPPING, STOPPED = b"r", b"f", b"d"
+"""To the program: watching; the program was silent, so the motors are being stopped; they are, or it was in vain."""
+
+BEAT_S = 0.02
+"""Time between two messages of a program whose robot may be moving [s]."""
+SILENT_S = 1.0
+"""Silence after which a program whose robot may be moving counts as frozen [s]."""
+LOOK_S = 0.1
+"""Time between two looks at whether the program still exists, should its pipe be held open by another process [s]."""
+ROUND_S = 0.1
+"""Time between two packets "motors off" [s]."""
+GIVE_UP_S = 10.0
+"""Time after which a robot that does not answer is left alone [s]; a tone may keep it busy for 8 s."""
+
+STOP = bytes([108] * 9)
+BLOCK = 11
+"""Length of the sensor block with which a robot answers."""
+MOST_HEARD = 4096
+
+
+def main() -> None:
+    """Watch until the program closes the port, or is gone."""
+    port, program = int(sys.argv[1]), int(sys.argv[2])
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)  # what ends the program must not end its guardian first
+    _tell(READY)
+    is_moving, heard_s = False, time.monotonic()
+    while True:
+        if select.select([0], [], [], LOOK_S)[0]:
+            messages = os.read(0, 4096)
+            if QUIT in messages:
+                return
+            if not messages:
+                break
+            is_moving, heard_s = messages.endswith(MOVING), time.monotonic()
+        elif os.getppid() != program:
+            break
+        elif is_moving and time.monotonic() - heard_s > SILENT_S:
+            _tell(STOPPING)
+            stop_motors(port)
+            _tell(STOPPED)
+            is_moving = False
+    if is_moving:  # otherwise the rest of a packet must not be filled up with what it was not meant to have
+        stop_motors(port)
+
+
+def stop_motors(port: int) -> bool:
+    """Send "motors off" until the robot has answered twice: the first answer may be to a packet that was begun before.
+
+    Returns:
+        Whether it did.
+    """
+    heard = b""
+    give_up_s = time.monotonic() + GIVE_UP_S
+    try:
+        _send(port, STOP + STOP, give_up_s)
+        while (now := time.monotonic()) < give_up_s:
+            round_s = now + ROUND_S
+            while select.select([port], [], [], max(0.0, round_s - time.monotonic()))[0]:
+                data = os.read(port, MOST_HEARD)
+                if not data:
+                    return False
+                heard = (heard + data)[-MOST_HEARD:]
+                if n_stops(heard) >= 2:
+                    return True
+            _send(port, STOP, give_up_s)
+    except OSError:  # the port hung up
+        pass
+    return False
+
+
+def n_stops(heard: bytes) -> int:
+    """Count the answers to "motors off": its echo and a sensor block, of which five bytes are 0 or 1."""
+    n = at = 0
+    while (at := heard.find(STOP, at)) >= 0:
+        block = heard[at + len(STOP) : at + len(STOP) + BLOCK]
+        if len(block) == BLOCK and max(block[:2] + block[8:]) <= 1:
+            n, at = n + 1, at + len(STOP) + BLOCK
+        else:
+            at += 1
+    return n
+
+
+def _send(port: int, data: bytes, give_up_s: float) -> None:
+    while data and select.select([], [port], [], max(0.0, give_up_s - time.monotonic()))[1]:
+        with contextlib.suppress(BlockingIOError):
+            data = data[os.write(port, data) :]
+
+
+def _tell(message: bytes) -> None:
+    with contextlib.suppress(OSError):  # the program is gone
+        os.write(1, message)
+
+
+if __name__ == "__main__":
+    main()
+    os._exit(0)

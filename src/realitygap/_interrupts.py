@@ -1,0 +1,81 @@
+"""Ctrl-C where Python would drop it."""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+AGAIN_S = 0.05
+"""Time after which an interrupt is repeated [s]; by then Python runs other code."""
+CALLBACKS = ("_raw_object_cache_notify", "_raw_object_cache_getbuffer")
+"""Functions of llvmlite that LLVM calls. A signal that comes while LLVM compiles is handled in the first of them."""
+
+_repeats: list[threading.Timer] = []
+
+
+@contextlib.contextmanager
+def kept_interrupts() -> Iterator[None]:
+    """Repeat, until the end of a block, each Ctrl-C that Python would drop.
+
+    Python cannot raise KeyboardInterrupt in a callback from C, in the callback of a weak reference, or in a
+    finalizer: it prints "Exception ignored" there and continues. Numba compiles and loads kernels through callbacks
+    from C, and fails later if one of them was cut off. So interrupts wait for the end of such a callback.
+
+    Raises:
+        KeyboardInterrupt: An interrupt was still to be repeated when the block ended or failed.
+    """
+    usual = sys.unraisablehook
+
+    def repeat_interrupt(unraisable: sys.UnraisableHookArgs) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            _repeat_later()
+        else:
+            usual(unraisable)
+
+    is_main = threading.current_thread() is threading.main_thread()
+    installs = is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    sys.unraisablehook = repeat_interrupt
+    if installs:
+        signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield
+    finally:
+        sys.unraisablehook = usual
+        if installs and signal.getsignal(signal.SIGINT) is on_interrupt:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        is_pending = any(timer.is_alive() for timer in _repeats)
+        for timer in _repeats:
+            timer.cancel()
+        _repeats.clear()
+        if is_pending:
+            raise KeyboardInterrupt
+
+
+def on_interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, or repeat the signal later if a callback that must not be cut off is running."""
+    while frame is not None:
+        if frame.f_code.co_name in CALLBACKS:
+            _repeat_later()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+def _repeat_later() -> None:
+    timer = threading.Timer(AGAIN_S, interrupt)
+    timer.daemon = True
+    timer.start()
+    _repeats.append(timer)
+
+
+def interrupt() -> None:
+    """Interrupt the main thread as Ctrl-C does, also while it waits."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+    else:
+        _thread.interrupt_main()

@@ -19,21 +19,28 @@ from realitygap.robots import JyroPlatform, SimPlatform
 from realitygap.trials import NoiseKey, trace_genome, try_genomes
 from realitygap.world import ArenaSettings
 
-ENV = "realitygap/ScribblerCoverage-v0"
+ENV = "realitygap/ScribblerCoverage-v1"
 KEY = NoiseKey(0x9E3779B97F4A7C15, replicate=3, generation=2, individual=5, repeat=1)
 
 # In double precision, as networks compute outside of trials.
 DOUBLE = {"precision": "double"}
 SETTINGS = [
-    {"noise": 0.5, "platform": DOUBLE},
-    {"noise": 0.0, "platform": DOUBLE},
-    {"noise": 0.8, "platform": {**DOUBLE, "turn_per_step": 0.9, "steps": 200}},
+    {"noise": 0.5, "platform": DOUBLE, "dtype": "float64"},
+    {"noise": 0.0, "platform": DOUBLE, "dtype": "float64"},
+    {"noise": 0.8, "platform": {**DOUBLE, "turn_per_step": 0.9, "steps": 200}, "dtype": "float64"},
     {
         "noise": 0.5,
         "platform": {**DOUBLE, "noisy_reading": "clip", "steps": 40},
         "arena": {"start": "left"},
+        "dtype": "float64",
     },
-    {"noise": 0.3, "platform": DOUBLE, "arena": {"start": [0.5, 0.3, 1.0]}, "cells": "ends"},
+    {
+        "noise": 0.3,
+        "platform": DOUBLE,
+        "arena": {"start": [0.5, 0.3, 1.0]},
+        "task": {"cells": "ends"},
+        "dtype": "float64",
+    },
 ]
 
 
@@ -69,7 +76,7 @@ def test_a_network_driven_through_the_environment_is_its_trial_bit_for_bit(setti
         observation, info = env.reset(options={"noise_key": key})
         assert env.unwrapped.noise_key == key
         assert info["pose"].tolist() == trial.poses[0].tolist()
-        coverage = info["coverage_line" if settings.get("cells") != "ends" else "coverage_ends"]
+        coverage = info["coverage_line" if not settings.get("task") else "coverage_ends"]
         for step in range(platform.steps):
             assert observation.tolist() == trial.inputs[step, :3].tolist()
             observation, reward, terminated, truncated, info = env.step(controller.activate(observation))
@@ -83,7 +90,7 @@ def test_a_network_driven_through_the_environment_is_its_trial_bit_for_bit(setti
         assert info["coverage_ends"] == trial.coverage_ends
         assert env.unwrapped.visited_cells == trial.cells
         assert coverage == pytest.approx(
-            trial.coverage_ends if settings.get("cells") == "ends" else trial.coverage_line, abs=1e-12
+            trial.coverage_ends if settings.get("task") else trial.coverage_line, abs=1e-12
         )
         n_blocked += trial.stalled.sum()
     if not settings.get("arena"):
@@ -99,7 +106,8 @@ def test_the_commands_of_a_trial_give_that_trial_in_either_precision_bit_for_bit
         trace_genome(platform, arena, genome, noise=0.5, noise_key=key)
         for genome, key in zip(tried, keys, strict=True)
     ]
-    envs = gymnasium.make_vec(ENV, num_envs=70, noise=0.5, platform={"precision": precision})
+    dtype = {"single": "float32", "double": "float64"}[precision]
+    envs = gymnasium.make_vec(ENV, num_envs=70, noise=0.5, platform={"precision": precision}, dtype=dtype)
     observations, infos = envs.reset(options={"noise_key": keys[0]})
     for step in range(platform.steps):
         assert observations.tolist() == [trial.inputs[step].tolist() for trial in trials]
@@ -134,7 +142,7 @@ def test_networks_driven_through_the_vector_environment_are_the_batch_bit_for_bi
     assert stalls.tolist() == batch.n_stalls.tolist()
     for k in range(40):
         assert envs.visited_cells(k) == tuple(batch.behavior(k))
-    total = batch.coverage_ends if settings.get("cells") == "ends" else batch.coverage_line
+    total = batch.coverage_ends if settings.get("task") else batch.coverage_line
     assert rewards + 1 / 72 == pytest.approx(total, abs=1e-12)
 
 
@@ -203,7 +211,7 @@ def test_a_seed_decides_all_trials_and_another_seed_others():
 
 
 def test_actions_out_of_range_are_limited_as_in_a_trial():
-    env = realitygap.gym.ScribblerCoverageEnv()
+    env = realitygap.gym.RobotEnv()
 
     def ends(action: list[float]) -> list[float]:
         env.reset(options={"noise_key": KEY})
@@ -218,7 +226,7 @@ def test_actions_out_of_range_are_limited_as_in_a_trial():
     [
         ({"noise": 11}, "noise is 11, expected 0 to 10"),
         ({"noise": float("nan")}, "noise is nan"),
-        ({"cells": "lines"}, "expected 'line' or 'ends'"),
+        ({"task": {"cells": "lines"}}, "expected 'line' or 'ends'"),
         ({"platform": {"step": 3}}, "step"),
         ({"arena": {"start": "middle"}}, "start"),
         ({"arena": {"start": [0.01, 0.01, 0.0]}}, "does not fit at the start"),
@@ -226,7 +234,7 @@ def test_actions_out_of_range_are_limited_as_in_a_trial():
 )
 def test_wrong_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
-        realitygap.gym.ScribblerCoverageEnv(**settings)
+        realitygap.gym.RobotEnv(**settings)
 
 
 @pytest.mark.parametrize(
@@ -239,16 +247,16 @@ def test_wrong_settings_are_refused(settings, message):
 )
 def test_settings_of_another_kind_are_refused(settings, message):
     with pytest.raises(TypeError, match=message):
-        realitygap.gym.ScribblerCoverageEnv(**settings)
+        realitygap.gym.RobotEnv(**settings)
 
 
 def test_wrong_calls_are_refused():
-    env = realitygap.gym.ScribblerCoverageEnv(platform={"steps": 1})
-    envs = realitygap.gym.ScribblerCoverageVectorEnv(3)
+    env = realitygap.gym.RobotEnv(platform={"steps": 1})
+    envs = realitygap.gym.RobotVectorEnv(3)
     with pytest.raises(ResetNeeded, match="call reset"):
         env.step(np.zeros(2))
     env.reset()
-    with pytest.raises(ValueError, match=r"expected \(2,\): move and turn"):
+    with pytest.raises(ValueError, match=r"expected \(2,\)"):
         env.step(np.zeros(3))
     env.step(np.zeros(2))
     with pytest.raises(ResetNeeded):
@@ -263,15 +271,15 @@ def test_wrong_calls_are_refused():
     with pytest.raises(TypeError, match="noise_key is 7, expected NoiseKey"):
         env.reset(options={"noise_key": 7})
     with pytest.raises(TypeError, match=r"num_envs is 1\.5, expected a whole number"):
-        realitygap.gym.ScribblerCoverageVectorEnv(1.5)
+        realitygap.gym.RobotVectorEnv(1.5)
     with pytest.raises(ValueError, match="num_envs is 0"):
-        realitygap.gym.ScribblerCoverageVectorEnv(0)
+        realitygap.gym.RobotVectorEnv(0)
 
 
 def test_thousands_of_robots_are_stepped_in_one_call():
     """Far from the speed of a single environment: 4,096 steps in less than the time of 200 of one robot at a time."""
-    envs = realitygap.gym.ScribblerCoverageVectorEnv(4096)
-    env = realitygap.gym.ScribblerCoverageEnv()
+    envs = realitygap.gym.RobotVectorEnv(4096)
+    env = realitygap.gym.RobotEnv()
     commands = np.random.default_rng(0).uniform(-1, 1, (4096, 2))
     envs.reset(seed=1), env.reset(seed=1)
     envs.step(commands), env.step(commands[0])
@@ -305,7 +313,7 @@ def test_gymnasium_finds_the_environment_by_module_and_name():
 SLOW_AND_DRAWN = {"drive.speed": {"uniform": [0.08, 0.14]}, "arena.start.x": {"uniform": [0.18, 0.3]}}
 SIMS = [
     ({}, {}),
-    ({"steps": 100, "set": SLOW_AND_DRAWN}, {"cells": "ends"}),
+    ({"steps": 100, "set": SLOW_AND_DRAWN}, {"task": {"cells": "ends"}}),
     ({"robot": "jyro", "steps": 40}, {"noise": 0.5}),
 ]
 
@@ -313,7 +321,7 @@ SIMS = [
 @pytest.mark.parametrize(("platform", "settings"), SIMS)
 def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, settings):
     platform, arena = SimPlatform(precision="double", **platform), ArenaSettings().arena()
-    env = gymnasium.make(ENV, platform=platform, disable_env_checker=True, **settings)
+    env = gymnasium.make(ENV, platform=platform, dtype="float64", disable_env_checker=True, **settings)
     n_blocked, starts = 0, set()
     for k, genome in enumerate(genomes(5)):
         key = NoiseKey(7, replicate=2, individual=k)
@@ -321,7 +329,7 @@ def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, setting
         controller = genome.network()
         observation, info = env.reset(options={"noise_key": key})
         starts.add(info["pose"][0])
-        coverage = info["coverage_ends" if settings.get("cells") == "ends" else "coverage_line"]
+        coverage = info["coverage_ends" if settings.get("task") else "coverage_line"]
         for step in range(platform.steps):
             assert observation.tolist() == trial.inputs[step, :3].tolist()
             observation, reward, _, truncated, info = env.step(controller.activate(observation))
@@ -332,7 +340,7 @@ def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, setting
         assert (info["coverage_line"], info["coverage_ends"]) == (trial.coverage_line, trial.coverage_ends)
         assert env.unwrapped.visited_cells == trial.cells
         assert coverage == pytest.approx(
-            trial.coverage_ends if settings.get("cells") == "ends" else trial.coverage_line, abs=1e-12
+            trial.coverage_ends if settings.get("task") else trial.coverage_line, abs=1e-12
         )
         n_blocked += trial.stalled.sum()
     assert (len(starts) > 1) == ("set" in platform.model_fields_set)
@@ -349,7 +357,8 @@ def test_many_robots_of_sim_are_the_trials_of_the_batch(precision):
         trace_genome(platform, ArenaSettings().arena(), genome, noise=0.0, noise_key=key)
         for genome, key in zip(tried, keys, strict=True)
     ]
-    envs = gymnasium.make_vec(ENV, num_envs=70, platform=platform)
+    dtype = {"single": "float32", "double": "float64"}[precision]
+    envs = gymnasium.make_vec(ENV, num_envs=70, platform=platform, dtype=dtype)
     observations, infos = envs.reset(options={"noise_key": keys[0]})
     for step in range(25):
         assert observations.tolist() == [trial.inputs[step, :3].tolist() for trial in trials]
@@ -393,4 +402,4 @@ def test_platforms_have_names_and_noise_of_their_own(tmp_path):
 )
 def test_what_is_no_platform_is_refused(platform, message):
     with pytest.raises(ValueError, match=message):
-        realitygap.gym.ScribblerCoverageEnv(platform=platform)
+        realitygap.gym.RobotEnv(platform=platform)

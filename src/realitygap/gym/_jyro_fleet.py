@@ -8,30 +8,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.kernels._fleet import make_fleet, observe_robots, start_robots, step_robots
-from realitygap.robots import JyroPlatform
+from realitygap.robots import STEP_S, JyroPlatform
 from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene, poses_of
 from realitygap.world import Arena, check_start
 
-from ._fleet import Array
+from ._fleet import Array, Outline
 
 
 class JyroFleet:
-    """A `Fleet` of the paper's simulation.
+    """A `Fleet` of the paper's simulation, which sees obstacle, stall and time.
 
     Raises:
-        ValueError: The robot does not fit at the start.
+        ValueError: The robot does not fit at the start, or the arena is not of straight walls.
     """
 
+    step_s = STEP_S
+
     def __init__(self, platform: JyroPlatform, arena: Arena, noise: float, n: int) -> None:
+        self._scene = jyro_scene(platform, arena)
         check_start(arena, platform.body)
         self.platform, self.arena, self.n_steps = platform, arena, platform.steps
+        self.outline = Outline.of_body(platform.body, platform.sensors)
         self._n = n
-        self._scene = jyro_scene(platform, arena)
         self._rules = jyro_rules(platform, noise=noise, bias_input=False, bias_value=1.0)
         self._fleet = make_fleet(self._scene, n)
         self.cells = np.zeros((n, arena.grid.n_cells), np.uint8)
         self.counts = np.zeros((n, 3), np.int32)
         self._step = 0
+
+    @property
+    def stalled(self) -> NDArray[np.bool_]:
+        """As `Fleet.stalled`."""
+        return _by_robot(self._fleet.stalled[:, None], self._n)[:, 0] > 0
+
+    @property
+    def ranges(self) -> Array:
+        """As `Fleet.ranges`, without noise."""
+        return 1.0 - _by_robot(self._fleet.fractions, self._n)
+
+    def number(self, name: str, value: float) -> Array:
+        """As `Fleet.number`: nothing is drawn."""
+        return np.full(self._n, float(value))
 
     def bounds(self) -> NDArray[Any]:
         """As `Fleet.bounds`."""
@@ -39,7 +56,7 @@ class JyroFleet:
         bounds: NDArray[Any] = np.nextafter(
             [-noise, 1 + noise], [-np.inf, np.inf], dtype=noise.dtype
         )  # sums are rounded
-        return bounds
+        return np.stack([bounds, [0, 1], [0, 1]], axis=1)
 
     def start(self, key: NoiseKey) -> None:
         """As `Fleet.start`."""
@@ -65,6 +82,9 @@ class JyroFleet:
             "pose": poses_of(_by_robot(self._fleet.poses, self._n), self.arena.start),
             "readings": _by_robot(self._fleet.fractions, self._n) * self.platform.sensor_range,
         }
+
+    def close(self) -> None:
+        """As `Fleet.close`: nothing is held."""
 
 
 def _by_robot(blocks: NDArray[Any], n: int) -> Array:

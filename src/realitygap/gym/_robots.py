@@ -12,80 +12,93 @@ from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import did_you_mean, real_number, whole_number
 from realitygap.kernels._philox import MAX_INDIVIDUALS
-from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.robots import JyroPlatform, SimPlatform, TwinPlatform
+from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, CoverageTask
 from realitygap.trials import NoiseKey
-from realitygap.world import ArenaSettings
+from realitygap.world import Arena, ArenaSettings
 
-from ._fleet import Fleet
+from ._fleet import Array, Fleet
 from ._jyro_fleet import JyroFleet
+from ._maze_fleet import MazeFleet
+from ._picture import draw_robot
+from ._rewards import ExitReward, Reward, reward_of
 from ._sim_fleet import SimFleet
+from ._twin_fleet import TwinFleet
 
-Cells = Literal["line", "ends"]
-Platform = JyroPlatform | SimPlatform | str | Mapping[str, Any] | None
+Platform = JyroPlatform | SimPlatform | TwinPlatform | str | Mapping[str, Any] | None
+RealType = Literal["float32", "float64"]
 T = TypeVar("T")
 
 PAPERS_NOISE = 0.1
 """The paper's a on `jyro`, whose sensors are without noise otherwise."""
 
+PAPERS_INPUTS = ("obstacle", "stall", "time")
+PLATFORMS = ("jyro", "sim", "sim:FILE", "twin:FILE")
+
+_KHEPERA_RANGES = tuple(f"range.{k}" for k in range(8))
+INPUTS: Mapping[str, tuple[str, ...]] = {
+    "avoid": _KHEPERA_RANGES,
+    "light": (*(f"light.{k}" for k in range(8)), *_KHEPERA_RANGES),
+    "wall": _KHEPERA_RANGES,
+    "goal": (*_KHEPERA_RANGES, *(f"goal_sector.{k}" for k in range(4))),
+}
+"""What a Khepera sees by default, as in the study of the same name, but for the constant."""
+
+KHEPERA: Mapping[str, Mapping[str, Any]] = {
+    "avoid": {"steps": 400},
+    "light": {"steps": 200, "set": {"arena.start.heading": {"uniform": [-3.14159, 3.14159]}}},
+    "wall": {"steps": 800},
+    "goal": {"steps": 800},
+}
+"""Settings of the platform by default, as in the study of the same name."""
+
+ARENAS: Mapping[str, str] = {"goal": "maze-medium"}
+"""Arenas by default, as in the study of the same name; otherwise the one named like the task."""
+
+WITHIN: Mapping[str, Mapping[str, Any]] = {"wall": {"within": 0.1}}
+"""Settings of the task by default, as in the study of the same name."""
+
 
 class Robots:
-    """n robots of one platform in one arena, all at the same step of their trials.
+    """n robots at one task, all at the same step of their trials.
 
-    Args:
-        n: How many, >= 1.
-        noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10. 0.1 on `jyro` and none on `sim` when None.
-        platform: The robot as simulated: `jyro`, `sim` or `sim:FILE`, or settings; the paper's when not given.
-        arena: Where, or its settings; the paper's when not given.
-        cells: What rewards count: cells along the line driven, or those in which steps end.
-
-    Raises:
-        TypeError: Something else than such settings.
-        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
+    Attributes:
+        n: Number of robots.
+        noise_key: Which random numbers robot 0 draws.
+        step_s: Duration of a command [s].
     """
 
-    def __init__(
-        self,
-        n: int,
-        *,
-        noise: float | None,
-        platform: Platform,
-        arena: ArenaSettings | Mapping[str, Any] | None,
-        cells: Cells,
-    ) -> None:
-        self.platform = _platform(platform)
-        if noise is None:
-            noise = PAPERS_NOISE if isinstance(self.platform, JyroPlatform) else 0.0
-        noise = real_number("noise", noise, 0, 10)
-        if cells not in ("line", "ends"):
-            raise ValueError(f"cells is {cells!r}, expected 'line' or 'ends'.")
-        self.n = whole_number("num_envs", n, 1, MAX_INDIVIDUALS)
-        place = _made("arena", ArenaSettings, arena).arena()
-        self._fleet: Fleet
-        if isinstance(self.platform, SimPlatform):
-            self._fleet = SimFleet(self.platform, place, noise, self.n)
-        else:
-            self._fleet = JyroFleet(self.platform, place, noise, self.n)
-        self.arena = self._fleet.arena
-        self._column = 0 if cells == "line" else 1
+    def __init__(self, fleet: Fleet, reward: Reward, n: int, dtype: RealType) -> None:
+        if dtype not in ("float32", "float64"):
+            raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'float64'.")
+        self.n = n
+        self._fleet, self._reward = fleet, reward
+        self._dtype: Any = np.dtype(dtype)
         self._step: int | None = None
+        self._paths: list[Array] | None = None
         self.noise_key = NoiseKey(0)
+        self.step_s = fleet.step_s
 
     @property
     def is_over(self) -> bool:
         """Whether all steps are done."""
-        return self._step == self.platform.steps
+        return self._step == self._fleet.n_steps
 
     def observation_space(self) -> Any:
-        """The Box of what one robot's controller sees: obstacle (largest noisy reading), stall, time."""
-        low, high = self._fleet.bounds()
-        return spaces.Box(np.array([low, 0.0, 0.0]), np.array([high, 1.0, 1.0]), dtype=np.float64)
+        """The Box of what one robot's controller sees."""
+        low, high = self._fleet.bounds().astype(self._dtype)
+        return spaces.Box(low, high, dtype=self._dtype.type)
 
     def action_space(self) -> Any:
-        """The Box of what it answers: move and turn."""
-        return spaces.Box(-1.0, 1.0, (2,), np.float64)
+        """The Box of what it answers: two commands."""
+        return spaces.Box(-1.0, 1.0, (2,), self._dtype.type)
 
-    def start(self, options: Mapping[str, Any] | None, np_random: np.random.Generator) -> NDArray[np.float64]:
-        """Put all robots at the start; returns (n, 3) observations.
+    def keep_paths(self) -> None:
+        """Keep the poses of each trial from the next one on, for pictures."""
+        self._paths = []
+
+    def start(self, options: Mapping[str, Any] | None, np_random: np.random.Generator) -> NDArray[Any]:
+        """Put all robots at the start; returns (n, i) observations.
 
         Args:
             options: `noise_key`: which random numbers; robot k draws those of individual `noise_key.individual` + k.
@@ -109,17 +122,20 @@ class Robots:
             )
         self.noise_key = key
         self._fleet.start(key)
+        self._reward.start(self._fleet)
         self._step = 0
-        return self._fleet.observe()
+        if self._paths is not None:
+            self._paths = [self._fleet.facts()["pose"]]
+        return self._observe()
 
-    def drive(self, commands: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def drive(self, commands: ArrayLike) -> tuple[NDArray[Any], Array]:
         """Carry out one command of each robot.
 
         Args:
-            commands: (n, 2) move and turn; limited to -1..1, and 0 where they are no number, as in a trial.
+            commands: (n, 2) limited to -1..1, and 0 where they are no number, as in a trial.
 
         Returns:
-            (n, 3) observations, and (n,) the share of the reachable cells that each robot visited for the first time.
+            (n, i) observations and (n,) rewards.
 
         Raises:
             ResetNeeded: No trial is under way.
@@ -129,35 +145,158 @@ class Robots:
             raise ResetNeeded("No trial is under way: call reset() first, and again when all steps are done.")
         given = np.ascontiguousarray(commands, np.float64)
         if given.shape != (self.n, 2):
-            raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2): move and turn.")
-        before = self._fleet.counts[:, self._column].copy()
+            raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2).")
         self._fleet.step(given)
         self._step += 1
-        visited = self._fleet.counts[:, self._column] - before
-        return self._fleet.observe(), visited / self.arena.grid.n_cells
+        rewards = self._reward.step(self._fleet, given)
+        if self._paths is not None:
+            self._paths.append(self._fleet.facts()["pose"])
+        return self._observe(), rewards
 
-    def facts(self) -> dict[str, NDArray[np.float64]]:
-        """What is so, whatever the controller sees: pose (n, 3), readings (n, s), both coverages (n,)."""
-        counts = self._fleet.counts / self.arena.grid.n_cells
-        return {**self._fleet.facts(), "coverage_line": counts[:, 0], "coverage_ends": counts[:, 1]}
+    def _observe(self) -> NDArray[Any]:
+        return self._fleet.observe().astype(self._dtype)
+
+    def facts(self) -> dict[str, Array]:
+        """What is so, whatever the controller sees: pose (n, 3), readings (n, s), and both coverages (n,)."""
+        facts, n_cells = self._fleet.facts(), self._fleet.cells.shape[1]
+        if not n_cells:
+            return facts
+        counts = self._fleet.counts / n_cells
+        return {**facts, "coverage_line": counts[:, 0], "coverage_ends": counts[:, 1]}
 
     def cells(self, k: int) -> tuple[int, ...]:
         """The cells that robot k visited along its line, in order of first visit, columns * row + column."""
         return tuple(self._fleet.cells[k, : self._fleet.counts[k, 0]].tolist())
 
+    def picture(self, k: int) -> NDArray[np.uint8]:
+        """Return robot k in its arena, (h, w, 3).
 
-def _platform(given: Platform) -> JyroPlatform | SimPlatform:
-    """The platform that was given, or that a name stands for; settings without a name are those of `jyro`."""
-    if isinstance(given, SimPlatform):
+        Raises:
+            ResetNeeded: No trial was begun.
+        """
+        if not self._paths:
+            raise ResetNeeded("There is nothing to show yet: call reset() first.")
+        path = np.array([poses[k] for poses in self._paths])
+        cells = self._fleet.cells[k, : self._fleet.counts[k, 0]]
+        return draw_robot(
+            self._fleet.arena, self._fleet.outline, path, self._fleet.facts()["readings"][k], cells
+        )
+
+    def close(self) -> None:
+        """Let go of the robots; safe to call twice."""
+        self._fleet.close()
+
+
+def task_robots(
+    n: int,
+    kind: str,
+    *,
+    task: Mapping[str, Any] | None,
+    noise: float | None,
+    platform: Platform,
+    arena: ArenaSettings | Mapping[str, Any] | None,
+    dtype: RealType,
+) -> Robots:
+    """Return n robots at a task; arguments and errors as of `RobotEnv`."""
+    n = whole_number("num_envs", n, 1, MAX_INDIVIDUALS)
+    settings = dict(task or {})
+    own = _task(kind, settings)
+    made = _platform(platform, kind)
+    if noise is None:
+        noise = PAPERS_NOISE if isinstance(made, JyroPlatform) else 0.0
+    noise = real_number("noise", noise, 0, 10)
+    preset = ARENAS.get(kind, kind)
+    if arena is None and kind != "coverage":
+        arena = {"preset": preset}
+    place = _made("arena", ArenaSettings, arena).arena()
+    inputs = PAPERS_INPUTS
+    if isinstance(made, SimPlatform) and kind != "coverage":
+        default = INPUTS[kind] if platform is None else own.inputs
+        inputs = tuple(name for name in settings.get("inputs", default) if name != "bias")
+    elif tuple(settings.get("inputs", inputs)) != inputs:
+        raise ValueError(
+            f"task.inputs is {', '.join(settings['inputs'])}, expected {', '.join(inputs)} on platform "
+            f"{_name_of(made)!r}. Choose platform 'sim', or leave the inputs out."
+        )
+    fleet = _fleet(made, place, inputs, noise, n)
+    try:
+        reward = reward_of(own, fleet)
+    except BaseException:
+        fleet.close()
+        raise
+    return Robots(fleet, reward, n, dtype)
+
+
+def maze_robots(n: int, maze: str, dtype: RealType) -> Robots:
+    """Return n of the published agents in a published maze.
+
+    Raises:
+        ValueError: There is no such maze.
+    """
+    n = whole_number("num_envs", n, 1, MAX_INDIVIDUALS)
+    if maze not in MAZE_TASKS:
+        raise ValueError(f"maze is {maze!r}. {did_you_mean(str(maze), MAZE_TASKS)}")
+    return Robots(MazeFleet(ArenaSettings(preset=maze).arena(), n), ExitReward(), n, dtype)
+
+
+def _task(kind: str, settings: Mapping[str, Any]) -> Any:
+    """The task of a kind."""
+    if isinstance(kind, str) and kind.startswith(PYTHON):
+        raise ValueError(
+            f"kind is {kind!r}, expected one of {', '.join(TASKS)}: a Python task scores whole trials. Use it in a "
+            "study."
+        )
+    if kind not in TASKS:
+        raise ValueError(f"kind is {kind!r}. {did_you_mean(str(kind), TASKS)}")
+    return _made("task", TASKS[kind], {**WITHIN.get(kind, {}), **settings})
+
+
+def _fleet(
+    platform: JyroPlatform | SimPlatform | TwinPlatform,
+    arena: Arena,
+    inputs: tuple[str, ...],
+    noise: float,
+    n: int,
+) -> Fleet:
+    if isinstance(platform, SimPlatform):
+        return SimFleet(platform, arena, inputs, noise, n)
+    if isinstance(platform, JyroPlatform):
+        return JyroFleet(platform, arena, noise, n)
+    if noise:
+        raise ValueError(
+            f"noise is {noise:g}, expected none on platform 'twin': its readings are noisy already."
+        )
+    return TwinFleet(platform, arena, n)
+
+
+def _platform(given: Platform, kind: str) -> JyroPlatform | SimPlatform | TwinPlatform:
+    """The platform that was given, or that a name stands for; settings without a name are those of the default."""
+    if isinstance(given, SimPlatform | JyroPlatform | TwinPlatform):
         return given
     if not isinstance(given, str):
-        return _made("platform", JyroPlatform, given)
+        if kind == "coverage":
+            return _made("platform", JyroPlatform, given)
+        base = {"robot": "khepera", **KHEPERA[kind]}
+        return _made(
+            "platform", SimPlatform, {**base, **given} if isinstance(given, Mapping) else given or base
+        )
     name, colon, file = given.partition(":")
     if name == "sim" and bool(colon) == bool(file):
         return SimPlatform(**({"robot": file} if file else {}))
+    if name == "twin" and file:
+        return TwinPlatform(file=file)
     if given == "jyro":
         return JyroPlatform()
-    raise ValueError(f"platform is {given!r}. {did_you_mean(given, ['jyro', 'sim', 'sim:FILE'])}")
+    if name == "scribbler":
+        raise ValueError(
+            f"platform is {given!r}, expected one of {', '.join(PLATFORMS)}: a robot on a port, emulated or not, is "
+            "driven by `realitygap run --port`, not step by step from Gymnasium."
+        )
+    raise ValueError(f"platform is {given!r}. {did_you_mean(given, PLATFORMS)}")
+
+
+def _name_of(platform: JyroPlatform | TwinPlatform | SimPlatform) -> str:
+    return "jyro" if isinstance(platform, JyroPlatform) else "twin"
 
 
 def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
@@ -167,3 +306,6 @@ def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
     if not isinstance(given, Mapping | None):
         raise TypeError(f"{name} is {given!r}, expected {kind.__name__}, or a mapping of what it is made of.")
     return kind(**(given or {}))
+
+
+__all__ = ["CoverageTask", "Platform", "RealType", "Robots", "maze_robots", "task_robots"]

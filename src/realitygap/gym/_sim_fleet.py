@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,34 +11,42 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import NeatSettings
 from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim import start_sim, step_sim
+from realitygap.kernels._sim import observe, start_sim, step_sim
 from realitygap.kernels._sim_lanes import make_sim_room
 from realitygap.robots import SimPlatform
 from realitygap.trials import REAL, Draws, NoiseKey, counters_of, poses_of, sim_rules, sim_scene
 from realitygap.world import Arena, check_drawn_starts
 
-from ._fleet import Array
+from ._fleet import Array, Outline, limited
 
-INPUTS = ("obstacle", "stall", "time")
+SIGNED = ("encoder", "last_move", "last_turn")
+"""Inputs that lie in -1..1."""
 
 
 class SimFleet:
     """A `Fleet` of a robot of a file, `LANES` robots in each call of the kernels.
 
     Raises:
-        ValueError: The robot has no range sensor, or does not fit at the start.
+        ValueError: The robot or the arena lacks an input, or the robot does not fit at the start.
     """
 
-    def __init__(self, platform: SimPlatform, arena: Arena, noise: float, n: int) -> None:
-        self._scene = sim_scene(platform, arena, INPUTS, noise)
+    def __init__(
+        self, platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise: float, n: int
+    ) -> None:
+        self._scene = sim_scene(platform, arena, inputs, noise)
         check_drawn_starts(self._scene.arena, self._scene.robot)
         self.arena, self.n_steps = self._scene.arena, platform.steps
+        self.step_s = platform.command_s
+        self.outline = Outline.of_model(self._scene.robot)
+        self._inputs = tuple(inputs)
         self._clip = platform.noisy_reading == "clip"
         self._n, self._n_range = n, len(self._scene.robot.range)
         self._rules = sim_rules(self._scene, 1.0)
         self._draws = Draws(self._scene.numbers)
+        self._drawn: dict[str, Array] = {}
         real = REAL[platform.precision]
-        neat = NeatSettings.named("default").rules(1, 2)  # networks are not asked here: the least one will do
+        # Networks are not asked here: of one without hidden nodes only the inputs are needed.
+        neat = NeatSettings.named("default").rules(len(inputs), 2)
         self._blocks = [slice(first, min(first + LANES, n)) for first in range(0, n, LANES)]
         self._rooms = [make_sim_room(self._scene.shape, neat, 1, real) for _ in self._blocks]
         self._commands = np.zeros((2, LANES), real)
@@ -51,26 +60,47 @@ class SimFleet:
         ends = self._gathered([np.bitwise_count(room.lanes.ends) for room in self._rooms])
         return np.stack([line[:, 0], ends.sum(axis=1)], axis=1).astype(np.int32)
 
+    @property
+    def stalled(self) -> NDArray[np.bool_]:
+        """As `Fleet.stalled`."""
+        return self._gathered([room.lanes.stalled[None] for room in self._rooms])[:, 0] > 0
+
+    @property
+    def ranges(self) -> Array:
+        """As `Fleet.ranges`, noise included."""
+        return self._gathered([room.lanes.readings[: self._n_range] for room in self._rooms])
+
+    def number(self, name: str, value: float) -> Array:
+        """As `Fleet.number`."""
+        return self._drawn[name] if name in self._drawn else np.full(self._n, float(value))
+
     def bounds(self) -> NDArray[Any]:
         """As `Fleet.bounds`: a linear response and what is added to it has no limits unless the platform clips it."""
-        is_open = not self._clip and any(sensor.response == "linear" for sensor in self._scene.robot.range)
-        return np.array([-math.inf, math.inf] if is_open else [0.0, 1.0])
+        linear = [not self._clip and sensor.response == "linear" for sensor in self._scene.robot.range]
+        bounds = []
+        for name in self._inputs:
+            kind, _, index = name.partition(".")
+            is_open = any(linear) if kind == "obstacle" else kind == "range" and linear[int(index)]
+            low = -math.inf if is_open else -1.0 if kind in SIGNED else 0.0
+            bounds.append((low, math.inf if is_open else 1.0))
+        return np.array(bounds).T
 
     def start(self, key: NoiseKey) -> None:
         """As `Fleet.start`."""
         self._key, self._step = np.uint64(key.key), 0
         counters = counters_of(key, self._n)
         drawn = self._draws.draw(key.key, counters)
+        self._drawn = dict(zip(self._draws.names, drawn.T, strict=True))
         shape = self._scene.shape
         for block, room in zip(self._blocks, self._rooms, strict=True):
-            values = dict(zip(self._draws.names, drawn[block].T, strict=True))
+            values = {name: numbers[block] for name, numbers in self._drawn.items()}
             table = self._scene.table({**self._scene.fixed, **values})
             n = block.stop - block.start
             start_sim(shape, table, self._rules, self._key, counters[block], n, room, self.cells[block])
 
     def step(self, commands: Array) -> None:
         """As `Fleet.step`."""
-        commands = np.clip(np.where(np.isnan(commands), 0.0, commands), -1.0, 1.0)
+        commands = limited(commands)
         for block, room in zip(self._blocks, self._rooms, strict=True):
             n = block.stop - block.start
             self._commands[:, :n] = commands[block].T
@@ -81,18 +111,18 @@ class SimFleet:
 
     def observe(self) -> Array:
         """As `Fleet.observe`."""
-        real = self._commands.dtype.type
-        stalled = self._gathered([room.lanes.stalled[None] for room in self._rooms])
-        readings = self._gathered([room.lanes.readings[: self._n_range] for room in self._rooms])
-        obstacle = readings.max(axis=1, keepdims=True)
-        time = np.full((self._n, 1), real(self._step) / real(self.n_steps), np.float64)
-        return np.concatenate([obstacle, stalled, time], axis=1)
+        for room in self._rooms:
+            observe(self._scene.shape, self._rules, room.lanes, self._step)
+        return self._gathered([room.lanes.values[: len(self._inputs)] for room in self._rooms])
 
     def facts(self) -> dict[str, Array]:
         """As `Fleet.facts`."""
         poses = [np.stack(room.lanes.pose[:3]) for room in self._rooms]
         near = [room.lanes.senses.near[: self._n_range] for room in self._rooms]
         return {"pose": poses_of(self._gathered(poses), self.arena.start), "readings": self._gathered(near)}
+
+    def close(self) -> None:
+        """As `Fleet.close`: nothing is held."""
 
     def _gathered(self, blocks: list[NDArray[Any]]) -> Array:
         """(m, LANES) numbers of each block as (n, m)."""

@@ -13,44 +13,35 @@ from numpy.typing import NDArray
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
-from ._robots import Cells, Platform, Robots
+from ._env import RENDER_FPS, Array, RenderMode, checked_render_mode, fps_of
+from ._robots import Platform, RealType, Robots, maze_robots, task_robots
 
-Array = NDArray[np.float64]
 
-
-class ScribblerCoverageVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
-    """n robots, each alone in an arena of its own: `ScribblerCoverageEnv` n times, in one call a step.
+class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
+    """n robots, each alone in a separate arena.
 
     Robot k draws the random numbers of individual `noise_key.individual` + k, as `try_genomes` does. All trials have
     the same number of steps and end together; the step after it, whatever its actions, begins new ones with a new key
     (Gymnasium's autoreset mode "next step").
-
-    Args:
-        num_envs: How many, >= 1.
-        noise, platform, arena, cells: As of `ScribblerCoverageEnv`.
-
-    Raises:
-        TypeError: Something else than such settings.
-        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
+    metadata: dict[str, Any] = {  # noqa: RUF012 - as Gymnasium declares it
+        "render_modes": ["rgb_array"],
+        "render_fps": RENDER_FPS,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        noise: float | None = None,
-        platform: Platform = None,
-        arena: ArenaSettings | Mapping[str, Any] | None = None,
-        cells: Cells = "line",
-    ) -> None:
-        self._robots = Robots(num_envs, noise=noise, platform=platform, arena=arena, cells=cells)
-        self.num_envs = num_envs
-        self.single_observation_space = self._robots.observation_space()
-        self.single_action_space = self._robots.action_space()
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
+    def __init__(self, robots: Robots, render_mode: RenderMode) -> None:
+        self._robots = robots
+        self.num_envs = robots.n
+        self.render_mode = checked_render_mode(render_mode)
+        if render_mode is not None:
+            robots.keep_paths()
+        self.metadata = {**self.metadata, "render_fps": fps_of(robots)}
+        self.single_observation_space = robots.observation_space()
+        self.single_action_space = robots.action_space()
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     @property
     def noise_key(self) -> NoiseKey:
@@ -64,15 +55,15 @@ class ScribblerCoverageVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all trials; arguments as of `ScribblerCoverageEnv.reset`. Returns (n, 3) observations and info."""
+        """Begin all trials; arguments as of `RobotEnv.reset`. Returns (n, i) observations and info."""
         super().reset(seed=seed)
         return self._robots.start(options, self.np_random), self._info()
 
     def step(self, actions: Array) -> tuple[Array, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Carry out one command of each robot, (n, 2) move and turn; after the last step, begin anew.
+        """Carry out one command of each robot, (n, 2); after the last step, begin anew.
 
         Returns:
-            (n, 3) observations, (n,) rewards, terminations, truncations, and info, whose arrays have a row a robot.
+            (n, i) observations, (n,) rewards, terminations, truncations, and info, whose arrays have a row a robot.
 
         Raises:
             ResetNeeded: `reset` was never called.
@@ -85,7 +76,74 @@ class ScribblerCoverageVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         over = np.full(self.num_envs, self._robots.is_over)
         return observations, rewards, np.zeros(self.num_envs, np.bool_), over, self._info()
 
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture (h, w, 3) of each robot; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(self._robots.picture(k) for k in range(self.num_envs))
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Let go of the robots."""
+        self._robots.close()
+
     def _info(self) -> dict[str, Any]:
         """Each array with another that says which robots it is of: all."""
         facts = self._robots.facts()
         return {**facts, **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in facts}}
+
+
+class RobotVectorEnv(_ManyRobots):
+    """`RobotEnv` n times, each robot alone in an arena of its own, in one call a step.
+
+    Robot k draws the random numbers of individual `noise_key.individual` + k, as `try_genomes` does. All trials have
+    the same number of steps and end together; the step after it, whatever its actions, begins new ones with a new key
+    (Gymnasium's autoreset mode "next step").
+
+    Args:
+        num_envs: Number of robots, >= 1.
+        kind, task, noise, platform, arena, dtype, render_mode: As of `RobotEnv`.
+
+    Raises:
+        TypeError: Something else than such settings.
+        ValueError: A setting out of range, an unknown one, or a start at which the robot does not fit.
+        TaskError: The arena lacks what the task needs.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        kind: str = "coverage",
+        *,
+        task: Mapping[str, Any] | None = None,
+        noise: float | None = None,
+        platform: Platform = None,
+        arena: ArenaSettings | Mapping[str, Any] | None = None,
+        dtype: RealType = "float32",
+        render_mode: RenderMode = None,
+    ) -> None:
+        robots = task_robots(
+            num_envs, kind, task=task, noise=noise, platform=platform, arena=arena, dtype=dtype
+        )
+        super().__init__(robots, render_mode)
+
+
+class MazeVectorEnv(_ManyRobots):
+    """`MazeEnv` n times, each agent alone in a separate maze, in one call a step.
+
+    Args:
+        num_envs: Number of agents, >= 1.
+        maze, dtype, render_mode: As of `MazeEnv`.
+
+    Raises:
+        ValueError: There is no such maze.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        maze: str = "maze-medium",
+        *,
+        dtype: RealType = "float32",
+        render_mode: RenderMode = None,
+    ) -> None:
+        super().__init__(maze_robots(num_envs, maze, dtype), render_mode)

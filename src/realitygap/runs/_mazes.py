@@ -15,12 +15,13 @@ from realitygap.kernels import _maze
 from realitygap.kernels._novelty import admit
 from realitygap.kernels._points import point_novelty
 from realitygap.tasks import MazeAgent, MazeTask
+from realitygap.trials import maze_exit, maze_rules, maze_scene
 from realitygap.world import Arena
 
 MazeReward = Literal["novelty", "objective"]
 MAZE_REWARDS: tuple[MazeReward, ...] = ("novelty", "objective")
 
-TURN = 2 * math.pi
+TURN = math.tau
 
 
 class Tried(NamedTuple):
@@ -67,21 +68,12 @@ class MazeTrials:
         Raises:
             ValueError: The arena has no goal.
         """
-        if arena.goal is None:
-            raise ValueError(f"Arena {arena.name!r} has no goal, expected one: it is the exit of the maze.")
+        goal = maze_exit(arena)
         self.agent = agent or MazeAgent()
-        self._arrival = arena.goal.radius
+        self._arena = arena
         self._origin = np.array([arena.start.x, arena.start.y])
-        self._exit = np.array([arena.goal.x, arena.goal.y]) - self._origin
-        real = np.float64 if precision == "double" else np.float32
-        # Rounded, so that quarters of a turn are that and the last bit of a library's cosine does not count.
-        rays = [(round(math.cos(ray), 15), round(math.sin(ray), 15)) for ray in self.agent.rays]
-        self._scene = _maze.MazeScene(
-            walls=(np.array(arena.walls) - np.tile(self._origin, 2)).astype(real),
-            rays=np.array(rays, real),
-            exit=self._exit.astype(real),
-            heading=np.array([arena.start.heading / TURN], real),
-        )
+        self._exit = np.array([goal.x, goal.y]) - self._origin
+        self._scene = maze_scene(arena, self.agent, precision)
 
     def distances_to_exit(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far from the exit places (n, 2) are [m]."""
@@ -117,7 +109,7 @@ class MazeTrials:
         arrived = np.full(n, -1, np.int32)
         n_tried = _maze.run_maze_trials(
             self._scene,
-            self._rules(genomes[0].bias_value),
+            maze_rules(self._arena, self.agent, genomes[0].bias_value),
             neat,
             networks,
             np.arange(n, dtype=np.int32),
@@ -128,20 +120,6 @@ class MazeTrials:
             trace,
         )
         return ends[:n_tried] + self._origin, arrived[:n_tried], trace
-
-    def _rules(self, bias_value: float) -> _maze.MazeRules:
-        agent = self.agent
-        return _maze.MazeRules(
-            n_steps=agent.steps,
-            radius=agent.radius,
-            reach=agent.reach,
-            arrival=self._arrival,
-            push=agent.push,
-            top_speed=agent.top_speed,
-            twist=agent.twist / TURN,
-            top_spin=agent.top_spin / TURN,
-            bias_value=bias_value,
-        )
 
 
 class _EndsArchive:

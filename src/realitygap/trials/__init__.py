@@ -16,6 +16,7 @@ from ._draws import Draws
 from ._ensemble import Play, Rehearsal, SimEnsemble
 from ._jyro import JyroTrials, jyro_rules, jyro_scene
 from ._jyro_robot import JyroRobot
+from ._maze_scene import maze_exit, maze_rules, maze_scene
 from ._onlooker import RobotOnlooker
 from ._open_twin import SimTwin, open_twin
 from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, start_words, trial_seed
@@ -44,6 +45,7 @@ from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._target_sim import SimTarget
 from ._target_twin import TwinTarget
 from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
+from ._twin_fleet import TwinRobots
 from ._twin_trials import close_twins, release_twins
 
 __all__ = [
@@ -84,6 +86,7 @@ __all__ = [
     "TrialInterrupted",
     "TrialPlan",
     "TrialStopped",
+    "TwinRobots",
     "TwinTarget",
     "Verdict",
     "WitnessAttendant",
@@ -97,6 +100,9 @@ __all__ = [
     "is_whole",
     "jyro_rules",
     "jyro_scene",
+    "maze_exit",
+    "maze_rules",
+    "maze_scene",
     "open_trials",
     "open_twin",
     "paper_inputs",

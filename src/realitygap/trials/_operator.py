@@ -104,15 +104,23 @@ class WitnessOperator:
 
     who = "witness"
 
-    def __init__(self, witness: Witness | None = None, *, in_flight: Verdict = "void") -> None:
+    def __init__(
+        self,
+        witness: Witness | None = None,
+        *,
+        in_flight: Verdict = "void",
+        despite_preflight: bool = False,
+    ) -> None:
         """Use a witness.
 
         Args:
             witness: Of the emulator; that of the robot's port when not given.
             in_flight: What becomes of a trial that was cut off.
+            despite_preflight: Whether to drive whatever the pre-flight finds.
         """
         self._witness = witness
         self._in_flight = in_flight
+        self._despite_preflight = despite_preflight
         self._times: list[float] = []
 
     @property
@@ -141,8 +149,8 @@ class WitnessOperator:
         self.witness.place(PREFLIGHT_POSE, 0)
 
     def accept(self, preflight: Preflight) -> bool:
-        """Whether nothing was found."""
-        return not preflight.problems
+        """Return whether the pre-flight found no problem, or problems were accepted in advance."""
+        return self._despite_preflight or not preflight.problems
 
     def settle(self, card: Card, problem: str) -> Verdict:
         """As said in advance; a line that was cut off is not known any more when the emulator was begun anew."""

@@ -55,7 +55,8 @@ class TwinProcess:
             return None
         self._said.truncate(0)
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "realitygap.trials._twin_worker"],
+            # -P: otherwise Python looks for modules in the current folder first, which may hold anybody's files.
+            [sys.executable, "-P", "-m", "realitygap.trials._twin_worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._said,
@@ -110,6 +111,11 @@ class TwinProcess:
                     with contextlib.suppress(OSError):
                         pipe.close()
             return status
+
+    def close(self) -> None:
+        """End it for good; safe to call twice."""
+        self.end()
+        self._said.close()
 
 
 class TwinPool:
@@ -210,7 +216,7 @@ class TwinPool:
 def _end_all(processes: Sequence[TwinProcess], closed: threading.Event) -> None:
     closed.set()
     for process in processes:
-        process.end()
+        process.close()
 
 
 def _error(kind: str, text: str) -> Exception:

@@ -77,7 +77,7 @@ class TwinTrials:
                 "do": "evolve",
                 "network": rows[int(row)],
                 "steps": self.n_steps,
-                "number": _number(int(key), counter),
+                "number": twin_number(int(key), counter),
                 "trace": trace,
             }
             for row, counter in zip(which, counters, strict=True)
@@ -121,7 +121,7 @@ def _listed(cells: list[list[int]], n_cells: int) -> tuple[NDArray[np.uint8], ND
     return listed, np.array([len(each) for each in cells], np.int32)
 
 
-def _number(key: int, counter: NDArray[np.uint32]) -> int:
+def twin_number(key: int, counter: NDArray[np.uint32]) -> int:
     """The number of a trial on a twin, a function of what other platforms draw their random numbers by."""
     text = ":".join(map(str, (key, *counter.tolist())))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")

@@ -5,6 +5,7 @@ A line of JSON in is a request, a line of JSON out its answer. It ends when nobo
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import os
@@ -12,10 +13,13 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from realitygap.errors import DescriptionError, RealityGapError
+from realitygap.errors import DescriptionError, RealityGapError, RobotError
 
 if TYPE_CHECKING:
+    from realitygap.robots.twin import TwinRobot
     from realitygap.world import Arena
+
+    from ._open_twin import SimTwin
 
 
 class _Twin:
@@ -34,6 +38,8 @@ class _Twin:
         model = load_twin(file)
         self._arena: Arena = Arena.from_dict(arena)
         self._robot = open_twin(model, self._arena)
+        self._open = functools.partial(open_twin, model, self._arena)
+        self._fleet: list[TwinRobot | SimTwin] = []
 
     def facts(self) -> dict[str, Any]:
         """What is known of any robot, and the hash of the file."""
@@ -69,6 +75,36 @@ class _Twin:
         self._robot.number = number
         return trial_of(self._robot, Network.from_dict(network), steps, trace=trace)
 
+    def begin(self, numbers: list[int]) -> list[dict[str, Any]]:
+        """Begin a trial of each number, each with a separate robot; return what every robot sees."""
+        self._fleet += [self._open() for _ in numbers[len(self._fleet) :]]
+        del self._fleet[len(numbers) :]
+        for robot, number in zip(self._fleet, numbers, strict=True):
+            robot.number = number
+            robot.reset()
+        return [seen_of(robot) for robot in self._fleet]
+
+    def drive(self, commands: list[list[float]]) -> list[dict[str, Any]]:
+        """Drive each robot by one command; return what every robot sees then."""
+        from realitygap.robots import Command
+
+        if len(commands) != len(self._fleet):  # after a process that ended
+            raise RobotError(f"{len(self._fleet)} trials are under way, got {len(commands)} commands.")
+        for robot, (move, turn) in zip(self._fleet, commands, strict=True):
+            robot.drive(Command(move, turn))
+        return [seen_of(robot) for robot in self._fleet]
+
+
+def seen_of(robot: TwinRobot | SimTwin) -> dict[str, Any]:
+    """Return what a robot senses and where it is, as JSON knows it."""
+    seen = robot.observe()
+    return {
+        "readings": seen.readings,
+        "stalled": bool(seen.stalled),
+        "pose": tuple(robot.pose),
+        "cells": list(robot.visited_cells),
+    }
+
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until there are no more."""
@@ -83,7 +119,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             elif twin is None:
                 raise DescriptionError("No twin is open.")
             else:
-                result = twin.carry_out(**request) if do == "carry_out" else twin.evolve(**request)
+                result = getattr(twin, do)(**request)
         except (RealityGapError, ValueError) as error:
             reply: dict[str, Any] = {"error": str(error), "kind": type(error).__name__}
         else:

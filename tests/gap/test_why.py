@@ -6,15 +6,19 @@ import pytest
 from realitygap.gap import Estimate, Why, explain_gap
 
 
-def squares(falls, noise=0.0, c=12, draws=3):
-    """(d, 4, c) of two parts that take so much of a gap of 0.3 each."""
+def differences(falls, noise=0.0, c=12, draws=3):
+    """(d, 4, c) of two parts that take so much of a gap of 0.3 each, without noise of trials."""
     rng = np.random.default_rng(1)
     rms = 0.3 - np.array([falls[0] * (k & 1) + falls[1] * (k >> 1) for k in range(4)])
-    return np.maximum(rms[None, :, None] + noise * rng.normal(size=(draws, 1, c)), 0) ** 2
+    return np.maximum(rms[None, :, None] + noise * rng.normal(size=(draws, 1, c)), 0)
+
+
+def explained(apart):
+    return explain_gap(apart, apart**2, ("motor", "body"), (3, 1))
 
 
 def test_parts_carry_what_they_take_and_add_up():
-    found = explain_gap(squares((0.2, 0.05)), ("motor", "body"), (3, 1))
+    found = explained(differences((0.2, 0.05)))
     assert [each.estimate for each in found.falls] == pytest.approx([0.2, 0.05])
     assert found.before.estimate == pytest.approx(0.3)
     assert found.after.estimate == pytest.approx(0.05)
@@ -26,12 +30,13 @@ def test_parts_carry_what_they_take_and_add_up():
 
 
 def test_draws_from_the_posterior_widen_the_intervals():
-    spread = squares((0.1, 0.0))
-    spread[1:, 1] = np.array([0.15, 0.25])[:, None] ** 2
-    low, high = (
-        getattr(explain_gap(spread, ("motor", "body"), (1, 1)).falls[0], end) for end in ("low", "high")
-    )
-    assert high - low > 0.04
+    spread = differences((0.1, 0.0))
+    assert explained(spread).after.low == pytest.approx(explained(spread).after.high)
+    spread[1:, [1, 3]] = np.array([0.15, 0.25])[:, None, None]
+    found = explained(spread)
+    assert found.falls[0].high - found.falls[0].low > 0.04
+    assert found.after.high - found.after.low > 0.04
+    assert found.before.low == pytest.approx(found.before.high)
 
 
 def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_advised():
@@ -59,6 +64,6 @@ def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_ad
 
 
 def test_few_controllers_carry_no_advice_and_it_says_how_many_would():
-    found = explain_gap(squares((0.2, 0.05), c=2), ("motor", "body"), (3, 1))
+    found = explained(differences((0.2, 0.05), c=2))
     assert found.after.low is None
     assert found.advice == "What to change next cannot be said: 2 controllers give no interval; 5 would."

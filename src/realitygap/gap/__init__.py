@@ -4,7 +4,7 @@
 """
 
 from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means
-from ._correlation import reliability, spearman, trials_for_reliability
+from ._correlation import attenuated, reliability, spearman, trials_for_reliability
 from ._coverage_map import CoverageMaps, coverage_maps
 from ._energy import energy_distances, energy_test, smallest_energy_p
 from ._equivalence import Equivalence, controllers_for_margin, equivalence_power, prove_equivalence
@@ -14,15 +14,17 @@ from ._means import difference_of_groups, mean_of
 from ._measure import measure_gap
 from ._plan import (
     Needed,
+    check_plan,
     plan_correlation,
     plan_effect,
     plan_margin,
     spread_of_differences,
     trial_reliability,
 )
-from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor
+from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor, rank_violation_interval
 from ._replay_error import ReplayError, replay_error
 from ._result import MEASURES, GapResult
+from ._rms_interval import rms_interval
 from ._shapley import coalitions, shapley_values
 from ._side import GapSide
 from ._verdict import verdict_of
@@ -41,13 +43,16 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "mean_difference",
     "square_differences",
     "rms_of",
+    "rms_interval",
     "shares_above",
     # order
     "spearman",
     "reliability",
+    "attenuated",
     "trials_for_reliability",
     "mean_maximum_rank_violation",
     "rank_violation_floor",
+    "rank_violation_interval",
     # behavior
     "energy_distances",
     "energy_test",
@@ -62,6 +67,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "equivalence_power",
     "controllers_for_margin",
     "Needed",
+    "check_plan",
     "plan_effect",
     "plan_margin",
     "plan_correlation",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ._side import Values
@@ -64,6 +66,23 @@ def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
     between = [spearman(*halves(values, rng)) for _ in range(splits)]
     size = values.shape[2] // 2
     return lengthened(np.nan_to_num(np.mean(between, axis=0)), values.shape[2] / size)
+
+
+def attenuated(correlation: float, source: float, target: float) -> float:
+    """Return the rank correlation of means of trials, given the one of controllers without noise.
+
+    Noise lowers Pearson's correlation by the factor √(source · target). Spearman's is converted to Pearson's and back,
+    for normal values.
+
+    Args:
+        correlation: Spearman's, without noise [-1..1].
+        source: Reliability of the simulator's means [0..1]: the share of their variance that is not noise.
+        target: Reliability of the target's means.
+
+    Source: Spearman (1904), American Journal of Psychology 15(1), 72-101; Pearson (1907) for the conversion.
+    """
+    pearson = 2 * math.sin(math.pi * correlation / 6) * math.sqrt(source * target)
+    return 6 / math.pi * math.asin(pearson / 2)
 
 
 def trials_for_reliability(found: float, trials: int, wanted: float) -> int | None:

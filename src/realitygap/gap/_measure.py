@@ -14,8 +14,9 @@ from ._energy import ALPHA, energy_distances, energy_test, smallest_energy_p
 from ._equivalence import POWER, prove_equivalence
 from ._estimate import CONFIDENCE, Estimate
 from ._level import mean_difference, rms_of, shares_above, square_differences
-from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor
+from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor, rank_violation_interval
 from ._result import GapResult
+from ._rms_interval import rms_interval
 from ._side import GapSide, Values
 
 SEED = 7
@@ -96,16 +97,15 @@ class _Work:
         self.pair = source.values[None], target.values[None]
         self.fewest = min(source.trials, target.trials)
         self.alike = [side.name for side in (source, target) if np.ptp(side.means) == 0]
-        statistics: dict[str, _bootstrap.Statistic] = {"level": mean_difference}
-        if self.fewest >= 2:
-            statistics["square"] = lambda one, other: square_differences(one, other).mean(axis=1)
-        self.drawn = bootstrap(statistics, source, target, n_resamples, rng)
+        self.drawn = bootstrap({"level": mean_difference}, source, target, n_resamples, rng)
         if self.n >= 2 and not self.alike:
             self._draw_orders()
 
     def _draw_orders(self) -> None:
         """Statistics of ranks, and reliability of both sides of the same resamples."""
-        ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc, "mmrv": _mmrv}
+        ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc}
+        if _mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
+            ranks["mmrv"] = _mmrv
         if self.fewest >= 2:
             ranks |= {
                 "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
@@ -121,10 +121,13 @@ class _Work:
         self, value: float, drawn: Values, change: Callable[[Values], Values] | None = None
     ) -> Estimate:
         low, high = interval(drawn, self.n)
+        if change is not None and low is not None and high is not None:
+            low, high = (float(change(np.array(end))) for end in (low, high))
+        return self._with_ends(value, low, high)
+
+    def _with_ends(self, value: float, low: float | None, high: float | None) -> Estimate:
         if low is None or high is None:
             return Estimate(value, None, None, self.n, _no_interval(self.n))
-        if change is not None:
-            low, high = (float(change(np.array(end))) for end in (low, high))
         # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
         return Estimate(value, min(low, value), max(high, value), self.n)
 
@@ -139,8 +142,12 @@ class _Work:
                 self.n,
                 "One trial of each controller does not tell noise from a gap; 2 of each on both sides would.",
             )
-        square = square_differences(*self.pair).mean(axis=1)
-        return self._estimate(float(rms_of(square)[0]), self.drawn["square"], rms_of)
+        squares = square_differences(*self.pair)[0]
+        value = float(rms_of(squares.mean()))
+        resampled = bootstrap_mean(squares, self.n_resamples, self.rng.spawn(1)[0])
+        return self._with_ends(
+            value, *rms_interval(self.target.means - self.source.means, squares, resampled)
+        )
 
     def a12(self) -> Estimate:
         shares = shares_above(self.source.values, self.target.values)
@@ -174,7 +181,13 @@ class _Work:
         return self._no_order() or self._estimate(float(_srcc(*self.pair)[0]), self.drawn["srcc"])
 
     def mmrv(self) -> Estimate:
-        return self._no_order() or self._estimate(float(_mmrv(*self.pair)[0]), self.drawn["mmrv"])
+        refused = self._no_order()
+        if refused:
+            return refused
+        value = float(_mmrv(*self.pair)[0])
+        if value == 0:
+            return self._estimate(value, self.drawn["mmrv"])
+        return self._with_ends(value, *rank_violation_interval(self.source.means, self.target.means))
 
     def _no_halves(self) -> Estimate | None:
         if self.fewest < 2:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from realitygap import _special as special
 
 from ._bootstrap import SMALLEST_N
-from ._correlation import spearman
+from ._correlation import attenuated, spearman
 from ._equivalence import controllers_for_margin
 from ._side import Values
 
@@ -20,6 +20,12 @@ ALPHA = 0.05
 MOST = 100_000
 SIMULATED = 2_000
 """Studies that are simulated to check a number: the interval of a power of 0.8 is then ±0.02."""
+
+SHORT_OF = 0.02
+"""By how much the lower end of that interval may be below the power that was asked for."""
+
+_MOST_PAIRS = 2_000_000
+"""Controllers in all studies that are simulated for a correlation: beyond 1,000 controllers there are fewer studies."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,8 @@ def plan_effect(
 
     Source: Cohen (1988), chapter 2, by the noncentral t distribution.
     """
-    _check(effect=effect, noise=noise + spread, power=power)
+    check_plan(power, effect=effect)
+    _check(noise=noise + spread)
     sd = spread_of_differences(spread, noise, trials)
     n = _fewest(lambda n: _t_power(effect / sd, n), power, smallest=SMALLEST_N)
     if n is None:
@@ -84,7 +91,8 @@ def plan_margin(
     margin: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
 ) -> Needed:
     """Controllers with which TOST at 5 % shows equivalence where there is no difference; as `plan_effect`."""
-    _check(margin=margin, noise=noise + spread, power=power)
+    check_plan(power, margin=margin)
+    _check(noise=noise + spread)
     sd = spread_of_differences(spread, noise, trials)
     n = controllers_for_margin(margin, sd, power=power)
     if n is None:
@@ -99,9 +107,13 @@ def plan_correlation(
 ) -> Needed:
     """Controllers with which a rank correlation is shown to be above a least one.
 
+    It is shown if the correlation of means is above the one that `least` gives with so much noise, one-sided at 5 %.
+    The normal formula gives a first number of controllers. Then studies are simulated, of normal controllers whose
+    trials have noise on both platforms, and the number is raised until so many of them show it.
+
     Args:
         correlation: The true one, of controllers without noise.
-        least: Above which it shall be shown, one-sided at 5 %; below `correlation`.
+        least: Above which it shall be shown; below `correlation`.
         reliability: Of the means of both platforms with so many trials [0..1]; both correlations are seen through it.
         trials: Of each controller on each platform.
         power: How often it shall be shown.
@@ -110,16 +122,42 @@ def plan_correlation(
     Source: Fisher's transformation with the standard error of Bonett & Wright (2000), Psychometrika 65(1), 23-28,
     for Spearman's correlation.
     """
-    _check(correlation=correlation, power=power)
-    if not -1 < least < correlation < 1:
+    check_plan(power, correlation=correlation, least=least)
+    seen, floor = (attenuated(each, reliability, reliability) for each in (correlation, least))
+    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
+    while n is not None and n <= MOST:
+        found = _simulated_correlations(correlation, reliability, floor, n, seed)
+        share, low, high = _share(found)
+        # fewer studies give a wider interval, which is no reason for more controllers
+        if low >= power - SHORT_OF * math.sqrt(SIMULATED / len(found)):
+            return Needed(trials, n, share, low, high)
+        n = max(n + 1, math.ceil(n * min((_reach(power) / _reach(share)) ** 2, 2.0)))
+    return Needed(trials, None)
+
+
+def check_plan(
+    power: float = 0.8,
+    *,
+    effect: float | None = None,
+    margin: float | None = None,
+    correlation: float | None = None,
+    least: float | None = None,
+) -> None:
+    """Refuse what no number of controllers can answer, before anything is tried.
+
+    Raises:
+        ValueError: `power` or `correlation` is not between 0 and 1, `effect` or `margin` not finite or not above 0, or
+            `least` not between -1 and `correlation`.
+    """
+    _check(power=power)
+    _check(**{name: value for name, value in (("effect", effect), ("margin", margin)) if value is not None})
+    if correlation is None:
+        return
+    _check(correlation=correlation)
+    if least is not None and not -1 < least < correlation:
         raise ValueError(
             f"least is {least} and correlation {correlation}, expected -1 < least < correlation < 1."
         )
-    seen, floor = correlation * reliability, least * reliability
-    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
-    if n is None:
-        return Needed(trials, None)
-    return Needed(trials, n, *_share(_simulated_correlations(seen, floor, n, seed)))
 
 
 def trial_reliability(controllers_spread: float, noise: float, trials: int) -> float:
@@ -161,8 +199,13 @@ def _error(correlation: float, n: int) -> float:
 
 
 def _z_power(seen: float, floor: float, n: int) -> float:
-    reach = (math.atanh(seen) - math.atanh(floor)) / _error(seen, n)
-    return float(special.ndtr(reach - special.ndtri(1 - ALPHA)))
+    apart = (math.atanh(seen) - math.atanh(floor)) / _error(seen, n)
+    return float(special.ndtr(apart - special.ndtri(1 - ALPHA)))
+
+
+def _reach(power: float) -> float:
+    """Distance of a correlation from the floor for a power, in standard errors; it grows with the root of n."""
+    return float(special.ndtri(max(power, 2 * ALPHA)) + special.ndtri(1 - ALPHA))
 
 
 def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Values]:
@@ -173,16 +216,20 @@ def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Value
     return means, spreads / math.sqrt(n)
 
 
-def _simulated_correlations(seen: float, floor: float, n: int, seed: int) -> NDArray[np.bool_]:
+def _simulated_correlations(
+    correlation: float, reliability: float, floor: float, n: int, seed: int
+) -> NDArray[np.bool_]:
+    """Whether each of many studies shows a correlation above the floor: n normal controllers, noise on both sides."""
     rng = np.random.default_rng(seed)
-    # of normal pairs with Pearson's 2 sin(pi rho / 6) Spearman's is rho
-    pearson = 2 * math.sin(math.pi * seen / 6)
-    studies = max(200, min(SIMULATED, 2_000_000 // n))
-    one = rng.normal(size=(studies, n))
-    other = pearson * one + math.sqrt(1 - pearson**2) * rng.normal(size=(studies, n))
-    found = np.clip(spearman(one, other), -1 + 1e-12, 1 - 1e-12)
-    errors = np.sqrt((1 + found**2 / 2) / (n - 3))
-    return np.asarray(np.arctanh(found) - special.ndtri(1 - ALPHA) * errors > math.atanh(floor))
+    pearson = 2 * math.sin(math.pi * correlation / 6)
+    studies = max(100, min(SIMULATED, _MOST_PAIRS // n))
+    source = rng.normal(size=(studies, n))
+    target = pearson * source + math.sqrt(1 - pearson**2) * rng.normal(size=(studies, n))
+    noise = math.sqrt(1 / reliability - 1)  # of a mean of trials; controllers spread by 1
+    seen = spearman(*(side + noise * rng.normal(size=side.shape) for side in (source, target)))
+    seen = np.clip(seen, -1 + 1e-12, 1 - 1e-12)
+    errors = np.sqrt((1 + seen**2 / 2) / (n - 3))
+    return np.asarray(np.arctanh(seen) - special.ndtri(1 - ALPHA) * errors > math.atanh(floor))
 
 
 def _share(found: NDArray[np.bool_]) -> tuple[float, float, float]:

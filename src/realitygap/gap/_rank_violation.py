@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from realitygap import _special as special
+
 from ._correlation import SPLITS, Rng, halves
+from ._estimate import CONFIDENCE
 from ._side import Values
 
 _BLOCK = 4_000_000
@@ -32,9 +37,51 @@ def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
 
 
 def _of_block(source: Values, target: Values) -> Values:
+    return np.asarray(_violations(source, target).max(axis=2).mean(axis=1))
+
+
+def _violations(source: Values, target: Values) -> Values:
+    """(b, c, c) difference on the target of each two controllers that the simulator orders otherwise, else 0."""
     violated = (source[:, :, None] < source[:, None, :]) != (target[:, :, None] < target[:, None, :])
     apart = np.abs(target[:, :, None] - target[:, None, :])
-    return np.asarray(np.where(violated, apart, 0.0).max(axis=2).mean(axis=1))
+    return np.where(violated, apart, 0.0)
+
+
+def rank_violation_interval(
+    source: Values, target: Values, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
+    """Return the interval of a mean maximum rank violation above 0.
+
+    It is a t interval on the logarithmic scale with the jackknife's standard error. The upper end is at most the range
+    of the target's means, which no rank violation exceeds. It is of the violation expected of as many controllers with
+    as many trials: the violation grows with the number of controllers and with the noise of trials.
+
+    Args:
+        source: (c,) means in simulation.
+        target: (c,) means on the target.
+        confidence: Between 0 and 1.
+
+    Raises:
+        ValueError: The violation is 0, which has no logarithm.
+    """
+    violations = _violations(source[None], target[None])[0]
+    value = float(violations.max(axis=1).mean())
+    if value == 0:
+        raise ValueError("The rank violation is 0, expected one above 0.")
+    c = len(source)
+    left = _left_out(violations)
+    error = math.sqrt((c - 1) / c * float(((left - left.mean()) ** 2).sum()))
+    factor = math.exp(float(special.stdtrit(c - 1, (1 + confidence) / 2)) * error / value)
+    return value / factor, min(value * factor, float(np.ptp(target)))
+
+
+def _left_out(violations: Values) -> Values:
+    """(c,) mean maximum rank violation without each controller."""
+    c = len(violations)
+    worst = violations.argmax(axis=1)
+    second, first = np.partition(violations, c - 2, axis=1)[:, c - 2 :].T
+    less = np.bincount(worst, weights=first - second, minlength=c)  # where the worst partner is left out
+    return np.asarray((first.sum() - first - less) / (c - 1))
 
 
 def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS) -> Values:

@@ -11,6 +11,7 @@ import numpy as np
 from ._bootstrap import interval
 from ._estimate import Estimate
 from ._level import rms_of
+from ._rms_interval import rms_interval
 from ._shapley import shapley_values
 from ._side import Values
 
@@ -96,6 +97,7 @@ def _would(fall: Estimate) -> str:
 
 
 def explain_gap(
+    differences: Values,
     squares: Values,
     parts: Sequence[str],
     numbers: Sequence[int],
@@ -106,16 +108,17 @@ def explain_gap(
     """Share out the fall of the RMS gap among parts of the model.
 
     Args:
-        squares: (1 + d, 2^g, c) unbiased square of each controller's difference (`square_differences`), with each
-            choice of g parts taken from the fit, in the order of `coalitions`: row 0 for the estimate, the others
-            for draws from its posterior.
+        differences: (1 + d, 2^g, c) difference of each controller's means, with each choice of g parts taken from the
+            fit, in the order of `coalitions`: row 0 for the estimate, the others for draws from its posterior.
+        squares: (1 + d, 2^g, c) unbiased squares of the true differences (`square_differences`).
         parts: Names of the g parts.
         numbers: How many numbers the fit changes in each.
         resamples: Of the bootstrap.
         seed: Of its draws.
 
     Returns:
-        Shapley values. Intervals have controllers drawn anew, and with each sample of them a draw from the posterior.
+        Shapley values. Their intervals have controllers drawn anew, and with each sample of them a draw from the
+        posterior. The intervals of the RMS gap are those of `rms_interval`, with the variance over the posterior.
     """
     rng = np.random.default_rng(seed)
     n_draws, _, c = squares.shape
@@ -124,15 +127,15 @@ def explain_gap(
     drawn = np.empty((resamples, squares.shape[1]))
     for k in range(resamples):
         drawn[k] = squares[which[k]][:, rng.integers(0, c, c)].mean(axis=1)
-    drawn = rms_of(drawn)
-    falls, others = _falls(worth)[0], _falls(drawn)
+    gaps = rms_of(drawn)
+    falls, others = _falls(worth)[0], _falls(gaps)
     return Why(
         tuple(parts),
         tuple(_estimate(falls[k], others[:, k], c) for k in range(len(parts))),
         tuple(numbers),
-        _estimate(worth[0, 0], drawn[:, 0], c),
-        _estimate(worth[0, -1], drawn[:, -1], c),
-        _estimate(worth[0, -1] - worth[0, 0], drawn[:, -1] - drawn[:, 0], c),
+        _rms(worth[0, 0], differences[:, 0], squares[:, 0], drawn[:, 0]),
+        _rms(worth[0, -1], differences[:, -1], squares[:, -1], drawn[:, -1]),
+        _estimate(worth[0, -1] - worth[0, 0], gaps[:, -1] - gaps[:, 0], c),
     )
 
 
@@ -141,8 +144,20 @@ def _falls(worth: Values) -> Values:
     return np.asarray(np.round(-shapley_values(worth), 12) + 0.0)
 
 
+def _rms(value: float, differences: Values, squares: Values, drawn: Values) -> Estimate:
+    """An RMS gap, of (1 + d, c) as in `explain_gap` and (b,) mean squares of its resamples."""
+    draws = squares[1:].mean(axis=1)
+    more_variance = float(draws.var(ddof=1)) if len(draws) > 1 else 0.0
+    ends = rms_interval(differences[0], squares[0], drawn, more_variance=more_variance)
+    return _with_ends(value, ends, squares.shape[1])
+
+
 def _estimate(value: float, drawn: Values, n: int) -> Estimate:
-    low, high = interval(drawn, n)
+    return _with_ends(value, interval(drawn, n), n)
+
+
+def _with_ends(value: float, ends: tuple[float, float] | tuple[None, None], n: int) -> Estimate:
+    low, high = ends
     if low is None or high is None:
         return Estimate(float(value), None, None, n, f"{n} controllers give no interval; 5 would.")
     return Estimate(float(value), min(low, float(value)), max(high, float(value)), n)

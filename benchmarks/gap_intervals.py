@@ -1,0 +1,260 @@
+"""How often intervals and plans of the gap are wrong: simulated studies whose truth is known.
+
+    python benchmarks/gap_intervals.py rms mmrv plan --out docs/data
+    python benchmarks/gap_intervals.py printed --studies 200
+
+`rms` and `mmrv`: how often the upper end of the 95 % interval is below the truth, and the lower end above it; both
+should be 2.5 %. `plan`: how often a study of the size that `realitygap plan --correlation` names shows it, by the rule
+of the plan. `printed`: the same by the interval that `realitygap gap` prints, a second a study. Writes a table of each,
+`gap-NAME.csv`. Seeds are fixed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from realitygap.gap import (
+    GapSide,
+    bootstrap,
+    interval,
+    mean_maximum_rank_violation,
+    measure_gap,
+    plan_correlation,
+    rank_violation_interval,
+    rms_interval,
+    square_differences,
+)
+
+Values = NDArray[np.float64]
+Interval = tuple[float | None, float | None]
+
+STUDIES = 4_000
+RESAMPLES = 400
+
+CELLS = 72
+BETWEEN, NOISE = 0.1, 0.08
+"""Standard deviations of controllers, and of one trial about its controller's mean, where scores are normal."""
+
+FAILING = 0.15
+"""Share of the controllers that have a gap, where few have one."""
+
+
+class Setting(NamedTuple):
+    """Studies with `shape` of true differences: their mean is `level`, and `spread` their standard deviation.
+
+    Few: 15 % of the controllers have a gap of `spread`, the others none. Cells: coverages are multiples of 1 / 72.
+    """
+
+    controllers: int
+    in_simulation: int
+    on_target: int
+    level: float
+    spread: float
+    shape: str = "normal"
+
+
+SETTINGS = (
+    Setting(5, 10, 10, 0.05, 0.05),
+    Setting(6, 10, 10, 0.05, 0.05),
+    Setting(8, 10, 10, 0.05, 0.05),
+    Setting(10, 10, 10, 0.05, 0.05),
+    Setting(20, 10, 10, 0.05, 0.05),
+    Setting(30, 20, 20, 0.05, 0.05),
+    Setting(8, 20, 4, 0.05, 0.05),
+    Setting(20, 2, 2, 0.05, 0.05),
+    Setting(10, 4, 4, 0.0, 0.06),
+    Setting(20, 50, 5, 0.0, 0.03),
+    Setting(10, 10, 10, 0.1, 0.0),
+    Setting(5, 50, 50, 0.0, 0.1),
+    Setting(10, 50, 50, 0.0, 0.1),
+    Setting(20, 20, 20, 0.0, 0.1),
+    Setting(5, 4, 4, 0.0, 0.0),
+    Setting(10, 4, 4, 0.0, 0.0),
+    Setting(20, 10, 10, 0.0, 0.0),
+    Setting(30, 2, 2, 0.0, 0.0),
+    Setting(8, 10, 10, 0.09, 0.06, "exponential"),
+    Setting(20, 10, 10, 0.09, 0.06, "exponential"),
+    Setting(60, 10, 10, 0.09, 0.06, "exponential"),
+    Setting(30, 10, 10, 0.0, 0.2, "few"),
+    Setting(8, 5, 5, 0.0, 0.1, "cells"),
+    Setting(20, 10, 10, 0.03, 0.05, "cells"),
+    Setting(30, 20, 20, -0.1, 0.1, "cells"),
+)
+
+PLANS = ((0.9, 0.7, 0.8, 10), (0.9, 0.5, 0.8, 5), (0.8, 0.3, 0.9, 5))
+"""Correlation, at least, reliability of both sides' means, trials of each controller."""
+
+PLAN_HEAD = ("correlation", "at least", "reliability", "trials each", "controllers")
+
+
+def qualities(setting: Setting, shape: tuple[int, ...], rng: np.random.Generator) -> tuple[Values, Values]:
+    """Return the true qualities of controllers in simulation and on the target."""
+    if setting.shape == "cells":
+        source = np.clip(rng.beta(2, 3, shape), 0.02, 0.98)
+        return source, np.clip(source + rng.normal(setting.level, setting.spread, shape), 0.02, 0.98)
+    apart = {
+        "normal": lambda: rng.normal(setting.level, setting.spread, shape),
+        "exponential": lambda: setting.level + setting.spread * (rng.exponential(1, shape) - 1),
+        "few": lambda: setting.level + setting.spread * (rng.random(shape) < FAILING),
+    }[setting.shape]()
+    source = rng.normal(0.3, BETWEEN, shape)
+    return source, source + apart
+
+
+def study(setting: Setting, rng: np.random.Generator) -> tuple[Values, Values]:
+    """Return the trials of one study: (c, r) in simulation and (c, q) on the target."""
+    sides = qualities(setting, (setting.controllers, 1), rng)
+    sizes = [(setting.controllers, n) for n in (setting.in_simulation, setting.on_target)]
+    if setting.shape == "cells":
+        source, target = (
+            rng.binomial(CELLS, side, size) / CELLS for side, size in zip(sides, sizes, strict=True)
+        )
+    else:
+        source, target = (side + rng.normal(0, NOISE, size) for side, size in zip(sides, sizes, strict=True))
+    return source, target
+
+
+def true_rms(setting: Setting, rng: np.random.Generator) -> float:
+    """Return the RMS gap of all controllers, by formula or, of cells, by two million of them."""
+    if setting.shape == "cells":
+        source, target = qualities(setting, (2_000_000,), rng)
+        return math.sqrt(((target - source) ** 2).mean())
+    if setting.shape == "few":
+        return math.sqrt((1 - FAILING) * setting.level**2 + FAILING * (setting.level + setting.spread) ** 2)
+    return math.hypot(setting.level, setting.spread)
+
+
+def rms_ends(source: Values, target: Values, rng: np.random.Generator) -> Interval:
+    """Return the interval of the RMS gap as `measure_gap` does, with fewer resamples."""
+    squares = square_differences(source[None], target[None])[0]
+    resampled = squares[rng.integers(0, len(squares), (RESAMPLES, len(squares)))].mean(axis=1)
+    return rms_interval(target.mean(axis=1) - source.mean(axis=1), squares, resampled)
+
+
+def violation(source: Values, target: Values) -> Values:
+    """Return the MMRV of (b, c, r) and (b, c, q) trials."""
+    return mean_maximum_rank_violation(source.mean(axis=2), target.mean(axis=2))
+
+
+def true_violation(setting: Setting, rng: np.random.Generator) -> float:
+    """Return the mean MMRV of studies."""
+    drawn = [study(setting, rng) for _ in range(STUDIES)]
+    return float(np.mean([violation(source[None], target[None]) for source, target in drawn]))
+
+
+def violation_ends(source: Values, target: Values, rng: np.random.Generator) -> Interval:
+    """Return the interval of the MMRV as `measure_gap` does."""
+    if violation(source[None], target[None])[0] > 0:
+        return rank_violation_interval(source.mean(axis=1), target.mean(axis=1))
+    sides = GapSide("sim", "SIM", source), GapSide("target", "SIM", target)
+    drawn = bootstrap({"mmrv": violation}, *sides, RESAMPLES, rng, smooth=True)["mmrv"]
+    return 0.0, interval(drawn, len(source))[1]
+
+
+Ends = Callable[[Values, Values, np.random.Generator], Interval]
+Truth = Callable[[Setting, np.random.Generator], float]
+
+
+def misses(ends: Ends, truth: Truth, studies: int) -> Iterator[list[str]]:
+    """Yield the rows of a table of misses, its head first."""
+    yield [
+        "controllers", "trials in simulation", "on the target", "level", "spread", "differences", "truth",
+        "upper end misses [%]", "lower end misses [%]", "mean width",
+    ]  # fmt: skip
+    for number, setting in enumerate(SETTINGS):
+        rng = np.random.default_rng([16, number])
+        true = truth(setting, rng)
+        low, high = np.array([ends(*study(setting, rng), rng) for _ in range(studies)], float).T
+        above, below = (f"{100 * share:.1f}" for share in ((high < true).mean(), (low > true).mean()))
+        numbers = [str(each) for each in setting[:3]] + [f"{each:g}" for each in setting[3:5]]
+        yield [*numbers, setting.shape, f"{true:.3f}", above, below, f"{(high - low).mean():.3f}"]
+
+
+def normal_study(
+    correlation: float, reliability: float, n: int, trials: int, rng: np.random.Generator
+) -> list[Values]:
+    """Return (n, trials) of both sides, of normal controllers with this rank correlation."""
+    pearson = 2 * math.sin(math.pi * correlation / 6)
+    latent = rng.multivariate_normal([0, 0], [[1, pearson], [pearson, 1]], n)
+    noise = math.sqrt(trials * (1 - reliability) / reliability)
+    return [latent[:, [side]] + noise * rng.normal(size=(n, trials)) for side in (0, 1)]
+
+
+def is_shown(sides: list[Values], least: float, reliability: float) -> bool:
+    """Return whether the rank correlation of means is above the attenuated least one, one-sided at 5 %."""
+    seen = float(stats.spearmanr(*(side.mean(axis=1) for side in sides)).statistic)
+    floor = 6 / math.pi * math.asin(math.sin(math.pi * least / 6) * reliability)
+    error = math.sqrt((1 + seen**2 / 2) / (len(sides[0]) - 3))
+    return math.atanh(min(seen, 1 - 1e-12)) - 1.6448536 * error > math.atanh(floor)
+
+
+def is_printed(sides: list[Values], least: float) -> bool:
+    """Return whether `realitygap gap` prints an interval of the correlation without noise that lies above."""
+    source, target = (GapSide(name, "SIM", side) for name, side in zip(("sim", "target"), sides, strict=True))
+    low = measure_gap(source, target, resamples=RESAMPLES).srcc_disattenuated.low
+    return low is not None and low > least
+
+
+def plans(studies: int) -> Iterator[list[str]]:
+    """Yield the rows of a table of plans and of the share of other studies that show the correlation, head first."""
+    yield [*PLAN_HEAD, "power of the plan", "shown in other simulated studies"]
+    for number, (correlation, least, reliability, trials) in enumerate(PLANS):
+        rng = np.random.default_rng([17, number])
+        plan = plan_correlation(correlation, least=least, reliability=reliability, trials=trials)
+        size = reliability, plan.controllers or 0, trials
+        shown = np.mean(
+            [is_shown(normal_study(correlation, *size, rng), least, reliability) for _ in range(studies)]
+        )
+        row = [f"{each:g}" for each in (correlation, least, reliability, trials, size[1])]
+        yield [*row, f"{plan.power:.3f}", f"{shown:.3f}"]
+
+
+def printed(studies: int) -> Iterator[list[str]]:
+    """Yield the rows of a table of plans and of the share of studies whose printed interval shows it, head first."""
+    yield [*PLAN_HEAD, "interval above the least one", "the same if the correlation is the least one"]
+    for number, (correlation, least, reliability, trials) in enumerate(PLANS):
+        rng = np.random.default_rng([18, number])
+        plan = plan_correlation(correlation, least=least, reliability=reliability, trials=trials)
+        size = reliability, plan.controllers or 0, trials
+        shares = [
+            np.mean([is_printed(normal_study(true, *size, rng), least) for _ in range(studies)])
+            for true in (correlation, least)
+        ]
+        row = [f"{each:g}" for each in (correlation, least, reliability, trials, size[1])]
+        yield [*row, *(f"{each:.3f}" for each in shares)]
+
+
+def main() -> None:
+    """Parse, simulate, write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("tables", nargs="+", choices=("rms", "mmrv", "plan", "printed"))
+    parser.add_argument("--studies", type=int, default=STUDIES)
+    parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER")
+    given = parser.parse_args()
+    for name in given.tables:
+        rows = {
+            "rms": lambda: misses(rms_ends, true_rms, given.studies),
+            "mmrv": lambda: misses(violation_ends, true_violation, given.studies),
+            "plan": lambda: plans(given.studies),
+            "printed": lambda: printed(given.studies),
+        }[name]()
+        with (given.out / f"gap-{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            for row in rows:
+                writer.writerow(row)
+                print(*row, sep="\t", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -122,21 +122,22 @@ class Served:
     def __init__(self, root: Path) -> None:
         from realitygap.lab import _server
 
-        self.lab, self._server = _server._prepare(root, None)
         listener = _server._listen("127.0.0.1", 0)
-        self.address = f"http://127.0.0.1:{listener.getsockname()[1]}/watch/watched"
+        port = listener.getsockname()[1]
+        self.lab, self._server = _server._prepare(root, "token", port, is_local=True, allow_code=False)
+        self.address = f"http://127.0.0.1:{port}/watch/watched?token=token"
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [listener]}, daemon=True)
         self._thread.start()
 
     def compute(self, seconds: float) -> None:
         """Have the study compute, until it is at its pace."""
-        self.lab.start_new(STUDY)
+        self.lab.start_new("watched", STUDY)
         self._until(lambda job: job.progress and job.progress["n_computed"])
         time.sleep(min(WARM_S, seconds))
 
     def drive(self, seconds: float) -> None:
         """Have an emulated robot drive the first trial of a study."""
-        self.lab.start_new(DRIVEN)
+        self.lab.start_new("watched", DRIVEN)
         while not self._job.is_over:
             time.sleep(0.1)
         self.lab.go_on("watched", port=PORT, counts="page", when="sheet", witness="")

@@ -11,7 +11,7 @@ import secrets
 import time
 from typing import Any
 from urllib.parse import urlencode, urlsplit
-from urllib.request import urlopen
+from urllib.request import Request, urlopen
 
 import websockets
 from websockets.asyncio.client import ClientConnection, connect
@@ -24,12 +24,13 @@ class PageClient:
     """A page, as a browser shows it: its elements are as the server last said.
 
     Args:
-        address: Of the page.
+        address: Of the page, with the token that the lab printed.
         looks: Whether to load the figures of the page, as they come.
     """
 
     def __init__(self, address: str, *, looks: bool = False) -> None:
-        self.address = address
+        self.address, _, token = address.partition("?token=")
+        self._cookie = {"Cookie": f"realitygap_lab_{urlsplit(self.address).port}={token}"}
         self.elements: dict[str, dict[str, Any]] = {}
         self.messages: list[tuple[float, str, Any]] = []
         self.n_heard = self.n_bytes = 0
@@ -44,7 +45,7 @@ class PageClient:
 
     async def __aenter__(self) -> PageClient:
         """Load the page, and connect."""
-        html = await asyncio.to_thread(_load, self.address)
+        html = await asyncio.to_thread(_load, self.address, self._cookie)
         query = ast.literal_eval(_found(r"query: (\{.*?\}),\n", html))
         self._client_id = query["client_id"]
         text = _found(r"createApp\(parseElements\(String\.raw`(.*?)`\)", html)
@@ -57,6 +58,7 @@ class PageClient:
         self._socket = await connect(
             f"ws://{address.netloc}/_nicegui_ws/socket.io/?{urlencode(sent)}",
             origin=f"http://{address.netloc}",  # type: ignore[arg-type]
+            additional_headers=self._cookie,
             compression=None,
             max_size=None,
         )
@@ -162,12 +164,12 @@ class PageClient:
                 self._figures.add(found)
                 address = urlsplit(self.address)
                 asyncio.get_running_loop().run_in_executor(
-                    None, _load, f"{address.scheme}://{address.netloc}{found}"
+                    None, _load, f"{address.scheme}://{address.netloc}{found}", self._cookie
                 )
 
 
-def _load(address: str) -> str:
-    with urlopen(address) as answer:
+def _load(address: str, headers: dict[str, str]) -> str:
+    with urlopen(Request(address, headers=headers)) as answer:
         body: bytes = answer.read()
         return "" if answer.headers.get("content-encoding") == "gzip" else body.decode()
 

@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
+from urllib.request import Request, urlopen
 
 import pytest
 
-from .served import LOG, begin
+from .served import FOR_CHILDREN, LOG, begin
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
 
@@ -36,22 +37,57 @@ ARGUMENTS = [
 ]
 DESKTOP, PHONE = (1280, 900), (390, 844)
 PATIENCE_MS = 120_000
-OUTAGE = ("net::ERR", "WebSocket connection", "reloading because")
-"""What a browser says of a page whose lab is gone."""
+OUTAGE = ("net::ERR", "WebSocket connection", "reloading because", "status of 403")
+"""What a browser says of a page whose lab is gone, or was started again with another token."""
+
+ENDLESS_CHECKS = """
+import sys
+if "realitygap.lab._work" in sys.orig_argv:
+    import time
+    from realitygap.lab import _check_work
+    check = _check_work._check
+    def slow(root, text, **options):
+        time.sleep(300 if "endless" in text else 0)
+        return check(root, text, **options)
+    _check_work._check = slow
+"""
 
 
 class RunningLab:
-    """A lab of a folder; `address` is that of its first page."""
+    """A lab of a folder; `address` is that of its first page, `cookie` what lets a browser in."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
         self.address = ""
+        self.token = ""
         self._port = 0
         self._process: BaseProcess | None = None
 
     def start(self) -> None:
-        self._process, self.address = begin(self.root, self._port)
+        self._process, printed = begin(self.root, self._port)
+        self.address, _, self.token = printed.partition("?token=")
         self._port = int(self.address.rstrip("/").rpartition(":")[2])
+
+    @property
+    def cookie(self) -> dict[str, Any]:
+        named = {"name": f"realitygap_lab_{self._port}", "value": self.token, "url": self.address}
+        return {**named, "httpOnly": True, "sameSite": "Strict"}
+
+    def entry(self, path: str = "") -> str:
+        """The address of a page with the token."""
+        return f"{self.address}{path}?token={self.token}"
+
+    def lag(self) -> float:
+        """The most that its event loop was late since this was asked last [s]."""
+        cookie = f"{self.cookie['name']}={self.token}"
+        with urlopen(Request(f"{self.address}lag", headers={"Cookie": cookie})) as answer:
+            return float(answer.read())
+
+    def make_checks_endless(self) -> None:
+        """Have every check of a study file with the word "endless" take longer than its limit."""
+        folder = self.root.parent / FOR_CHILDREN
+        folder.mkdir()
+        (folder / "sitecustomize.py").write_text(ENDLESS_CHECKS)
 
     def kill(self) -> None:
         """End it as a power cut does."""
@@ -105,6 +141,7 @@ def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
         path: str = "", size: tuple[int, int] = DESKTOP, forgive: Sequence[str] = (), **options: Any
     ) -> Any:
         context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+        context.add_cookies([lab.cookie])
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(PATIENCE_MS)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import faulthandler
 import multiprocessing
 import os
 import sys
+import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import uvicorn  # noqa: F401  # imported once, for all that are forked
 from fastapi import FastAPI  # noqa: F401
+from nicegui import app
 
 import realitygap.lab.pages  # noqa: F401
 from realitygap.lab import open_lab
@@ -19,12 +22,36 @@ from realitygap.lab import open_lab
 LOG = "lab.log"
 """What a lab says to its terminal, beside its folder."""
 
+FOR_CHILDREN = "modules"
+"""Folder beside the lab's: a `sitecustomize.py` in it changes the lab's child processes."""
+
+BEAT_S = 0.01
+_lags = [0.0]
+
+
+@app.on_startup
+async def _beat() -> None:
+    """Measure how late the event loop is."""
+    while True:
+        began = time.monotonic()
+        await asyncio.sleep(BEAT_S)
+        _lags.append(time.monotonic() - began - BEAT_S)
+
+
+@app.get("/lag")
+async def lag() -> float:
+    """The most that the event loop was late since this was asked last [s]."""
+    most = max(_lags)
+    _lags[:] = [0.0]
+    return most
+
 
 def serve(root: Path, port: int, told: Connection) -> None:
     """Serve the lab of a folder; say its address."""
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # of which NiceGUI thinks that it is under test itself
     sys.stdout = sys.stderr = (root.parent / LOG).open("a", buffering=1, encoding="utf-8")
     os.dup2(sys.stderr.fileno(), 2)
+    os.environ["PYTHONPATH"] = str(root.parent / FOR_CHILDREN)
     faulthandler.enable(sys.stderr)
 
     def tell(line: str) -> None:

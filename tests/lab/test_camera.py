@@ -32,6 +32,7 @@ def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebod
     with Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as ledger:
         true = {row["trial"]: row for row in ledger.scores()}
     counts = Counts(folder, ResultsFolder.open(folder).description)
+    counts.look()
     for number in (1, 2, 3):
         (seen,) = read_proposals(folder, number)
         assert len(set(seen.cells) ^ set(true[number]["cells"])) <= 1

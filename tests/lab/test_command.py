@@ -6,13 +6,16 @@ import signal
 import socket
 import subprocess
 import sys
+import urllib.error
 import urllib.request
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab import open_lab
+from realitygap.lab._server import _entry
 
 COMMAND = [sys.executable, "-m", "realitygap", "lab"]
 
@@ -60,9 +63,26 @@ def test_it_answers_at_the_address_that_it_tells_and_ends_with_ctrl_c(tmp_path: 
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as lab:
         assert lab.stdout is not None
         address = next(line for line in lab.stdout if line.startswith("Open ")).split()[1]
-        with urllib.request.urlopen(address) as answer:
-            assert b"realitygap lab" in answer.read()
+        plain, _, token = address.partition("?token=")
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(plain)
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        with browser.open(address) as entry:
+            assert b'href="/"' in entry.read()
+        with browser.open(plain) as answer:
+            assert b"Stop the robot" in answer.read()
+        assert len(token) >= 20
         lab.send_signal(signal.SIGINT)
         _, said = lab.communicate(timeout=60)
     assert "Traceback" not in said
     assert lab.returncode in (0, 130)
+
+
+def test_browser_is_started_without_the_token_in_its_arguments(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")  # elsewhere, other accounts cannot read them
+    with _entry("http://127.0.0.1:1/?token=secret", tmp_path) as opened:
+        file = Path(unquote(urlsplit(opened).path))
+        assert "secret" not in opened
+        assert "token=secret" in file.read_text("utf-8")
+        assert file.stat().st_mode & 0o077 == 0
+    assert not file.exists()

@@ -52,15 +52,15 @@ def counts(folder: Path) -> Counts:
 
 
 def test_what_another_program_writes_is_seen_and_nothing_is_read_twice(folder, counts):
-    assert counts.trials() == []
+    assert counts.look() == []
     with begin(folder) as ledger:
-        assert counts.trials() == []
+        assert counts.look() == []
         plan(ledger)
-        found = counts.trials()
+        found = counts.look()
         assert [each.number for each in found] == [1, 2]
-        assert counts.trials() is found
+        assert counts.look() is found
         ledger.note("it squeaks", "anna", 1)
-        assert counts.trials() is not found
+        assert counts.look() is not found
         assert counts.trial(1).notes == ("anna: it squeaks",)
     counts.note(2, "so does this", "ben")
     assert counts.trial(2).notes == ("ben: so does this",)
@@ -75,12 +75,14 @@ def test_a_change_is_seen_though_sizes_and_times_of_the_files_are_as_they_were(f
         ledger.note("one", "anna", 1)
         with closing(sqlite3.connect(path)) as other:
             other.execute("PRAGMA wal_checkpoint(RESTART)").fetchone()  # what comes goes where it went before
+        counts.look()
         assert counts.trial(1).notes == ("anna: one",)
         before = [(each.stat().st_size, each.stat().st_mtime_ns) for each in files]
         ledger.note("two", "anna", 1)
         for each, (_, time) in zip(files, before, strict=True):
             os.utime(each, ns=(time, time))
         assert [(each.stat().st_size, each.stat().st_mtime_ns) for each in files] == before
+        counts.look()
         assert counts.trial(1).notes == ("anna: one", "anna: two")
 
 
@@ -89,9 +91,11 @@ def test_a_ledger_restored_from_a_copy_is_read_anew(folder, counts):
     with begin(folder) as ledger:
         plan(ledger)
     shutil.copy(path, folder / "copy")
+    counts.look()
     counts.note(1, "after the copy", "anna")
     assert counts.trial(1).notes
     (folder / "copy").replace(path)
+    counts.look()
     assert counts.trial(1).notes == ()
 
 
@@ -103,6 +107,6 @@ def test_a_torn_ledger_is_told_each_time_until_it_is_whole(folder, counts):
     path.write_bytes(whole[:4096] + b"\0" * (len(whole) - 4096))
     for _ in range(2):
         with pytest.raises(LedgerError, match="is torn"):
-            counts.trials()
+            counts.look()
     path.write_bytes(whole)
-    assert len(counts.trials()) == 2
+    assert len(counts.look()) == 2

@@ -53,7 +53,7 @@ def test_arrow_keys_drive_and_escape_stops(visit):
     page.get_by_text("The robot was told to stop.").wait_for()
     page.get_by_text("Standing", exact=True).wait_for()  # though the key is still down
     page.keyboard.up("ArrowUp")
-    page.locator('.lab-pad[data-stops="1"]').wait_for()
+    page.locator('.lab-pad[data-stops="2"]').wait_for()
     page.keyboard.down("ArrowUp")
     page.get_by_text("Driving", exact=True).wait_for()
     page.keyboard.up("ArrowUp")

@@ -117,7 +117,7 @@ def test_a_trial_goes_on_when_the_page_goes_away(lab, visit):
     again.get_by_text("Pen: blue").wait_for()
 
 
-def test_one_operator_has_the_robot_and_others_watch(lab, visit):
+def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(lab, visit):
     make_study(lab.root)
     page = visit(PAGE)
     begin_sitting(page)
@@ -125,9 +125,20 @@ def test_one_operator_has_the_robot_and_others_watch(lab, visit):
     other = visit(PAGE)
     other.get_by_text("anna has the robot; you are watching.").wait_for()
     assert other.get_by_role("button", name="Start the trial").is_disabled()
-    other.get_by_role("button", name="Take the robot over").click()
-    start_trial(other, 1)
+    other.get_by_role("button", name="Ask for the robot").click()
+    other.get_by_role("button", name="Cancel").click()
+    for answer in ("Keep it", "Hand it over"):
+        other.get_by_role("button", name="Ask for the robot").click()
+        other.get_by_role("button", name="Ask now").click()
+        other.get_by_text("You asked for it.").wait_for()
+        page.get_by_text("asks for the robot.").wait_for()
+        page.get_by_role("button", name=answer).click()
+        if answer == "Keep it":
+            other.get_by_text("anna keeps the robot for now.").wait_for()
     page.get_by_text("has the robot; you are watching.").wait_for()
+    start_trial(other, 1)
+    page.get_by_role("button", name="Stop the robot").click()
+    page.get_by_text("The robot was told to stop.").wait_for()
 
 
 def test_two_people_count_and_their_agreement_is_told(lab, visit):
@@ -227,13 +238,15 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
     assert page.get_by_label("A note on the whole").input_value() == "half a note"
 
 
-def test_a_page_that_was_open_comes_back_by_itself_when_the_lab_does(lab, visit):
+def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(lab, visit):
     make_study(lab.root)
     page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource", "Failed to fetch"])
     page.get_by_label("Your name").fill("anna")
     lab.kill()
-    page.get_by_text("Connection lost").wait_for()
+    page.locator("#popup").get_by_text("Connection lost").wait_for()
     lab.start()
-    page.get_by_text("Connection lost").wait_for(state="hidden")
+    page.get_by_label("Or paste the address or the token here").fill(lab.token)
+    page.get_by_role("button", name="Open the lab").click()
+    page.wait_for_url(lab.address + PAGE)
     begin_sitting(page)
     page.get_by_role("button", name="Start the trial").wait_for()

@@ -60,7 +60,7 @@ def test_several_trials_are_played_together_and_a_wish_that_cannot_be_is_told(la
     page.locator(".lab-problem", has_text="99").wait_for()
 
 
-def test_the_report_is_written_and_shown(lab, visit):
+def test_report_is_written_and_works_in_its_sandbox(lab, visit):
     carry_out(lab.root)
     page = visit("watch/seen")
     page.get_by_role("button", name="Write the report").click()
@@ -68,7 +68,21 @@ def test_the_report_is_written_and_shown(lab, visit):
     link.wait_for()
     with page.context.expect_page() as opened:
         link.click()
-    opened.value.get_by_role("heading", name="seen").first.wait_for()
+    report, faults = opened.value, []
+    report.on("console", lambda message: faults.append(message.text))
+    report.on("pageerror", lambda error: faults.append(str(error)))
+    report.reload()
+    report.get_by_role("heading", name="seen").first.wait_for()
+    assert report.evaluate("origin") == "null"
+    began = report.locator("#replay-clock").inner_text()
+    report.get_by_role("button", name="To the start").click()
+    report.get_by_role("button", name="Play", exact=True).click()
+    report.wait_for_function(
+        "began => document.getElementById('replay-clock').innerText !== began", arg=began
+    )
+    report.get_by_role("link", name="Link to this view").click()
+    assert "#replay=" in report.url
+    assert faults == []
 
 
 def test_whoever_watches_sees_a_trial_while_it_is_driven(lab, visit):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import json
 import queue
-import signal
-import sys
 import threading
 from collections.abc import Callable, Mapping
 from typing import Any, TextIO
 
+from realitygap._interrupts import interrupt
 from realitygap.errors import RealityGapError
 
 Message = dict[str, Any]
@@ -19,9 +17,6 @@ MOST_EARLY = 100
 """Messages that are kept until somebody says what to do with them."""
 LOOK_S = 0.2
 """How often who waits looks up [s]: a library lets waits outlast signals; between two an interrupt is seen."""
-
-AGAIN_S = 0.05
-"""After which an interrupt that was lost comes once more [s]: Python is elsewhere by then."""
 
 
 class Channel:
@@ -101,7 +96,7 @@ class Channel:
                     self._answers.put(message)
                 else:
                     self._do(str(what), message)
-        _interrupt()
+        interrupt()
 
     def _do(self, what: str, message: Message) -> None:
         with self._hearing:
@@ -121,26 +116,3 @@ def _read(line: str) -> Message:
         if isinstance(message, Mapping):
             return dict(message)
     return {}
-
-
-def _interrupt() -> None:
-    """Ctrl-C for the main thread, also where it waits."""
-    if hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
-    else:
-        _thread.interrupt_main()
-
-
-def keep_interrupts() -> None:
-    """Let Ctrl-C that came where Python cannot raise it, as in the callback of a weak reference, come once more."""
-    usual = sys.unraisablehook
-
-    def again(unraisable: sys.UnraisableHookArgs) -> None:
-        if unraisable.exc_type is not KeyboardInterrupt:
-            usual(unraisable)
-            return
-        timer = threading.Timer(AGAIN_S, _interrupt)
-        timer.daemon = True
-        timer.start()
-
-    sys.unraisablehook = again

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import queue
 import subprocess
 import sys
 import threading
@@ -18,6 +19,9 @@ PATIENCE_S = 10.0
 class Child:
     """A process that works.
 
+    Nothing here but `end` waits for the process: what it is told is sent by a thread, because a pipe whose other end
+    does not read is full at some time.
+
     Args:
         order: What it is to do.
         folder: In which it works.
@@ -28,9 +32,10 @@ class Child:
         self, order: Mapping[str, Any], folder: Path, hear: Callable[[dict[str, Any]], None]
     ) -> None:
         self._hear = hear
-        self._lock = threading.Lock()
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "realitygap.lab._work"],
+            # -P: otherwise Python looks for modules in the folder first, and would run a numpy.py of anybody's.
+            [sys.executable, "-P", "-m", "realitygap.lab._work"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             cwd=folder,
@@ -39,7 +44,8 @@ class Child:
             start_new_session=True,  # Ctrl-C reaches it through the server, after which it stops its robot
         )
         self.tell(order)
-        threading.Thread(target=self._listen, daemon=True).start()
+        for work in (self._listen, self._send):
+            threading.Thread(target=work, daemon=True).start()
 
     @property
     def is_alive(self) -> bool:
@@ -48,12 +54,7 @@ class Child:
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Say something to it; nothing where it has ended."""
-        line = json.dumps(message, separators=(",", ":"))
-        pipe = self._process.stdin
-        with self._lock, contextlib.suppress(OSError, ValueError):
-            if pipe is not None:
-                pipe.write(line + "\n")
-                pipe.flush()
+        self._lines.put(json.dumps(message, separators=(",", ":")) + "\n")
 
     def ask_to_end(self) -> None:
         """Have it stop what it does, its robot first."""
@@ -68,6 +69,17 @@ class Child:
             self._process.kill()
             self._process.wait()
 
+    def kill(self) -> None:
+        """Kill it, whatever it is doing."""
+        self._process.kill()
+
+    def _send(self) -> None:
+        pipe = self._process.stdin
+        with contextlib.suppress(OSError, ValueError):
+            while pipe is not None and (line := self._lines.get()) is not None:
+                pipe.write(line)
+                pipe.flush()
+
     def _listen(self) -> None:
         pipe = self._process.stdout
         with contextlib.suppress(OSError, ValueError):
@@ -75,4 +87,5 @@ class Child:
                 with contextlib.suppress(ValueError):
                     self._hear(json.loads(line))
         status = self._process.wait()
+        self._lines.put(None)
         self._hear({"kind": "ended", "status": status})

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+import threading
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial
 from realitygap.runs import Condition
 from realitygap.world import Arena
 
-from ._drawn import Draft, forget_draft, keep_draft, read_draft
+from ._drawn import FOLDER, Draft, forget_draft, keep_draft, read_draft, read_drawn
 from ._proposals import Proposal, read_proposals
 
 LONGEST_NOTE = 2000
@@ -56,8 +58,28 @@ class CountedTrial:
         return None if self.second else "second"
 
 
+@dataclass(frozen=True)
+class CountCard:
+    """Everything that is shown while a trial is counted.
+
+    Attributes:
+        draft: What they have tapped so far.
+        arena: Where the trial was driven.
+        proposals: What a photograph or a camera saw, the last one first.
+        line: (x, y) [m] that an emulated robot drew; empty if nobody saw it.
+    """
+
+    draft: Draft
+    arena: Arena
+    proposals: list[Proposal]
+    line: list[tuple[float, float]]
+
+
 class Counts:
     """The trials of a study in the order of their turns.
+
+    `trials`, `trial`, `proposals`, `arena` and `keep` wait for nothing, as pages need it. All other methods wait for
+    the disk, and for other programs that write to the ledger: pages call them in threads.
 
     Args:
         folder: Of the study.
@@ -75,15 +97,37 @@ class Counts:
         self._arenas: dict[str, Arena] = {}
         self._stamp: tuple[Any, ...] = ()
         self._found: list[CountedTrial] = []
+        self._proposed: dict[int, list[Proposal]] = {}
+        self._proposed_stamp: tuple[Any, ...] = ()
+        self._drafts: dict[tuple[int, str, ScoreRole], Draft] = {}
+        self._looking = threading.Lock()
+        self._keeper = ThreadPoolExecutor(1)  # one: drafts are written in the order of the taps
+
+    def look(self) -> list[CountedTrial]:
+        """Read the trials again if the ledger has changed, and their proposals likewise; return all trials.
+
+        Raises:
+            LedgerError: The ledger cannot be read.
+        """
+        with self._looking:
+            path = self._folder / LEDGER_NAME
+            stamp = _stamp(path)
+            if stamp and stamp != self._stamp:
+                with Ledger.open(path, writable=False) as ledger:
+                    self._found = self._read(ledger)
+                self._stamp = stamp
+            stamp = (self._stamp, _changed(self._folder / FOLDER))
+            if stamp != self._proposed_stamp:
+                self._proposed = {
+                    each.number: read_proposals(self._folder, each.number) for each in self._found
+                }
+                self._proposed_stamp = stamp
+            for condition in {each.trial.condition for each in self._found}:
+                self.arena(condition)
+            return self._found
 
     def trials(self) -> list[CountedTrial]:
-        """All trials; read anew only when the ledger has changed."""
-        path = self._folder / LEDGER_NAME
-        stamp = _stamp(path)
-        if stamp and stamp != self._stamp:
-            with Ledger.open(path, writable=False) as ledger:
-                self._found = self._read(ledger)
-            self._stamp = stamp
+        """All trials, as they were at the last look."""
         return self._found
 
     def trial(self, number: int) -> CountedTrial:
@@ -103,11 +147,6 @@ class Counts:
             resolved = Condition.from_settings(condition, self._settings[condition])
             self._arenas[condition] = resolved.arena.arena()
         return self._arenas[condition]
-
-    def first_arena(self) -> Arena:
-        """Where the trials of the first condition on a robot are driven."""
-        name = next(name for name, settings in self._settings.items() if settings["platform"] == "scribbler")
-        return self.arena(name)
 
     def _read(self, ledger: Ledger) -> list[CountedTrial]:
         scores = [row for row in ledger.scores() if row["undone"] is None]
@@ -152,17 +191,18 @@ class Counts:
             else found.score(sorted(draft.cells), who)
             for number, draft in drafts.items()
         }
-        with self._ledger() as ledger:
+        with self._writing() as ledger:
             ledger.score_all(scores, role)
             for number, found in seen.items():
                 if found is not None and found.told:
                     ledger.note(found.told, who, number)
         for number in drafts:
-            forget_draft(self._folder, number, who, role)
+            self._drafts.pop((number, who, role), None)
+            self._keeper.submit(forget_draft, self._folder, number, who, role).result()
 
     def draft(self, number: int, who: str, role: ScoreRole) -> Draft:
         """What somebody has tapped of a trial so far; before that, what was last seen of it, for a first count."""
-        draft = read_draft(self._folder, number, who, role)
+        draft = self._drafts.get((number, who, role)) or read_draft(self._folder, number, who, role)
         if draft is not None:
             return draft
         if role == "correction":
@@ -174,38 +214,57 @@ class Counts:
 
     def keep(self, number: int, who: str, role: ScoreRole, draft: Draft) -> None:
         """Keep what somebody has tapped so far."""
-        keep_draft(self._folder, number, who, role, draft)
+        self._drafts[number, who, role] = draft
+        self._keeper.submit(keep_draft, self._folder, number, who, role, draft)
+
+    def card(self, number: int, who: str, role: ScoreRole) -> CountCard:
+        """Everything that is shown while a trial is counted."""
+        draft = self.draft(number, who, role)
+        arena = self.arena(self.trial(number).trial.condition)
+        return CountCard(draft, arena, self.proposals(number), read_drawn(self._folder, number))
 
     def proposals(self, number: int) -> list[Proposal]:
-        """What a photograph or a camera saw of a trial, the last one first."""
-        return read_proposals(self._folder, number)
+        """What a photograph or a camera saw of a trial, the last one first, as of the last look."""
+        return self._proposed.get(number, [])
 
     def _proposal(self, number: int, mark: str) -> Proposal | None:
         return next((each for each in self.proposals(number) if mark and each.mark == mark), None)
 
     def undo(self, number: int) -> None:
         """Take a score back, as far as its generation is not closed."""
-        with self._ledger() as ledger:
+        with self._writing() as ledger:
             ledger.undo(number)
 
     def void(self, number: int, reason: str) -> None:
         """Declare a trial void; it is driven again."""
-        with self._ledger() as ledger:
+        with self._writing() as ledger:
             ledger.void(number, reason[:LONGEST_NOTE])
 
     def note(self, number: int | None, text: str, who: str) -> None:
         """Keep a note."""
-        with self._ledger() as ledger:
+        with self._writing() as ledger:
             ledger.note(text[:LONGEST_NOTE], _named(who), number)
 
-    def _ledger(self) -> Ledger:
-        return Ledger.open(self._folder / LEDGER_NAME)
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[Ledger]:
+        """Open the ledger, and look at it again after the writing."""
+        with Ledger.open(self._folder / LEDGER_NAME) as ledger:
+            yield ledger
+        self.look()
 
 
 def _named(who: str) -> str:
     if not who.strip():
         raise LedgerError("Who are you? Give a name first: the ledger keeps it with what you enter.")
     return who.strip()
+
+
+def _changed(folder: Path) -> int:
+    """When a file came into a folder, or left it, last; 0 if there is no folder."""
+    try:
+        return folder.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _stamp(path: Path) -> tuple[Any, ...]:

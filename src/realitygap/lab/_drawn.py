@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
+from realitygap.records import refuse_links, write_whole
 
 FOLDER = "lab"
 """Within a study's folder. What it holds can be lost without harm once its trials are scored."""
@@ -18,7 +20,9 @@ FOLDER = "lab"
 def keep_drawn(folder: Path, trial: int, path: Sequence[Sequence[float]]) -> None:
     """Keep the line of a trial: (t, 2 or more) x, y [m] and so on."""
     write_json(
-        folder / FOLDER / f"line-{trial}.json", [[round(each[0], 5), round(each[1], 5)] for each in path]
+        folder,
+        folder / FOLDER / f"line-{trial}.json",
+        [[round(each[0], 5), round(each[1], 5)] for each in path],
     )
 
 
@@ -46,7 +50,7 @@ class Draft:
 def keep_draft(folder: Path, trial: int, who: str, role: str, draft: Draft) -> None:
     """Keep what somebody has tapped so far."""
     values = {"cells": sorted(draft.cells), "proposal": draft.proposal}
-    write_json(_draft(folder, trial, who, role), values)
+    write_json(folder, _draft(folder, trial, who, role), values)
 
 
 def read_draft(folder: Path, trial: int, who: str, role: str) -> Draft | None:
@@ -69,17 +73,20 @@ def _draft(folder: Path, trial: int, who: str, role: str) -> Path:
     return folder / FOLDER / f"draft-{trial}-{mark}.json"
 
 
-def write_json(path: Path, value: Any) -> None:
-    """Write a file as a whole, beside its place first."""
+def write_json(folder: Path, path: Path, value: Any) -> None:
+    """Write a JSON file whole, in a study's folder.
+
+    Raises:
+        RecordError: It cannot be written, or a name on the way to it is a link.
+    """
+    refuse_links(folder, path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{path.name}.{secrets.token_hex(4)}.tmp")
-    temporary.write_text(json.dumps(value), "utf-8")
-    temporary.replace(path)
+    write_whole(path, json.dumps(value).encode(), within=folder)
 
 
 def read_json(path: Path) -> Any:
     """What is in a file; None where it is not there, or no JSON."""
     try:
-        return json.loads(path.read_text("utf-8"))
+        return parse_json(read_file(path, MOST_JSON_BYTES, plain=True), nan=True)
     except (OSError, ValueError):
         return None

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
 
+from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
 from realitygap.settings import shown
+from realitygap.study import Study, python_tasks
 
 LONGEST_TEXT = 200_000
 """Of a study file [letters]."""
@@ -32,11 +33,25 @@ def refuse_files_outside(root: Path, text: str) -> None:
             f"The file has {len(text):,} letters, expected at most {LONGEST_TEXT:,}: a study file in TOML."
         )
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        data = parse_toml(text)
+    except ValueError as error:
         raise StudyError(f"This is not TOML: {error}. Expected a study file.") from error
     for value in _texts(data):
         refuse_outside(root, value)
+
+
+def refuse_code(study: Study, allow_code: bool) -> None:
+    """Refuse a study whose tasks are Python files, unless the lab may run code.
+
+    Raises:
+        StudyError: It has such a task.
+    """
+    tasks = python_tasks(study)
+    if tasks and not allow_code:
+        raise StudyError(
+            f"{shown(tasks[0].kind)} runs code on the lab's machine, which this lab does not allow. Read the file. If "
+            "you trust it, start the lab with: realitygap lab --allow-code"
+        )
 
 
 def refuse_outside(root: Path, text: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import tomllib
 import types
 import typing
 from collections.abc import Mapping
@@ -17,6 +16,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from realitygap._limits import parse_toml
 from realitygap.evolution import NAMED_SETTINGS
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.runs import Condition
@@ -117,10 +117,7 @@ def read_form(text: str) -> dict[str, Any]:
     Raises:
         ValueError: It is not TOML.
     """
-    try:
-        return tomllib.loads(text)
-    except RecursionError as error:
-        raise ValueError("This is no study file: it is nested too deeply.") from error
+    return parse_toml(text)
 
 
 def entered(field: Field, text: str) -> Any:
@@ -132,8 +129,8 @@ def entered(field: Field, text: str) -> Any:
     if field.kind in ("text", "choice"):
         return text
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except (tomllib.TOMLDecodeError, RecursionError):
+        return parse_toml(f"value = {text}")["value"]
+    except ValueError:
         expected = {"whole": "a whole number", "number": "a number", "yes-no": "true or false"}.get(
             field.kind, 'a value as study files have it, such as [1, 2] or "text"'
         )

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
+
+from realitygap._limits import parse_json
 
 Message = MutableMapping[str, Any]
 
@@ -54,7 +54,7 @@ def is_of_page(frame: str | None) -> bool:
         match _value(text):
             case [str(what), dict(said)]:
                 return _fits(what, said)
-    except (ValueError, RecursionError):
+    except ValueError:
         pass
     return False
 
@@ -88,18 +88,5 @@ def _value(text: str) -> Any:
 
     Raises:
         ValueError: It is none, or holds others.
-        RecursionError: It is nested too deeply.
     """
-    value = json.loads(text, parse_constant=_refuse, parse_float=_finite)
-    text.encode()
-    json.dumps(value, ensure_ascii=False).encode()
-    return value
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    return value if math.isfinite(value) else _refuse(text)
-
-
-def _refuse(text: str) -> float:
-    raise ValueError(f"{text} is no number")
+    return parse_json(text, large=True)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import re
 import threading
-import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RealityGapError, StudyError
+from realitygap.errors import StudyError
+from realitygap.records import refuse_links
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
-from realitygap.study import parse_study
 
 from ._calibration_job import CalibrationJob
+from ._checks import Checks
 from ._counts import Counts
-from ._files import refuse_camera, refuse_files_outside, refuse_outside, refuse_platform, refuse_port
+from ._files import refuse_camera, refuse_outside, refuse_platform, refuse_port
 from ._gap_job import ROBOT, GapJob
 from ._hand import Hand
 from ._job import Job
@@ -42,29 +42,54 @@ class Visitor:
     who: str = ""
 
 
+HANDOVER_S = 20.0
+"""Time that the operator of a robot has to answer who asks for it; after that the robot is handed over [s]."""
+
+
+@dataclass(frozen=True)
+class RobotRequest:
+    """A visitor who asks for the robot that another visitor has.
+
+    Attributes:
+        visitor: Who asks.
+        operator: Who has the robot.
+        is_refused: Whether the operator keeps the robot.
+    """
+
+    visitor: Visitor
+    operator: Visitor
+    is_refused: bool = False
+
+
 class Lab:
     """The lab of a folder of studies.
 
     Attributes:
         root: The folder.
+        allow_code: Whether Python files of tasks may run.
         studies: In it.
+        checks: Study files that are being checked.
         jobs: Studies that go on, or went on since the lab was opened, by name.
         watchers: The figures of studies that somebody has watched, by name.
         hand: The robot that is driven by hand, or was last; None before.
         gap: The gap that is measured or planned, or was last; None before.
         calibration: The calibration that goes on, or was last; None before.
         operator: Who has the robot: one visitor at a time, while others watch; None while nobody has.
+        request: Who asked last for the robot that somebody else has; None where nobody did, or it was handed over.
         videos: The video of each study that is tracked, or was last, by the study's name.
         lives: The robot that a network of each study drives for those who look, by the study's name.
         version: Counts changes, so that a page knows when to look.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, *, allow_code: bool = False) -> None:
         self.root = root
+        self.allow_code = allow_code
         self.studies = Studies(root)
+        self.checks = Checks(root, allow_code=allow_code)
         self.jobs: dict[str, StudyJob] = {}
         self.version = 0
         self.operator: Visitor | None = None
+        self.request: RobotRequest | None = None
         self.hand: Hand | None = None
         self.gap: GapJob | None = None
         self.calibration: CalibrationJob | None = None
@@ -157,24 +182,21 @@ class Lab:
                 self.watchers[name] = Watcher(path, self.root, self.changed)
             return self.watchers[name]
 
-    def start_new(self, text: str) -> str:
+    def start_new(self, name: str, text: str) -> None:
         """Begin a study.
 
         Args:
+            name: Of the study, as a check found it in the file.
             text: Of its file.
 
-        Returns:
-            Its name.
-
         Raises:
-            StudyError: There are mistakes in the file, it names files outside the lab's folder, or the name is taken.
+            StudyError: The name is taken.
         """
-        refuse_files_outside(self.root, text)
-        study = parse_study(text, str(self.root / "study.toml"))
-        folder = self.studies.new_path(study.about.name)
         with self._lock:
-            self._begin(study.about.name, {"work": "study", "folder": str(folder), "text": text})
-        return study.about.name
+            if self.job(name) is not None:
+                raise StudyError(f"The study {name!r} is running already. Give this one another name.")
+            folder = self.studies.new_path(name)
+            self._begin(name, {"work": "study", "folder": str(folder), "text": text})
 
     def go_on(self, name: str, **options: Any) -> StudyJob:
         """Have a study go on where it stopped.
@@ -199,6 +221,7 @@ class Lab:
             return self._begin(name, {"work": "study", "folder": str(folder), **options})
 
     def _begin(self, name: str, order: dict[str, Any]) -> StudyJob:
+        order["allow_code"] = self.allow_code
         job = self.jobs[name] = StudyJob(name, order, self.root, self.changed)
         self.changed()
         return job
@@ -230,8 +253,10 @@ class Lab:
         with self._lock:
             if values["target"].startswith(ROBOT):
                 self.refuse_second_robot()
+            kept = page.with_suffix(".jsonl")
+            refuse_links(self.root, page, kept)
             page.parent.mkdir(exist_ok=True)
-            order = {"measure": values, "page": str(page), "kept": str(page.with_suffix(".jsonl"))}
+            order = {"measure": values, "page": str(page), "kept": str(kept)}
             self._begin_gap(name, order)
 
     def plan_gap(self, question: str, value: float) -> None:
@@ -275,6 +300,7 @@ class Lab:
         out = self.root / f"{name}.toml"
         if out.exists() and not out.with_suffix(".trials.jsonl").exists():
             raise StudyError(f"There is a file {out.name} already, of something else. Give another name.")
+        refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
         refuse_outside(self.root, values["base"])
         refuse_platform(self.root, values["platform"])
         is_robot = values["platform"].startswith(ROBOT)
@@ -283,7 +309,7 @@ class Lab:
                 raise StudyError("A calibration goes on already. Wait until it is done, or stop it.")
             if is_robot:
                 self.refuse_second_robot()
-                self.operator = visitor
+                self.operator, self.request = visitor, None
             order = {**values, "out": str(out)}
             self.calibration = CalibrationJob(order, self.root, self.changed)
         self.changed()
@@ -314,20 +340,63 @@ class Lab:
         with self._lock:
             self.refuse_second_robot()
             self.hand = Hand({"port": port, "witness": witness}, self.root, self.changed)
-            self.operator = visitor
+            self.operator, self.request = visitor, None
         self.changed()
 
-    def take_robot(self, visitor: Visitor, *, over: bool = False) -> None:
-        """Have a visitor be the operator.
+    def take_robot(self, visitor: Visitor) -> None:
+        """Have the visitor who began to use a robot be its operator."""
+        with self._lock:
+            self.operator, self.request = visitor, None
+        self.changed()
+
+    def ask_for_robot(self, visitor: Visitor) -> None:
+        """Ask the operator for the robot; after `HANDOVER_S` without an answer it is handed over.
 
         Raises:
-            StudyError: Somebody else is, and it is not taken over.
+            StudyError: Somebody else asks already.
         """
         with self._lock:
-            if not over and not self.may_operate(visitor):
-                raise StudyError(f"{self.operator_name} has the robot. Take it over first, if they agree.")
-            self.operator = visitor
+            operator, asked = self.operator, self.request
+            if self.may_operate(visitor) or operator is None:
+                self.take_robot(visitor)
+                return
+            if asked is not None and not asked.is_refused:
+                if asked.visitor.key == visitor.key:
+                    return
+                raise StudyError(
+                    f"{asked.visitor.who or 'Somebody else'} asks for the robot already. Wait a moment."
+                )
+            self.request = request = RobotRequest(visitor, operator)
+        waiting = threading.Timer(HANDOVER_S, self._answer, (request,), {"yes": True})
+        waiting.daemon = True
+        waiting.start()
         self.changed()
+
+    def answer_request(self, operator: Visitor, *, yes: bool) -> None:
+        """Hand the robot over to the visitor who asks for it, or keep it.
+
+        Raises:
+            StudyError: Nobody asks this operator any more.
+        """
+        request = self.request
+        if request is None or request.operator.key != operator.key or not self._answer(request, yes=yes):
+            raise StudyError("Nobody asks you for the robot any more.")
+
+    def _answer(self, request: RobotRequest, *, yes: bool) -> bool:
+        """Answer a request; False if it was answered before, or the robot has another operator by now."""
+        with self._lock:
+            if self.request is not request or request.is_refused:
+                return False
+            if self.operator is None or self.operator.key != request.operator.key:
+                self.request = None
+                return False
+            self.request = None if yes else replace(request, is_refused=True)
+            if yes:
+                self.operator = request.visitor
+                if self.hand is not None and not self.hand.is_over:
+                    self.hand.stop()  # a handle that is still held drives no more
+        self.changed()
+        return True
 
     def may_operate(self, visitor: Visitor) -> bool:
         """Whether this visitor has the robot, or nobody has."""
@@ -377,15 +446,4 @@ class Lab:
             watcher.end()
         for photos in self._photos.values():
             photos.end()
-
-
-def check_study(root: Path, text: str) -> str:
-    """Whether a study can be begun from the text of a file: what is wrong with it, or nothing."""
-    try:
-        refuse_files_outside(root, text)
-        parse_study(text, str(root / "study.toml"))
-    except RealityGapError as error:
-        return str(error)
-    except tomllib.TOMLDecodeError as error:
-        return f"This is not TOML: {error}."
-    return ""
+        self.checks.end()

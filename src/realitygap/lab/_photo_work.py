@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._limits import read_file
 from realitygap.errors import StudyError
-from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, write_whole
 from realitygap.runs import Condition
 from realitygap.vision import (
     PEN_NAMES,
@@ -24,6 +25,7 @@ from realitygap.vision import (
     trials_on_sheet,
 )
 
+from ._access import LARGEST_BODY
 from ._channel import Channel, Message
 from ._proposals import Proposal, keep_proposal
 
@@ -47,12 +49,12 @@ def work(channel: Channel, order: Message) -> None:
     """
     folder = Path(order["folder"])
     channel.say("stage", text="Looking for the sheet and its pens")
-    image = read_photo(photo_bytes(Path(order["photo"]).read_bytes()))
+    image = read_photo(photo_bytes(read_file(Path(order["photo"]), LARGEST_BODY, plain=True)))
     with Ledger.open(folder / LEDGER_NAME, writable=False) as ledger:
         on_sheet = trials_on_sheet(ledger, sheet=int(order["sheet"]), role="second")
     layout = _layout(folder, on_sheet.waiting[0].condition)
     found = score_sheet(image, layout, on_sheet.pens)
-    _keep_picture(found.picture, Path(order["picture"]))
+    _keep_picture(found.picture, Path(order["picture"]), folder)
     _propose(folder, on_sheet, found, order)
     channel.say(
         "read",
@@ -73,14 +75,12 @@ def _layout(folder: Path, name: str) -> SheetLayout:
         raise StudyError(f"There is no sheet to print for this study: {error}.") from error
 
 
-def _keep_picture(picture: NDArray[np.uint8], path: Path) -> None:
+def _keep_picture(picture: NDArray[np.uint8], path: Path, folder: Path) -> None:
     from PIL import Image
 
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "JPEG", quality=QUALITY)
-    temporary = path.with_suffix(".tmp")
-    temporary.write_bytes(file.getvalue())
-    temporary.replace(path)
+    write_whole(path, file.getvalue(), within=folder)
 
 
 def _propose(folder: Path, on_sheet: SheetTrials, found: SheetScore, order: Message) -> None:

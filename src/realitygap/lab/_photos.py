@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from realitygap.errors import StudyError
+from realitygap.records import refuse_links, write_whole
 from realitygap.vision import photo_hash
 
 from ._access import LARGEST_BODY
@@ -70,9 +71,8 @@ class Photos:
         self._go_on()
 
     def photos(self) -> list[SheetPhoto]:
-        """All of them, the last one first."""
-        with self._lock:
-            return sorted(self._photos.values(), key=lambda each: each.time, reverse=True)
+        """All of them, the last one first; without the lock, which may be held while a disk is at work."""
+        return sorted([*self._photos.values()], key=lambda each: each.time, reverse=True)
 
     def of_sheet(self, sheet: int) -> SheetPhoto | None:
         """The last one of a sheet that has been read; None where there is none."""
@@ -112,8 +112,9 @@ class Photos:
             if sum(each.state in ("waiting", "reading") for each in self._photos.values()) >= MOST_WAITING:
                 raise StudyError(f"{MOST_WAITING} photographs wait to be read. Wait until one is done.")
             photo = SheetPhoto(mark, _plain(name), sheet, time.time(), said="Waits to be read")
+            refuse_links(self._folder, self._place)
             self._place.mkdir(parents=True, exist_ok=True)
-            self._file(mark).write_bytes(data)
+            write_whole(self._file(mark), data, within=self._folder)
             self._put(photo)
             self._go_on()
         return photo
@@ -146,7 +147,7 @@ class Photos:
                 with contextlib.suppress(OSError):
                     path.unlink(missing_ok=True)
         else:
-            write_json(place, asdict(photo))
+            write_json(self._folder, place, asdict(photo))
         self._changed()
 
     def _go_on(self) -> None:

@@ -75,7 +75,7 @@ def keep_proposal(folder: Path, trial: int, proposal: Proposal) -> None:
     """Keep what was proposed for a trial of the study in a folder; the same mark anew takes the place of the old."""
     before = [each for each in _of_kind(folder, trial, proposal.kind) if each.mark != proposal.mark]
     kept = [*before, proposal][-MOST:]
-    write_json(_place(folder, trial, proposal.kind), [asdict(each) for each in kept])
+    write_json(folder, _place(folder, trial, proposal.kind), [asdict(each) for each in kept])
 
 
 def read_proposals(folder: Path, trial: int) -> list[Proposal]:

@@ -142,6 +142,7 @@ class _Hand:
     def _do(self, message: Message) -> None:
         what = message.get("what")
         try:
+            self._stop(message)  # a picture takes the link for seconds, in which no stop could pass
             if what == "preflight":
                 found = preflight(self._robot)
                 self._channel.say("preflight", facts=found.facts, problems=list(found.problems))

@@ -5,12 +5,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import logging
+import os
 import secrets
 import socket
+import sys
+import tempfile
 import threading
 import traceback
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +29,10 @@ LOST_S = 20.0
 """How long a page may be out of reach, as a phone behind a wall is, before it has to be loaded anew [s]."""
 
 
+THREADS = 32
+"""That wait for disks and ledgers in place of the event loop: some may wait long, and others must still be free."""
+
+
 def open_lab(
     folder: str | Path = "results",
     *,
@@ -32,15 +40,18 @@ def open_lab(
     host: str = "127.0.0.1",
     show: bool = True,
     tell: Callable[[str], None] = print,
+    allow_code: bool = False,
 ) -> None:
     """Serve the page of the studies in a folder until Ctrl-C.
 
     Args:
         folder: Of the studies' folders; made where it is not there. Nothing outside it is read or written.
         port: 0 to 65535; 0 takes one that is free.
-        host: Address to answer at. Any but this machine's loopback needs a token, which is told with the address.
+        host: Address to answer at. Every visitor needs the token, which is printed with the address, also on this
+            machine's loopback: any account of this machine can reach it.
         show: Whether to open the page in the browser.
         tell: Takes the lines for whoever started it.
+        allow_code: Whether studies may run Python files of tasks, which are in the folder.
 
     Raises:
         StudyError: The folder cannot be made, or is the folder of one study.
@@ -51,13 +62,18 @@ def open_lab(
     port = whole_number("port", port, 0, 65535)
     root = _root(Path(folder))
     listener = _listen(host, port)
-    with contextlib.closing(listener):
-        token = None if host in LOOPBACK else secrets.token_urlsafe(16)
+    token = secrets.token_urlsafe(16)
+    with contextlib.closing(listener), contextlib.ExitStack() as while_served:
         addresses = [_address(name, listener, token) for name in _names(host)]
-        lab, server = _prepare(root, token)  # takes some seconds: what is told then answers at once
-        _tell_addresses(root, addresses, token, tell)
+        is_local = host in LOOPBACK
+        port = listener.getsockname()[1]
+        lab, server = _prepare(
+            root, token, port, is_local=is_local, allow_code=allow_code
+        )  # takes some seconds
+        _tell_addresses(root, addresses, is_local, tell)
         if show:
-            threading.Timer(0.5, _show, (addresses[0], tell)).start()
+            entry = while_served.enter_context(_entry(addresses[0], root))
+            threading.Timer(0.5, _show, (entry, tell)).start()
         try:
             server.run(sockets=[listener])
         finally:
@@ -114,19 +130,18 @@ def _names(host: str) -> list[str]:
     return [outward or socket.gethostname()]
 
 
-def _address(name: str, listener: socket.socket, token: str | None) -> str:
+def _address(name: str, listener: socket.socket, token: str) -> str:
     shown = f"[{name}]" if ":" in name else name
-    return f"{SCHEME}://{shown}:{listener.getsockname()[1]}/" + (f"?token={token}" if token else "")
+    return f"{SCHEME}://{shown}:{listener.getsockname()[1]}/?token={token}"
 
 
-def _tell_addresses(root: Path, addresses: list[str], token: str | None, tell: Callable[[str], None]) -> None:
+def _tell_addresses(root: Path, addresses: list[str], is_local: bool, tell: Callable[[str], None]) -> None:
     tell(f"The lab shows the studies in {root}. Ctrl-C ends it.")
     for address in addresses:
         tell(f"Open {address}")
-        if token is not None:
+        if not is_local:
             tell(_qr_code(address))
-    if token is not None:
-        tell("Whoever has this address can start studies and drive the robot. Give it to nobody else.")
+    tell("Whoever has this address can start studies and drive the robot. Give it to nobody else.")
 
 
 def _qr_code(text: str) -> str:
@@ -137,17 +152,18 @@ def _qr_code(text: str) -> str:
     return drawn.getvalue().rstrip("\n")
 
 
-def _prepare(root: Path, token: str | None) -> tuple[Any, Any]:
+def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: bool) -> tuple[Any, Any]:
     """The lab, and what will serve it."""
     import uvicorn
     from fastapi import FastAPI
     from nicegui import app as nicegui_app
-    from nicegui import ui
+    from nicegui import run, ui
 
     from ._lab import Lab
     from .pages import add_pages
 
-    lab = Lab(root)
+    lab = Lab(root, allow_code=allow_code)
+    run.thread_pool = ThreadPoolExecutor(THREADS)
     nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = (
         True  # pages show by themselves how far an upload is
     )
@@ -156,6 +172,7 @@ def _prepare(root: Path, token: str | None) -> tuple[Any, Any]:
     ui.run_with(
         app,
         title="realitygap lab",
+        viewport="width=device-width, initial-scale=1, interactive-widget=resizes-content",
         tailwind=False,
         show_welcome_message=False,
         language="en-US",
@@ -165,7 +182,7 @@ def _prepare(root: Path, token: str | None) -> tuple[Any, Any]:
     for name in ("nicegui", "asyncio", "uvicorn.error", "engineio.server", "socketio.server"):
         logging.getLogger(name).addFilter(_in_one_line)
     config = uvicorn.Config(
-        Access(app, token),
+        Access(app, token, port=port, is_local=is_local),
         log_level="warning",
         access_log=False,
         ws_max_size=2**20,
@@ -189,6 +206,24 @@ def _in_one_line(record: logging.LogRecord) -> bool:
         record.msg = "A page said what no page says, or this is a mistake in realitygap: %s"
         record.args, record.exc_info = (f"{shown(error)}{where}",), None
     return True
+
+
+@contextlib.contextmanager
+def _entry(address: str, root: Path) -> Iterator[str]:
+    """The address that the browser opens.
+
+    On Linux, every account can read the arguments of a program. There, the browser opens a file that only its owner can
+    read and that leads to the address. It is in the lab's folder, because browsers in a sandbox of their own (snap,
+    flatpak) see neither the system's folder for such files nor hidden ones.
+    """
+    if not sys.platform.startswith("linux"):
+        yield address
+        return
+    folder = root if os.access(root, os.W_OK) else None
+    with tempfile.NamedTemporaryFile("w", prefix="open-lab-", suffix=".html", dir=folder) as file:
+        file.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">')
+        file.flush()
+        yield Path(file.name).as_uri()
 
 
 def _show(address: str, tell: Callable[[str], None]) -> None:

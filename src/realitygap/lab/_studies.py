@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from realitygap._limits import read_file
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 from realitygap.runs import NAME_PATTERN
@@ -20,7 +21,9 @@ from realitygap.settings import shown
 
 LATELY_S = 0.8
 """How old what those who watch are told may be [s]."""
-_HOLDER = re.compile(r"process (\d+) on (.+)")
+_HOLDER = re.compile(r"process (\d{1,9}) on (.+)")
+_LONGEST_HOLDER = 1000
+"""Of what a lock says [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -138,8 +141,8 @@ class Studies:
             return StudyState(name, title=name, problem=str(error) or repr(error))
 
     def states(self) -> list[StudyState]:
-        """How far all of them are."""
-        return [self.state(name) for name in self.names()]
+        """How far all of them were a moment ago."""
+        return [self.lately(name) for name in self.names()]
 
     def lately(self, name: str) -> StudyState:
         """How far a study was a moment ago: however many watch it, its folder is looked at once."""
@@ -193,7 +196,7 @@ def _of_ledger(path: Path, conditions: list[str], replicates: int) -> tuple[int,
 def used_by(folder: Path) -> str:
     """The program that says in the folder's lock that it writes there, where it is still alive; else empty."""
     try:
-        said = (folder / ".lock").read_text("utf-8").strip()
+        said = read_file(folder / ".lock", _LONGEST_HOLDER, plain=True).decode("utf-8").strip()
     except (OSError, UnicodeDecodeError):
         return ""
     match = _HOLDER.fullmatch(said)

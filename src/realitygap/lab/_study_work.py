@@ -10,11 +10,12 @@ from typing import Any
 
 from realitygap.errors import StudyError
 from realitygap.records import ResultsFolder
-from realitygap.study import Progress, Study, parse_study, run_study
+from realitygap.study import Progress, Study, check_files, parse_study, run_study
 from realitygap.trials import Operator
 
 from ._channel import Channel, Message
 from ._described import study_of
+from ._files import refuse_code
 from ._page_operator import PageOperator, WatchedWitness
 
 _TOLD_S = 0.5
@@ -27,16 +28,18 @@ def work(channel: Channel, order: Message) -> None:
     Args:
         channel: To the server.
         order: `folder` of the results; `text` of the study file where it is new; `port` of the robot
-            and `camera` above it, where there are any.
+            and `camera` above it, where there are any; `allow_code` if Python files of tasks may run.
     """
     folder = Path(order["folder"])
     study = _study(order, folder)
+    allow_code = bool(order.get("allow_code"))
+    refuse_code(study, allow_code)
     port = order.get("port") or None
     told = _Telling(channel)
-    result = run_study(study, folder, tell=told.show, threads=order.get("threads"))
+    result = run_study(study, folder, tell=told.show, threads=order.get("threads"), allow_code=allow_code)
     if port is not None:
         with _operated(channel, order, study, folder) as operator:
-            result = run_study(study, folder, port=port, operator=operator)
+            result = run_study(study, folder, port=port, operator=operator, allow_code=allow_code)
     physical = result.physical
     channel.say("done", waiting="" if physical is None else physical.waiting)
 
@@ -44,7 +47,9 @@ def work(channel: Channel, order: Message) -> None:
 def _study(order: Message, folder: Path) -> Study:
     if order.get("text") is not None:
         return parse_study(order["text"], str(folder.parent / f"{folder.name}.toml"))
-    return study_of(ResultsFolder.open(folder).description)
+    study = study_of(ResultsFolder.open(folder).description)
+    check_files(study, folder.parent)
+    return study
 
 
 @contextlib.contextmanager

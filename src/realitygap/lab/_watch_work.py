@@ -71,7 +71,7 @@ def _grant(channel: Channel, folder: Path, wish: Message) -> None:
         elif what == "replay":
             channel.say("replay", key=wish["key"], **_replay(folder, wish))
         elif what == "report":
-            write_report(ResultsFolder.open(folder), folder / "report.html")
+            write_report(ResultsFolder.open(folder))
             channel.say("report")
     except (RealityGapError, ValueError, TypeError, OSError) as error:
         channel.say("refused", key=wish.get("key", ""), text=str(error))

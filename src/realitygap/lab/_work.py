@@ -9,11 +9,13 @@ import traceback
 from collections.abc import Callable
 from importlib import import_module
 
+from realitygap._interrupts import kept_interrupts
 from realitygap.errors import RealityGapError
 
-from ._channel import Channel, Message, keep_interrupts
+from ._channel import Channel, Message
 
 _WORK = {
+    "check": "_check_work",
     "study": "_study_work",
     "robot": "_robot_work",
     "watch": "_watch_work",
@@ -30,12 +32,12 @@ def main() -> int:
     wire = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what anything prints is no message
     signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell has it ignored
-    keep_interrupts()
     channel = Channel(sys.stdin, wire)
     try:
         order = channel.begin()
         work: Callable[[Channel, Message], None] = import_module(f"{__package__}.{_WORK[order['work']]}").work
-        work(channel, order)
+        with kept_interrupts():
+            work(channel, order)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one that comes once more is the same one
         channel.say("interrupted")

@@ -13,8 +13,10 @@ from realitygap.lab._lab import Lab, Visitor
 from realitygap.robots import DEFAULT_ROBOT
 from realitygap.world import load_arena
 
-from ._frame import framed, hint, section, text_of, told, visitor_of, watching, whole_of
+from ._frame import attempt, framed, hint, section, text_of, visitor_of, watching, whole_of
 from ._grid import CellGrid
+from ._handover import show_holder
+from ._notices import notify
 from ._part import Part
 
 _KINDS = {
@@ -116,7 +118,7 @@ class _Page:
                 self._visitor,
             )
 
-        ui.button("Calibrate", on_click=lambda: told(begin)).props("unelevated no-caps")
+        ui.button("Calibrate", on_click=lambda: attempt(begin)).props("unelevated no-caps")
 
     def _show_work(self) -> None:
         job = self._lab.calibration
@@ -132,14 +134,9 @@ class _Page:
         ui.label(f"{job.n_done} of {job.n_trials} trials" if job.n_trials else "Getting ready ...")
         may = self._may(job)
         if not may:
-            with ui.row().classes("lab-row"):
-                ui.label(f"{self._lab.operator_name} has the robot; you are watching.")
-                ui.button("Take the robot over", on_click=self._take_over).props("outline no-caps")
+            show_holder(self._lab, self._visitor)
         if not job.is_over:
             ui.button("Stop for now", on_click=job.ask_to_end).props("outline no-caps").set_enabled(may)
-
-    def _take_over(self) -> None:
-        told(lambda: self._lab.take_robot(self._visitor, over=True))
 
     def _show_plot(self) -> None:
         """What each sensor read on average, against the distance of the wall or the number of the trial."""
@@ -161,7 +158,7 @@ def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
 
     def answer(**values: Any) -> None:
         if not job.answer(ask["number"], **values):
-            ui.notify("That has been answered already.")
+            notify("That has been answered already.")
 
     with ui.card().classes("lab-card lab-question").props('role="status"'):
         if ask["question"] == "place":

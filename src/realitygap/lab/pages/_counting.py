@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from nicegui import ui
+from nicegui import run, ui
 
 from realitygap.errors import LedgerError
-from realitygap.lab._counts import CountedTrial, Counts
-from realitygap.lab._drawn import Draft, read_drawn
+from realitygap.lab._counts import CountCard, CountedTrial, Counts
+from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
+from realitygap.lab._photos import Photos
 from realitygap.lab._proposals import Proposal
 from realitygap.records import ScoreRole
 
-from ._frame import hint, section, text_of, told
+from ._frame import attempt, hint, section, text_of
 from ._grid import CellGrid, ink_of
+from ._notices import notify
 
 _ROLES: dict[ScoreRole, str] = {
     "score": "The count that selection uses.",
@@ -33,19 +35,22 @@ class Counting:
     Args:
         lab: Whose page it is.
         counts: The trials of the study.
+        photos: Those of its sheets.
         who: The name of who counts.
     """
 
-    def __init__(self, lab: Lab, counts: Counts, who: Callable[[], str]) -> None:
+    def __init__(self, lab: Lab, counts: Counts, photos: Photos, who: Callable[[], str]) -> None:
         self._lab = lab
         self._counts = counts
+        self._photos = photos
         self._who = who
         self._chosen: int | None = None
         self._corrects = False
         self._draft = Draft([])
         self._shown: Any = None
+        self._loaded: tuple[Any, CountCard] | None = None  # what is shown, and what was read of it
 
-    def show(self) -> None:
+    async def show(self) -> None:
         """Show it."""
         section("Counting")
         self._lists = ui.refreshable(self._show_lists)
@@ -53,20 +58,22 @@ class Counting:
         self._lists()
         self._shown = self._chosen_now()
         self._n_seen = self._seen()
+        await self._load()
         self._card()
 
-    def refresh(self) -> None:
+    async def refresh(self) -> None:
         """Show it anew; the grid only where another trial is to be counted, or in another way."""
         self._lists.refresh()
         now, seen = self._chosen_now(), self._seen()
         if (now, seen) != (self._shown, self._n_seen):
             self._shown, self._n_seen = now, seen
+            await self._load()
             self._card.refresh()
 
-    def choose(self, number: int | None, *, corrects: bool = False) -> None:
+    async def choose(self, number: int | None, *, corrects: bool = False) -> None:
         """Count this trial."""
         self._chosen, self._corrects = number, corrects
-        self.refresh()
+        await self.refresh()
 
     # inside
 
@@ -80,10 +87,18 @@ class Counting:
             chosen, role = next((each for each in listed if each.trial.state == "driven"), None), "score"
         return None if chosen is None else (chosen.number, role, who)
 
-    def look(self) -> None:
+    async def look(self) -> None:
         """Show the trial anew where something has been proposed for it."""
         if self._seen() != self._n_seen:
-            self.refresh()
+            await self.refresh()
+
+    async def _load(self) -> None:
+        """Read what is shown of the trial."""
+        shown = self._shown
+        if shown is not None:
+            number, role, who = shown
+            card = await run.io_bound(self._counts.card, number, who, role)
+            self._loaded = None if card is None else (shown, card)
 
     def _seen(self) -> tuple[str, ...]:
         """What is proposed for the trial that is being counted."""
@@ -106,9 +121,9 @@ class Counting:
     def _show_card(self) -> None:
         if self._shown is None:
             ui.label("No line waits to be counted.")
-            return
-        number, role, who = self._shown
-        self._show_trial(self._counts.trial(number), role, who)
+        elif self._loaded is not None and self._loaded[0] == self._shown:
+            number, role, who = self._shown
+            self._show_trial(self._counts.trial(number), role, who, self._loaded[1])
 
     def _role(self, chosen: CountedTrial | None, who: str) -> ScoreRole | None:
         if chosen is None:
@@ -141,11 +156,11 @@ class Counting:
                         f'flat dense no-caps aria-label="Take back the count of trial {each.number}"'
                     )
 
-    def _undo(self, number: int) -> None:
-        if told(lambda: self._counts.undo(number)):
-            ui.notify(f"The count of trial {number} is taken back; enter it anew.")
+    async def _undo(self, number: int) -> None:
+        if await attempt(lambda: self._counts.undo(number)):
+            notify(f"The count of trial {number} is taken back; enter it anew.")
         self._lab.changed()
-        self.choose(number)
+        await self.choose(number)
 
     def _corrections(self, listed: list[CountedTrial]) -> None:
         closed = {each.number: f"Trial {each.number}, {each.pen}" for each in listed if each.trial.is_closed}
@@ -161,11 +176,8 @@ class Counting:
                 on_change=lambda event: self.choose(event.value, corrects=True),
             ).classes("lab-wide").props("outlined dense")
 
-    def _show_trial(self, each: CountedTrial, role: ScoreRole, who: str) -> None:
-        folder = self._lab.studies.path(self._counts.name)
-        self._draft = self._counts.draft(each.number, who, role)
-        arena = self._counts.arena(each.trial.condition)
-        proposals = self._counts.proposals(each.number)
+    def _show_trial(self, each: CountedTrial, role: ScoreRole, who: str, loaded: CountCard) -> None:
+        self._draft, arena, proposals = loaded.draft, loaded.arena, loaded.proposals
         chosen = next((one for one in proposals if one.mark == self._draft.proposal), None)
         with ui.card().classes("lab-card").props(f'data-counting="{each.number}"'):
             with ui.row().classes("lab-row"):
@@ -187,7 +199,7 @@ class Counting:
             grid = CellGrid(
                 arena,
                 cells=self._draft.cells,
-                line=[] if chosen else read_drawn(folder, each.number),
+                line=[] if chosen else loaded.line,
                 pieces=chosen.lines if chosen else (),
                 sure=chosen.sure if chosen else (),
                 picture=self._picture(chosen),
@@ -201,10 +213,11 @@ class Counting:
                     "unelevated no-caps"
                 )
 
-                def clear() -> None:
+                async def clear() -> None:
                     put(Draft([]))
                     grid.put([])
                     if chosen:
+                        await self._load()
                         self._card.refresh()
 
                 ui.button("Clear", on_click=clear).props("flat no-caps")
@@ -228,13 +241,14 @@ class Counting:
         if proposal.said:
             ui.label(proposal.said).classes("lab-problem")
 
-    def _take(self, each: CountedTrial, role: ScoreRole, proposal: Proposal) -> None:
+    async def _take(self, each: CountedTrial, role: ScoreRole, proposal: Proposal) -> None:
         self._counts.keep(each.number, self._who(), role, Draft(proposal.cells, proposal.mark))
+        await self._load()
         self._card.refresh()
 
     def _picture(self, proposal: Proposal | None) -> tuple[str, list[float]] | None:
         """The sheet below the cells, where they are of a photograph."""
-        photo = None if proposal is None else self._lab.photos(self._counts.name).photo(proposal.mark)
+        photo = None if proposal is None else self._photos.photo(proposal.mark)
         if photo is None or photo.state != "read":
             return None
         return f"/photos/{self._counts.name}/{photo.mark}.jpg", photo.box
@@ -242,33 +256,32 @@ class Counting:
     def _said(self, n_cells: int) -> str:
         return f"{len(self._draft.cells)} of {n_cells} cells"
 
-    def _enter(self, each: CountedTrial, role: ScoreRole) -> None:
+    async def _enter(self, each: CountedTrial, role: ScoreRole) -> None:
         def enter() -> None:
+            self._counts.look()
             if self._counts.trial(each.number).trial.state != each.trial.state:
                 raise LedgerError(f"Somebody else has just changed trial {each.number}. Look again.")
             self._counts.score(each.number, self._draft, self._who(), role)
 
-        if told(enter):
-            ui.notify(
-                f"Trial {each.number}: {len(self._draft.cells)} cells are in the ledger.", type="positive"
-            )
+        if await attempt(enter):
+            notify(f"Trial {each.number}: {len(self._draft.cells)} cells are in the ledger.", type="positive")
             self._chosen, self._corrects = None, False
         self._lab.changed()
-        self.refresh()
+        await self.refresh()
 
     def _more(self, each: CountedTrial) -> None:
         """A note, and the ways to say that it does not count."""
         with ui.expansion("Note, or void").classes("lab-expansion"):
             text = ui.input("What is to be said of this trial").props("outlined dense").classes("lab-wide")
 
-            def note() -> None:
-                if told(lambda: self._counts.note(each.number, text_of(text), self._who())):
-                    ui.notify("Noted.")
+            async def note() -> None:
+                if await attempt(lambda: self._counts.note(each.number, text_of(text), self._who())):
+                    notify("Noted.")
                     self._lab.changed()
 
-            def void() -> None:
-                if told(lambda: self._counts.void(each.number, text_of(text))):
-                    ui.notify(f"Trial {each.number} is void; it will be driven again.")
+            async def void() -> None:
+                if await attempt(lambda: self._counts.void(each.number, text_of(text))):
+                    notify(f"Trial {each.number} is void; it will be driven again.")
                     self._lab.changed()
 
             with ui.row().classes("lab-row"):

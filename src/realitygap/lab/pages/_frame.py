@@ -6,10 +6,11 @@ import contextlib
 import json
 import math
 from collections.abc import Callable, Iterator
+from inspect import isawaitable
 from typing import Any
 from urllib.parse import unquote
 
-from nicegui import events, ui
+from nicegui import run, ui
 from starlette.requests import Request
 
 from realitygap.errors import RealityGapError
@@ -17,9 +18,14 @@ from realitygap.lab._access import VISITOR
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.settings import shown
 
+from ._notices import notify
+from ._stop import Stop
+
 WHO = "realitygap_who"
 """The cookie with the name of who counts."""
 LONGEST_NAME = 60
+WRONG = (RealityGapError, ValueError, TypeError, OSError)
+"""What people can mend."""
 LOOK_S = 0.25
 """How often a page looks whether something has changed [s]."""
 
@@ -35,11 +41,14 @@ def framed(lab: Lab, title: str, here: str) -> Iterator[None]:
         title: Of the page.
         here: Its path, as the way to the others has it.
     """
+    from ._handover import show_request  # which uses what is below
+
     ui.on_exception(_said_wrong)
     ui.page_title(f"{title} – realitygap lab")
     for sheet in ("lab-files/lab.css", "lab-player/player.css"):
         ui.add_head_html(f'<link rel="stylesheet" href="/{sheet}">')
     ui.add_head_html('<script>document.documentElement.lang = "en-US"</script>')
+    ui.add_head_html('<script src="/lab-files/frame.js"></script>')
     ui.colors(
         primary="#1f5c99", negative="#b3161b", positive="#1e6b34", secondary="#4a5560", accent="#6a3d9a"
     )
@@ -50,51 +59,35 @@ def framed(lab: Lab, title: str, here: str) -> Iterator[None]:
                 link.props('aria-current="page"')
     with ui.column().classes("lab-main"):
         ui.label(title).props('role="heading" aria-level="1"').classes("lab-title")
+        asked = ui.element("div")
         yield
+    # After the content: once a page has a timer, it is sent as far as it is done.
+    with asked:
+        show_request(lab, visitor_of(ui.context.client.request))
     with ui.footer(elevated=False).classes("lab-footer"):
-        button = (
-            ui.button("Stop the robot", on_click=lambda: _stop(lab), color=None)
-            .classes("lab-stop")
-            .props('unelevated no-caps aria-keyshortcuts="Escape"')
-        )
-        _as_needed(lab, button)
-        watching(lab, lambda: _as_needed(lab, button))
-    ui.keyboard(on_key=lambda event: _pressed(lab, event), repeating=False)
-
-
-def _as_needed(lab: Lab, button: ui.button) -> None:
-    """Red while there is a robot to stop."""
-    button.classes(add="lab-stop-ready") if lab.has_robot else button.classes(remove="lab-stop-ready")
-
-
-def _stop(lab: Lab) -> None:
-    if lab.stop_robot():
-        ui.notify("The robot was told to stop.", type="warning")
-    else:
-        ui.notify("No robot is in use here.")
-
-
-def _pressed(lab: Lab, event: events.KeyEventArguments) -> None:
-    if event.action.keydown and event.key.escape and lab.stop_robot():
-        ui.notify("The robot was told to stop.", type="warning")
+        stop = Stop(lab)
+        stop.show()
+        watching(lab, stop.look)
 
 
 def _said_wrong(error: Exception) -> None:
-    ui.notify(
+    notify(
         f"This is a mistake in realitygap, and nothing that was written is lost: {shown(error)}.",
         type="negative",
     )
 
 
 def watching(lab: Lab, show: Callable[[], Any]) -> None:
-    """Show something anew whenever the lab has changed."""
+    """Show something anew whenever the lab has changed; `show` may be a coroutine."""
     seen = lab.version
 
-    def look() -> None:
+    async def look() -> None:
         nonlocal seen
         if lab.version != seen:
             seen = lab.version
-            show()
+            shown = show()
+            if isawaitable(shown):
+                await shown
 
     ui.timer(LOOK_S, look)
 
@@ -132,13 +125,29 @@ def whole_of(field: Any) -> int | None:
 
 
 def told(act: Callable[[], Any]) -> bool:
-    """Do something; what is wrong with it is shown. Whether it was done."""
+    """Do something that waits for nothing; what is wrong with it is shown. Whether it was done."""
     try:
         act()
-    except (RealityGapError, ValueError, TypeError, OSError) as error:
-        ui.notify(str(error), type="negative", multi_line=True, timeout=8000, close_button="Close")
+    except WRONG as error:
+        show_error(error)
         return False
     return True
+
+
+async def attempt(act: Callable[[], Any]) -> bool:
+    """Do something in a thread, because it may wait for a disk; show what is wrong with it. Whether it was done."""
+    try:
+        await run.io_bound(act)
+    except WRONG as error:
+        show_error(error)
+        return False
+    return True
+
+
+def show_error(error: Exception) -> None:
+    """Show what is wrong."""
+    close = {"label": "Close", "color": "white", "noCaps": True}
+    notify(str(error), type="negative", multi_line=True, timeout=8000, actions=[close])
 
 
 def visitor_of(request: Request) -> Visitor:

@@ -7,10 +7,11 @@ from typing import Any
 from nicegui import app, ui
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
+from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._gap_job import GapJob
 from realitygap.lab._lab import Lab
 
-from ._frame import framed, hint, number_of, section, text_of, told, watching, whole_of
+from ._frame import attempt, framed, hint, number_of, section, text_of, watching, whole_of
 
 _QUESTIONS = {
     "effect": "to find a mean difference of (coverage)",
@@ -32,7 +33,8 @@ def add_gap(lab: Lab) -> None:
         path = lab.gap_page(name)
         if path is None or not path.is_file() or path.is_symlink():
             return PlainTextResponse("There is no such report.", 404)
-        return FileResponse(path, media_type="text/html", headers={"cache-control": "no-store"})
+        headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
+        return FileResponse(path, media_type="text/html", headers=headers)
 
 
 class _Page:
@@ -90,7 +92,7 @@ class _Page:
                 values["witness"] = text_of(witness)
             self._lab.measure_gap(text_of(name), values)
 
-        ui.button("Measure the gap", on_click=lambda: told(begin)).props("unelevated no-caps")
+        ui.button("Measure the gap", on_click=lambda: attempt(begin)).props("unelevated no-caps")
 
     def _show_work(self) -> None:
         job = self._lab.gap
@@ -126,7 +128,7 @@ class _Page:
             value.props("outlined dense").classes("lab-number")
         ui.button(
             "Plan",
-            on_click=lambda: told(
+            on_click=lambda: attempt(
                 lambda: self._lab.plan_gap(question.value or "effect", number_of(value) or 0.0)
             ),
         ).props("outline no-caps")

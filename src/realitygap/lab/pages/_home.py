@@ -8,10 +8,13 @@ from realitygap.lab._lab import Lab
 from realitygap.lab._studies import StudyState
 from realitygap.lab._study_job import StudyJob
 
-from ._frame import framed, hint, told, watching
+from ._frame import attempt, framed, hint, watching
 
 DISK_S = 2.0
 """How often the studies' folders are looked at [s]: other programs may work in them."""
+
+MOST_CARDS = 30
+"""Studies that are shown at first, the last ones changed: each costs a page time."""
 
 
 def add_home(lab: Lab) -> None:
@@ -20,6 +23,7 @@ def add_home(lab: Lab) -> None:
     @ui.page("/", response_timeout=30)
     async def home() -> None:
         states = list(await run.io_bound(lab.studies.states) or ())
+        n_shown = MOST_CARDS
         with framed(lab, "Studies", "/"):
             hint(f"In the folder {lab.root.name}.").tooltip(str(lab.root))
             ui.button("Start a new study", on_click=lambda: ui.navigate.to("/new")).props(
@@ -30,8 +34,17 @@ def add_home(lab: Lab) -> None:
             def cards() -> None:
                 if not states:
                     ui.label("No study is here yet.")
-                for state in states:
+                for state in states[:n_shown]:
                     _card(lab, state)
+                if len(states) > n_shown:
+                    ui.button(f"Show {len(states) - n_shown:,} more", on_click=show_more).props(
+                        "outline no-caps"
+                    )
+
+            def show_more() -> None:
+                nonlocal n_shown
+                n_shown += MOST_CARDS
+                cards.refresh()
 
             with ui.column().classes("lab-cards").props('aria-live="polite"'):
                 cards()
@@ -110,6 +123,6 @@ def _buttons(lab: Lab, state: StudyState, job: StudyJob | None) -> None:
                 "unelevated no-caps"
             )
         if (job is None or job.is_over) and state.n_done < state.n_runs and not state.used_by:
-            ui.button("Go on", on_click=lambda: told(lambda: lab.go_on(state.name))).props(
+            ui.button("Go on", on_click=lambda: attempt(lambda: lab.go_on(state.name))).props(
                 "unelevated no-caps"
             )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from importlib import resources
-from typing import Any
+from typing import Any, Literal
 
-from nicegui import events, ui
+from nicegui import events, run, ui
 
+from realitygap.errors import StudyError
+from realitygap.lab._checks import Check
 from realitygap.lab._files import LONGEST_TEXT
 from realitygap.lab._form import (
     TITLES,
@@ -17,10 +20,11 @@ from realitygap.lab._form import (
     read_form,
     written_form,
 )
-from realitygap.lab._lab import Lab, check_study
+from realitygap.lab._lab import Lab
 from realitygap.study import named_studies
 
-from ._frame import framed, hint, section, text_of, told
+from ._frame import attempt, framed, hint, section, text_of, told
+from ._notices import notify
 
 BEGINNING = """[study]
 name = "my-study"
@@ -36,6 +40,10 @@ name = "novelty-10"
 selection = "novelty"
 noise = 0.1
 """
+
+
+MOST_SHOWN = 50
+"""Conditions in the form."""
 
 
 class _Draft:
@@ -65,7 +73,8 @@ def add_new(lab: Lab) -> None:
     """Add the page."""
 
     @ui.page("/new", response_timeout=30)
-    def new() -> None:
+    async def new() -> None:
+        await run.io_bound(lab.checks.prepare)
         draft = _Draft()
         with framed(lab, "New study", "/new"):
             _Page(lab, draft).show()
@@ -75,6 +84,7 @@ class _Page:
     def __init__(self, lab: Lab, draft: _Draft) -> None:
         self._lab = lab
         self._draft = draft
+        self._check: Check | None = None
 
     def show(self) -> None:
         hint(
@@ -106,20 +116,25 @@ class _Page:
                 )
         self._is_text = False
         self._said = ui.label("").classes("lab-problem lab-lines").props('role="status"')
+        with ui.row().classes("lab-row") as self._waiting:
+            ui.spinner()
+            ui.label("Reading the study file ...").props('role="status"')
+            ui.button("Cancel", on_click=self._cancel).props("flat no-caps")
+        self._waiting.set_visibility(False)
         with ui.row().classes("lab-row"):
-            ui.button("Check", on_click=self._check).props("outline no-caps")
+            ui.button("Check", on_click=self._checked).props("outline no-caps")
             ui.button("Start the study", on_click=self._start).props("unelevated no-caps")
 
     # where it comes from
 
-    def _begin_with(self, event: events.ValueChangeEventArguments[Any]) -> None:
+    async def _begin_with(self, event: events.ValueChangeEventArguments[Any]) -> None:
         if event.value not in named_studies():
             return
         text = (resources.files("realitygap.study") / "studies" / f"{event.value}.toml").read_text("utf-8")
-        self._take(text)
+        await self._take(text)
 
     def _rejected(self) -> None:
-        ui.notify(
+        notify(
             f"This is no study file: expected one that ends in .toml, of at most {LONGEST_TEXT:,} bytes.",
             type="negative",
         )
@@ -129,27 +144,27 @@ class _Page:
         try:
             text = data[: LONGEST_TEXT + 1].decode("utf-8")
         except UnicodeDecodeError:
-            ui.notify("This is not a text file in UTF-8. Expected a study file (.toml).", type="negative")
+            notify("This is not a text file in UTF-8. Expected a study file (.toml).", type="negative")
             return
-        self._take(text)
+        await self._take(text)
 
-    def _take(self, text: str) -> None:
+    async def _take(self, text: str) -> None:
         """Put the text of a file into the form; where it has mistakes it is shown as it is."""
         self._text.value = text
-        told(lambda: self._read(text))
-
-    def _read(self, text: str) -> None:
-        self._draft.data = read_form(text)
+        found = await self._ask("read", text)
+        if "data" not in found:
+            self._said.text = found["mistakes"]
+            return
+        self._draft.data = found["data"]
         self._form.refresh()
-        self._said.text = ""
 
-    def _turned(self, event: events.ValueChangeEventArguments[Any]) -> None:
+    async def _turned(self, event: events.ValueChangeEventArguments[Any]) -> None:
         """Between form and file: each shows what the other has."""
         self._is_text = event.value == "File"
         if self._is_text:
             self._text.value = written_form(self._draft.data)
         else:
-            told(lambda: self._read(text_of(self._text)))
+            await self._take(text_of(self._text))
 
     # the form
 
@@ -170,9 +185,13 @@ class _Page:
         listed = self._draft.data.setdefault("condition", [])
         if not isinstance(listed, list):
             return
-        for number, condition in enumerate(listed):
+        for number, condition in enumerate(listed[:MOST_SHOWN]):
             if isinstance(condition, dict):
                 self._show_condition(number, condition)
+        if len(listed) > MOST_SHOWN:
+            hint(
+                f"The first {MOST_SHOWN} of {len(listed):,} conditions are shown. Change the others in the file."
+            )
         ui.button("Add a condition", on_click=self._add_condition).props("outline no-caps")
 
     def _show_condition(self, number: int, condition: dict[str, Any]) -> None:
@@ -203,15 +222,38 @@ class _Page:
     def _whole(self) -> str:
         return text_of(self._text) if self._is_text else written_form(self._draft.data)
 
-    def _check(self) -> None:
-        mistakes = check_study(self._lab.root, self._whole())
-        self._said.text = mistakes or "It can be started."
+    async def _ask(self, do: Literal["read", "check"], text: str) -> dict[str, Any]:
+        """Have another process read or check the text, until it is done or canceled."""
+        if self._check is not None:
+            self._check.end()
+        try:
+            check = self._check = await run.io_bound(self._lab.checks.begin, do, text)
+        except StudyError as error:
+            return {"mistakes": str(error)}
+        if check is None:
+            return {"mistakes": "The lab is closing."}
+        self._said.text = ""
+        self._waiting.set_visibility(True)
+        try:
+            return await asyncio.wrap_future(check.found)
+        finally:
+            if self._check is check:
+                self._check = None
+                self._waiting.set_visibility(False)
 
-    def _start(self) -> None:
+    def _cancel(self) -> None:
+        if self._check is not None:
+            self._check.end()
+
+    async def _checked(self) -> None:
+        found = await self._ask("check", self._whole())
+        self._said.text = found.get("mistakes") or "It can be started."
+
+    async def _start(self) -> None:
         text = self._whole()
-        mistakes = check_study(self._lab.root, text)
-        self._said.text = mistakes
-        if not mistakes and told(lambda: self._lab.start_new(text)):
+        found = await self._ask("check", text)
+        self._said.text = found.get("mistakes", "")
+        if "name" in found and await attempt(lambda: self._lab.start_new(found["name"], text)):
             ui.navigate.to("/")
 
 

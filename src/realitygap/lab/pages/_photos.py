@@ -11,13 +11,14 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.errors import RealityGapError
-from realitygap.lab._access import LARGEST_BODY
+from realitygap.lab._access import FOREIGN_HEADERS, LARGEST_BODY
 from realitygap.lab._counts import CountedTrial, Counts
 from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
-from realitygap.lab._photos import SheetPhoto
+from realitygap.lab._photos import Photos, SheetPhoto
 
-from ._frame import hint, told
+from ._frame import attempt, hint
+from ._notices import notify
 
 
 class PhotoInput(Element, component="photo_input.js"):
@@ -35,9 +36,10 @@ def add_photos(lab: Lab) -> None:
     async def take(name: str, request: Request) -> Response:
         try:
             sheet = int(request.query_params.get("sheet", ""))
-            photos = lab.photos(name)
+            photos = await run.io_bound(lab.photos, name)
             data = await _body(request)
-            await run.io_bound(photos.add, data, request.query_params.get("name", ""), sheet)
+            if photos is not None:
+                await run.io_bound(photos.add, data, request.query_params.get("name", ""), sheet)
         except ValueError:
             return PlainTextResponse("Which sheet does the photo show? Expected its number.", 400)
         except RealityGapError as error:
@@ -52,7 +54,8 @@ def add_photos(lab: Lab) -> None:
             return PlainTextResponse(str(error), 404)
         if path is None or not path.is_file():
             return PlainTextResponse("There is no such picture.", 404)
-        return FileResponse(path, media_type="image/jpeg", headers={"cache-control": "no-cache"})
+        headers = {**FOREIGN_HEADERS, "cache-control": "no-cache"}
+        return FileResponse(path, media_type="image/jpeg", headers=headers)
 
 
 async def _body(request: Request) -> bytes:
@@ -75,20 +78,40 @@ class SheetPhotos:
     Args:
         lab: Whose page it is.
         counts: The trials of the study.
+        photos: Those of its sheets.
         who: The name of who counts.
         jump: Shows a trial to be counted.
     """
 
-    def __init__(self, lab: Lab, counts: Counts, who: Callable[[], str], jump: Callable[[int], Any]) -> None:
-        self._lab, self._counts, self._who, self._jump = lab, counts, who, jump
-        self._photos = lab.photos(counts.name)
+    def __init__(
+        self,
+        lab: Lab,
+        counts: Counts,
+        photos: Photos,
+        who: Callable[[], str],
+        jump: Callable[[int], Any],
+    ) -> None:
+        self._lab, self._counts, self._photos, self._who, self._jump = lab, counts, photos, who, jump
         self._sheet: int | None = None
+        self._drafts: dict[int, Draft] = {}
 
     def stand(self) -> Any:
         """Changes when something else is to be shown."""
         sheets = tuple(self.sheets())
         states = tuple((each.mark, each.state, each.said) for each in self._photos.photos())
-        return sheets, states, tuple(each.trial.state for each in self._counts.trials())
+        trials = self._counts.trials()
+        proposed = tuple(each.mark for trial in trials for each in self._counts.proposals(trial.number))
+        return sheets, states, proposed, tuple(each.trial.state for each in trials)
+
+    async def load(self) -> None:
+        """Read what was tapped so far of the trials that wait."""
+        waiting = [each.number for each in self._counts.trials() if each.trial.state == "driven"]
+        who = self._who()
+
+        def read() -> dict[int, Draft]:
+            return {number: self._counts.draft(number, who, "score") for number in waiting}
+
+        self._drafts = await run.io_bound(read) or {}
 
     def sheets(self) -> list[int]:
         """Those with lines that may be counted, once or twice."""
@@ -143,9 +166,9 @@ class SheetPhotos:
                 ui.label(f"{photo.said} ... You may leave this page; it goes on.").props('role="status"')
             elif photo.state == "refused":
                 ui.label(photo.said).classes("lab-problem").props('role="alert"')
-                ui.button("Leave it out", on_click=lambda: self._photos.forget(photo.mark)).props(
-                    "outline no-caps"
-                )
+                ui.button(
+                    "Leave it out", on_click=lambda: attempt(lambda: self._photos.forget(photo.mark))
+                ).props("outline no-caps")
             else:
                 self._show_read(photo)
 
@@ -179,12 +202,13 @@ class SheetPhotos:
 
     def _draft(self, each: CountedTrial, photo: SheetPhoto) -> Draft | None:
         """What is entered together with the others: what began from this photo, and was perhaps corrected."""
-        draft = self._counts.draft(each.number, self._who(), "score")
-        return draft if draft.cells and draft.proposal == photo.mark else None
+        draft = self._drafts.get(each.number)
+        return draft if draft is not None and draft.cells and draft.proposal == photo.mark else None
 
-    def _enter(self, photo: SheetPhoto) -> None:
+    async def _enter(self, photo: SheetPhoto) -> None:
+        await self.load()
         found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
         drafts = {number: draft for number, draft in found.items() if draft is not None}
-        if told(lambda: self._counts.score_all(drafts, self._who())):
-            ui.notify(f"{len(drafts)} trials are in the ledger.", type="positive")
+        if await attempt(lambda: self._counts.score_all(drafts, self._who())):
+            notify(f"{len(drafts)} trials are in the ledger.", type="positive")
         self._lab.changed()

@@ -13,6 +13,7 @@ from realitygap.trials import start_words
 
 from ._frame import hint
 from ._grid import CellGrid, ink_of
+from ._notices import notify
 
 
 def show_question(
@@ -57,7 +58,7 @@ class _Asked:
     def answer(self, **values: Any) -> None:
         """Answer it."""
         if not self.job.answer(self.ask["number"], **values):
-            ui.notify("That has been answered already.")
+            notify("That has been answered already.")
 
     def button(self, text: str, *, is_main: bool = True, **values: Any) -> None:
         """One that answers."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from nicegui import events, ui
+from nicegui import events, run, ui
 from nicegui.element import Element
 from starlette.requests import Request
 
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.robots.scribbler import find_ports
+from realitygap.robots.scribbler import PortGuess, find_ports
 
-from ._frame import framed, hint, section, text_of, told, visitor_of, watching
+from ._frame import attempt, framed, hint, section, text_of, visitor_of, watching
 from ._grid import CellGrid
+from ._handover import show_holder
 
 LIVE_S = 0.05
 """Between two looks at the senses: 20 a second."""
@@ -38,15 +39,17 @@ def add_robot(lab: Lab) -> None:
     """Add the page."""
 
     @ui.page("/robot", response_timeout=30)
-    def robot(request: Request) -> None:
+    async def robot(request: Request) -> None:
+        ports = await run.io_bound(find_ports)
         with framed(lab, "Robot", "/robot"):
-            _Page(lab, visitor_of(request)).show()
+            _Page(lab, visitor_of(request), ports or []).show()
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor) -> None:
+    def __init__(self, lab: Lab, visitor: Visitor, ports: list[PortGuess]) -> None:
         self._lab = lab
         self._visitor = visitor
+        self._ports = ports
         self._n_shown = -1
         self._n_points = 0
         self._pad: DrivePad | None = None
@@ -74,7 +77,7 @@ class _Page:
             )
         return shown, self._lab.operator, self._lab.robot_job
 
-    def _look(self) -> None:
+    async def _look(self) -> None:
         now = self._stand()
         if now == self._seen:
             return
@@ -82,6 +85,7 @@ class _Page:
         if self._is_same_robot(before, now):
             self._facts.refresh()
         else:
+            self._ports = await run.io_bound(find_ports) or []
             self._part.refresh()
 
     def _is_same_robot(self, before: Any, now: Any) -> bool:
@@ -110,7 +114,7 @@ class _Page:
         self._show_robot(hand)
 
     def _show_connecting(self) -> None:
-        found = find_ports()
+        found = self._ports
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         port = (
             ui.input(
@@ -130,17 +134,13 @@ class _Page:
         def connect() -> None:
             self._lab.connect(text_of(port), text_of(witness), self._visitor)
 
-        ui.button("Connect", on_click=lambda: told(connect)).props("unelevated no-caps")
+        ui.button("Connect", on_click=lambda: attempt(connect)).props("unelevated no-caps")
 
     def _show_robot(self, hand: Hand) -> None:
         may = self._lab.may_operate(self._visitor)
         ui.label(f"{hand.label} at {hand.port}").classes("lab-section").props('role="status"')
         if not may:
-            ui.label(f"{self._lab.operator_name} has the robot; you are watching.")
-            ui.button(
-                "Take the robot over",
-                on_click=lambda: told(lambda: self._lab.take_robot(self._visitor, over=True)),
-            ).props("outline no-caps")
+            show_holder(self._lab, self._visitor)
         with ui.element("div").classes("lab-two"):
             with ui.column().classes("lab-cards"):
                 section("Drive")

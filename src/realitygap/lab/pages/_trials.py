@@ -5,19 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from nicegui import ui
+from nicegui import run, ui
 from starlette.requests import Request
 
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._photos import Photos
 from realitygap.lab._study_job import StudyJob
 from realitygap.report import measure_agreement
-from realitygap.robots.scribbler import find_ports
+from realitygap.robots.scribbler import PortGuess, find_ports
 
 from ._counting import Counting
 from ._driving import Driving
-from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, told, visitor_of, watching
+from ._frame import (
+    LONGEST_NAME,
+    WRONG,
+    attempt,
+    framed,
+    hint,
+    remember_who,
+    section,
+    text_of,
+    visitor_of,
+    watching,
+)
+from ._handover import show_holder
+from ._notices import notify
 from ._part import Part
 from ._photos import SheetPhotos
 from ._questions import show_question
@@ -38,28 +52,38 @@ def add_trials(lab: Lab) -> None:
     """Add the page."""
 
     @ui.page("/trials/{name}", response_timeout=30)
-    def trials(name: str, request: Request) -> None:
-        try:
+    async def trials(name: str, request: Request) -> None:
+        def open_study() -> tuple[Counts, Photos]:
             counts = lab.counts(name)
+            counts.look()
+            return counts, lab.photos(name)
+
+        try:
+            found = await run.io_bound(open_study)
         except RealityGapError as error:
             with framed(lab, "Trials", ""):
                 ui.label(str(error)).classes("lab-problem")
             return
-        with framed(lab, f"Trials of {name}", ""):
-            _Page(lab, name, counts, visitor_of(request)).show()
+        if found is not None:
+            with framed(lab, f"Trials of {name}", ""):
+                await _Page(lab, name, *found, visitor_of(request)).show()
 
 
 class _Page:
-    def __init__(self, lab: Lab, name: str, counts: Counts, visitor: Visitor) -> None:
+    def __init__(self, lab: Lab, name: str, counts: Counts, photos: Photos, visitor: Visitor) -> None:
         self._lab = lab
         self._name = name
         self._counts = counts
         self._visitor = visitor
-        self._counting = Counting(lab, counts, lambda: self._visitor.who)
+        self._counting = Counting(lab, counts, photos, lambda: self._visitor.who)
         self._videos = Videos(lab, counts, self._look_at)
-        self._sheets = SheetPhotos(lab, counts, lambda: self._visitor.who, self._look_at)
+        self._sheets = SheetPhotos(lab, counts, photos, lambda: self._visitor.who, self._look_at)
+        self._is_looking = False
+        self._can_begin: _Beginning | None = None
+        self._agreement = ""
 
-    def show(self) -> None:
+    async def show(self) -> None:
+        await self._load()
         ui.input(
             "Your name",
             value=self._visitor.who,
@@ -68,6 +92,7 @@ class _Page:
         hint(
             "It stands in the ledger with whatever you enter. Two people who count the same trials have two names."
         )
+        self._seen: Any = None
         self._robot = Part(self._robot_stand, self._show_robot)
         self._asked = Part(self._asked_stand, self._show_asked)
         self._ending = Part(self._may_end, self._show_ending)
@@ -87,7 +112,7 @@ class _Page:
         with ui.element("section").props('aria-label="Video"'):
             self._filmed()
         with ui.element("section").props('aria-label="Counting"').classes("lab-part"):
-            self._counting.show()
+            await self._counting.show()
         self._table = ui.refreshable(self._show_table)
         with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
             self._table()
@@ -95,15 +120,39 @@ class _Page:
         watching(self._lab, self._look)
         ui.timer(1.0, self._look)  # another program may write to the ledger
 
-    def _look(self) -> None:
+    async def _load(self) -> None:
+        """Read what the disk has for this page."""
+        await run.io_bound(self._counts.look)
+        await self._sheets.load()
+        await self._videos.load()
+        if self._job() is None:
+            self._can_begin = await run.io_bound(self._beginning)
+        if any(each.second for each in self._counts.trials()):
+            self._agreement = await run.io_bound(self._agree) or ""
+
+    async def _look(self) -> None:
         """Show anew what has changed; what somebody is tapping stays as it is."""
+        if self._is_looking:  # the disk takes its time
+            return
+        self._is_looking = True
+        try:
+            await run.io_bound(self._counts.look)
+            stand = self._robot_stand(), self._sheets.stand(), self._videos.stand(), self._counts.trials()
+            if stand != self._seen:
+                self._seen = stand
+                await self._load()
+            await self._show_changes()
+        finally:
+            self._is_looking = False
+
+    async def _show_changes(self) -> None:
         for part in (self._robot, self._asked, self._ending):
             part.look()
         if self._counts.trials() is not self._listed:
             self._listed = self._counts.trials()
-            self._counting.refresh()
+            await self._counting.refresh()
             self._table.refresh()
-        self._counting.look()
+        await self._counting.look()
         if self._pictured != (now := self._sheets.stand()):
             self._pictured = now
             self._photos.refresh()
@@ -112,17 +161,18 @@ class _Page:
             self._tracked = now
             self._filmed.refresh()
 
-    def _look_at(self, number: int) -> None:
+    async def _look_at(self, number: int) -> None:
         """Count this trial, below."""
-        self._counting.choose(number)
+        await self._counting.choose(number)
         ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})")
 
-    def _named(self, who: str) -> None:
+    async def _named(self, who: str) -> None:
         self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
         remember_who(self._visitor.who)
         if self._lab.operator is not None and self._lab.operator.key == self._visitor.key:
             self._lab.operator = self._visitor
-        self._counting.refresh()
+        await self._sheets.load()
+        await self._counting.refresh()
         self._table.refresh()
 
     # the robot
@@ -161,9 +211,7 @@ class _Page:
         if now.said:
             ui.label(now.said).classes("lab-problem").props('role="status"')
         if now.operator:
-            with ui.row().classes("lab-row"):
-                ui.label(f"{now.operator} has the robot; you are watching.")
-                ui.button("Take the robot over", on_click=self._take_over).props("outline no-caps")
+            show_holder(self._lab, self._visitor)
 
     def _asked_stand(self) -> _AskedStand:
         job = self._job()
@@ -194,14 +242,12 @@ class _Page:
 
     def _show_beginning(self) -> None:
         """What to say before a robot drives."""
-        try:
-            state = self._lab.studies.state(self._name)
-        except RealityGapError:
+        if self._can_begin is None:
             return
-        if state.is_complete:
+        if self._can_begin.is_complete:
             ui.label("All runs on a robot are complete.")
             return
-        found = find_ports()
+        found = self._can_begin.ports
         ports = [guess.port for guess in found]
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         ui.label(
@@ -258,14 +304,24 @@ class _Page:
                 witness=text_of(witness),
                 camera=text_of(camera),
             )
-            self._lab.take_robot(self._visitor, over=True)
+            self._lab.take_robot(self._visitor)
 
-        ui.button("Begin a sitting", on_click=lambda: told(begin)).props("unelevated no-caps")
+        ui.button("Begin a sitting", on_click=lambda: attempt(begin)).props("unelevated no-caps")
 
-    def _take_over(self) -> None:
-        told(lambda: self._lab.take_robot(self._visitor, over=True))
+    def _beginning(self) -> _Beginning | None:
+        try:
+            state = self._lab.studies.state(self._name)
+        except RealityGapError:
+            return None
+        return _Beginning(state.is_complete, tuple(find_ports()))
 
     # what there is
+
+    def _agree(self) -> str:
+        try:
+            return measure_agreement(self._lab.studies.path(self._name)).sentence
+        except WRONG as error:
+            return str(error)
 
     def _show_table(self) -> None:
         section("All trials")
@@ -273,8 +329,8 @@ class _Page:
         if not found:
             ui.label("No trial is planned yet.")
             return
-        if any(each.second for each in found):
-            told(lambda: ui.label(measure_agreement(self._lab.studies.path(self._name)).sentence))
+        if self._agreement:
+            ui.label(self._agreement)
         rows = [
             {
                 "number": each.number,
@@ -305,9 +361,9 @@ class _Page:
         table.add_slot("body-cell-number", _NUMBER)
         table.on("choose", lambda event: self._choose(event.args))
 
-    def _choose(self, number: Any) -> None:
+    async def _choose(self, number: Any) -> None:
         if type(number) is int:
-            self._counting.choose(number)
+            await self._counting.choose(number)
             ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'center'})")
 
     def _show_note(self) -> None:
@@ -323,10 +379,18 @@ class _Page:
         is_seen = each.trial.is_closed or each.second or each.first == self._visitor.who
         return str(len(each.trial.cells)) if is_seen else "counted"
 
-    def _note(self, field: Any) -> None:
-        if told(lambda: self._counts.note(None, text_of(field), self._visitor.who)):
+    async def _note(self, field: Any) -> None:
+        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who)):
             field.value = ""
-            ui.notify("Noted.")
+            notify("Noted.")
+
+
+@dataclass(frozen=True)
+class _Beginning:
+    """Facts that are needed before a robot drives."""
+
+    is_complete: bool
+    ports: tuple[PortGuess, ...]
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from nicegui import ui
+from nicegui import run, ui
 
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in
 
-from ._frame import hint, text_of, told
+from ._frame import attempt, hint, text_of
 
 
 class Videos:
@@ -25,7 +25,11 @@ class Videos:
 
     def __init__(self, lab: Lab, counts: Counts, jump: Callable[[int], Any]) -> None:
         self._lab, self._counts, self._jump = lab, counts, jump
-        self._open = False
+        self._files: list[str] = []
+
+    async def load(self) -> None:
+        """Look which videos are in the lab's folder."""
+        self._files = await run.io_bound(videos_in, self._lab.root) or []
 
     def stand(self) -> Any:
         """Changes when something else is to be shown."""
@@ -72,7 +76,7 @@ class Videos:
                     ).props("outline no-caps")
 
     def _show_form(self) -> None:
-        found, waiting = videos_in(self._lab.root), self._waiting()
+        found, waiting = self._files, self._waiting()
         hint(
             "Film the arena with its corner tags and the robot with its tag, from before a trial until the robot "
             "stands. One video may show several trials. Put it into the lab's folder."
@@ -91,4 +95,4 @@ class Videos:
             spec = f"{text_of(video)}?{text_of(options)}"
             self._lab.track(self._counts.name, spec, [trial.value] if trial.value else self._waiting())
 
-        ui.button("Track it", on_click=lambda: told(track)).props("unelevated no-caps")
+        ui.button("Track it", on_click=lambda: attempt(track)).props("unelevated no-caps")

@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import secrets
+from dataclasses import dataclass
 from typing import Any
 
 from nicegui import app, run, ui
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.errors import RealityGapError
+from realitygap.lab._access import FOREIGN_HEADERS
+from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._live_robot import EMULATED
 from realitygap.lab._studies import StudyState
 from realitygap.lab._study_job import StudyJob
+from realitygap.lab._watcher import Watcher
 
 from ._driving import Driving
-from ._frame import framed, hint, section, text_of, told, watching, whole_of
+from ._frame import attempt, framed, hint, section, text_of, told, watching, whole_of
 from ._part import Part
 from ._player import LivePlayer, Player
 
+MOST_FILES = 200
+"""Files of the lab's folder that are proposed."""
 LOOK_S = 1.0
 """How often the study's folder is looked at [s]."""
 
@@ -47,7 +53,9 @@ def add_watch(lab: Lab) -> None:
             if state is None or state.problem:
                 ui.label(state.problem if state else "The lab is closing.").classes("lab-problem")
                 return
-            _Page(lab, state).show()
+            opened = await run.io_bound(_open, lab, state)
+            if opened is not None:
+                _Page(lab, state, opened).show()
 
     @app.get("/figures/{name}/{figure}-{width}.svg")
     def figure(name: str, figure: str, width: str) -> Response:
@@ -55,10 +63,8 @@ def add_watch(lab: Lab) -> None:
         drawn = {} if watcher is None else watcher.figures.get(figure, {})
         if width not in ("wide", "narrow") or width not in drawn:
             return PlainTextResponse("There is no such figure.", 404)
-        headers = {
-            "cache-control": "no-store",
-            "content-encoding": "gzip",
-        }  # once for all, and every browser reads it
+        packed = {"cache-control": "no-store", "content-encoding": "gzip"}  # which every browser reads
+        headers = {**FOREIGN_HEADERS, **packed}
         return Response(drawn[width], media_type="image/svg+xml", headers=headers)
 
     @app.get("/reports/{name}")
@@ -69,15 +75,37 @@ def add_watch(lab: Lab) -> None:
             return PlainTextResponse(str(error), 404)
         if not path.is_file() or path.is_symlink():
             return PlainTextResponse("There is no report yet.", 404)
-        return FileResponse(path, media_type="text/html", headers={"cache-control": "no-store"})
+        headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
+        return FileResponse(path, media_type="text/html", headers=headers)
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """Facts about a study that are read when its page is opened."""
+
+    watcher: Watcher
+    counts: Counts | None
+    conditions: list[str]
+    files: list[str]
+
+
+def _open(lab: Lab, state: StudyState) -> _Opened:
+    counts = lab.counts(state.name) if state.has_robot else None
+    if counts is not None:
+        counts.look()
+    files = sorted(path.name for path in lab.root.glob("*.toml"))[:MOST_FILES]
+    conditions = list(lab.studies.results(state.name).conditions)
+    return _Opened(lab.watcher(state.name), counts, conditions, files)
 
 
 class _Page:
-    def __init__(self, lab: Lab, state: StudyState) -> None:
+    def __init__(self, lab: Lab, state: StudyState, opened: _Opened) -> None:
         self._lab = lab
         self._state = state
         self._name = state.name
-        self._watcher = lab.watcher(state.name)
+        self._opened = opened
+        self._watcher = opened.watcher
+        self._has_report = False
         self._key = secrets.token_hex(8)
         self._asked = False
         self._report_stamp = self._watcher.report_stamp
@@ -95,10 +123,11 @@ class _Page:
             self._figures()
         self._show_replay()
         with ui.row().classes("lab-row"):
-            ui.button("Write the report", on_click=self._watcher.write_report).props("outline no-caps")
+            ui.button("Write the report", on_click=lambda: attempt(self._watcher.write_report)).props(
+                "outline no-caps"
+            )
             self._report = ui.refreshable(self._show_report)
             self._report()
-        self._look_at_figures()
         watching(self._lab, self._look)
         ui.timer(LOOK_S, self._look_at_disk)
 
@@ -113,8 +142,10 @@ class _Page:
         card = None if job is None or job.is_over else job.card
         return None if job is None or card is None else (job, card)
 
-    def _look(self) -> None:
+    async def _look(self) -> None:
         self._show_progress()
+        if self._opened.counts is not None:
+            await run.io_bound(self._opened.counts.look)
         self._drive.look()
         if self._n_drawn != self._watcher.n_drawn:
             self._n_drawn = self._watcher.n_drawn
@@ -130,16 +161,23 @@ class _Page:
             self._report.refresh()
 
     async def _look_at_disk(self) -> None:
-        state = await run.io_bound(self._lab.studies.lately, self._name)
-        if state is not None and state != self._state:
+        found = await run.io_bound(self._read_disk)
+        if found is None:
+            return
+        state, has_report = found
+        if state != self._state:
             self._state = state
             self._show_progress()
-        self._look_at_figures()
+        if has_report != self._has_report:
+            self._has_report = has_report
+            self._report.refresh()
 
-    def _look_at_figures(self) -> None:
-        state = self._state
+    def _read_disk(self) -> tuple[StudyState, bool]:
+        """Read how far the study is and whether it has a report; ask for new figures if they are due."""
+        state = self._lab.studies.lately(self._name)
         if state.n_done or state.n_driven_done:
             self._watcher.look((state.n_done, state.n_driven_done))
+        return state, (self._lab.root / self._name / "report.html").is_file()
 
     def _show_progress(self) -> None:
         """Texts alone are changed: it happens often, and at every page that watches."""
@@ -162,8 +200,8 @@ class _Page:
         self._said.text = "; ".join(said) or "Nothing yet."
 
     def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:
-        if driven is not None:
-            Driving(*driven, self._lab.counts(self._name)).show()
+        if driven is not None and self._opened.counts is not None:
+            Driving(*driven, self._opened.counts).show()
 
     # figures
 
@@ -189,7 +227,7 @@ class _Page:
 
     def _show_replay(self) -> None:
         section("Play trials")
-        names = self._lab.studies.results(self._name).conditions
+        names = self._opened.conditions
         with ui.row().classes("lab-row"):
             each = ui.select(_EACH, value="", label="What").classes("lab-wide").props("outlined dense")
             condition = (
@@ -206,28 +244,30 @@ class _Page:
                 )
             }
 
-        def ask() -> None:
+        def given() -> dict[str, Any]:
+            return {key: value for key, field in numbers.items() if (value := whole_of(field)) is not None}
+
+        async def ask() -> None:
             wish: dict[str, Any] = {"each": each.value or None}
             if each.value != "condition":
                 wish["condition"] = condition.value
-            wish |= {key: value for key, field in numbers.items() if (value := whole_of(field)) is not None}
-            self._asked = True
-            self._stage.refresh()
-            self._watcher.replay(self._key, **wish)
+            if told(lambda: wish.update(given())):
+                self._asked = True
+                self._stage.refresh()
+                await attempt(lambda: self._watcher.replay(self._key, **wish))
 
         def drive() -> None:
-            wish: dict[str, Any] = {"condition": condition.value, "platform": text_of(platform)}
-            wish |= {key: value for key, field in numbers.items() if (value := whole_of(field)) is not None}
-            self._lab.drive_live(self._name, wish)
+            chosen = {"condition": condition.value, "platform": text_of(platform)}
+            self._lab.drive_live(self._name, {**chosen, **given()})
 
         with ui.row().classes("lab-row"):
-            ui.button("Show", on_click=lambda: told(ask)).props("unelevated no-caps")
+            ui.button("Show", on_click=ask).props("unelevated no-caps")
             platform = (
                 ui.input("Live on (else where the study has it)", autocomplete=self._platforms())
                 .props("outlined dense")
                 .classes("lab-wide")
             )
-            ui.button("Drive it live", on_click=lambda: told(drive)).props("outline no-caps")
+            ui.button("Drive it live", on_click=lambda: attempt(drive)).props("outline no-caps")
         hint(
             "Where no run is named, it is the typical one. Trials of a robot are shown where somebody saw their lines."
         )
@@ -238,8 +278,7 @@ class _Page:
 
     def _platforms(self) -> list[str]:
         """On which a network may be seen live; files are those in the lab's folder."""
-        twins = [f"twin:{path.name}" for path in sorted(self._lab.root.glob("*.toml"))]
-        return ["sim", "jyro", EMULATED, *twins]
+        return ["sim", "jyro", EMULATED, *(f"twin:{name}" for name in self._opened.files)]
 
     def _show_live(self) -> None:
         job = self._lab.lives.get(self._name)
@@ -272,5 +311,5 @@ class _Page:
     def _show_report(self) -> None:
         if self._watcher.report_said:
             ui.label(self._watcher.report_said).classes("lab-problem")
-        if (self._lab.studies.path(self._name) / "report.html").is_file():
+        if self._has_report:
             ui.link("The report", f"/reports/{self._name}", new_tab=True)

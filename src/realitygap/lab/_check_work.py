@@ -1,0 +1,67 @@
+"""A study file that is read or checked in its own process: it may come from anywhere and take any time."""
+
+from __future__ import annotations
+
+import json
+import queue
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RealityGapError
+from realitygap.study import parse_study
+
+from ._channel import LOOK_S, Channel, Message
+from ._files import refuse_code, refuse_files_outside
+from ._form import read_form
+
+IDLE_S = 300.0
+"""How long the process waits for a file [s]; the next check then starts another process."""
+
+
+def work(channel: Channel, order: Message) -> None:
+    """Wait for one file, and answer.
+
+    Args:
+        channel: To the server.
+        order: `root`, the lab's folder; `allow_code` if Python files of tasks may run.
+    """
+    wishes: queue.Queue[Message] = queue.Queue()
+    channel.at_once("read", wishes.put)
+    channel.at_once("check", wishes.put)
+    end = time.monotonic() + IDLE_S
+    while time.monotonic() < end:
+        try:
+            wish = wishes.get(timeout=LOOK_S)
+        except queue.Empty:
+            continue
+        text = str(wish["text"])
+        if wish["do"] == "read":
+            channel.say("found", **_read(text))
+        else:
+            channel.say(
+                "found", **_check(Path(order["root"]), text, allow_code=bool(order.get("allow_code")))
+            )
+        return
+
+
+def _read(text: str) -> Message:
+    """The values of the file as JSON has them, or the mistake."""
+    try:
+        return {"data": json.loads(json.dumps(read_form(text), default=str))}
+    except ValueError as error:
+        return {"mistakes": f"This is not TOML: {error}. Expected a study file."}
+
+
+def _check(root: Path, text: str, *, allow_code: bool) -> dict[str, Any]:
+    """The name of the study, or the mistakes in its file."""
+    try:
+        refuse_files_outside(root, text)
+        study = parse_study(text, str(root / "study.toml"))
+        refuse_code(study, allow_code)
+        return {"name": study.about.name}
+    except RealityGapError as error:
+        return {"mistakes": str(error)}
+    except tomllib.TOMLDecodeError as error:
+        return {"mistakes": f"This is not TOML: {error}."}

@@ -1,0 +1,126 @@
+"""The lab runs Python tasks only if it was started with --allow-code, and only from files in its folder."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import realitygap
+from realitygap.errors import StudyError
+from realitygap.lab import _check_work, _lab, _study_work
+from realitygap.lab._checks import Checks
+from realitygap.lab._lab import Lab
+from realitygap.tasks import _python
+
+STUDY = """
+[study]
+name = "mine"
+replicates = 1
+[neat]
+settings = "rosenzweig-remy"
+population = 2
+generations = 1
+[platform.sim]
+steps = 3
+[task]
+kind = "python:task.py:far"
+inputs = ["obstacle", "stall", "time"]
+[[condition]]
+name = "far"
+platform = "sim"
+"""
+REFUSED = "start the lab with: realitygap lab --allow-code"
+
+
+class SilentChannel:
+    """Takes what a process says to the server."""
+
+    def say(self, kind: str, **values: Any) -> None: ...
+
+
+@pytest.fixture
+def root(tmp_path) -> Path:
+    source = f"open({str(tmp_path / 'marker')!r}, 'w').close()\ndef far(t): return t.poses[:, -1, 0]\n"
+    (tmp_path / "task.py").write_text(source)
+    return tmp_path.resolve()
+
+
+def work(root: Path, **order: Any) -> None:
+    _study_work.work(SilentChannel(), {"work": "study", "folder": str(root / "mine"), "threads": 1, **order})
+
+
+@pytest.fixture
+def orders(monkeypatch) -> list[dict[str, Any]]:
+    """Orders to processes, none of which is started."""
+    told: list[dict[str, Any]] = []
+    monkeypatch.setattr(_lab, "StudyJob", lambda name, order, root, changed: told.append(order))
+    return told
+
+
+def check(root: Path, text: str = STUDY, *, allow_code: bool) -> dict[str, Any]:
+    return _check_work._check(root, text, allow_code=allow_code)
+
+
+def test_check_refuses_a_python_task_unless_the_lab_may_run_code(root):
+    assert REFUSED in check(root, allow_code=False)["mistakes"]
+    inline = STUDY.replace("inputs", 'source = "def far(t): pass"\ninputs')
+    assert "source: code in a study file is not run" in check(root, inline, allow_code=True)["mistakes"]
+    assert check(root, allow_code=True) == {"name": "mine"}
+    assert not (root / "marker").exists()  # a check runs none
+
+
+def test_lab_passes_its_permission_to_its_processes(root, orders):
+    lab = Lab(root, allow_code=True)
+    assert lab.checks._allow_code
+    lab.start_new("mine", STUDY)
+    assert [order["allow_code"] for order in orders] == [True]
+    work(root, text=STUDY, allow_code=True)
+    assert (root / "marker").exists()
+    lab.go_on("mine")
+    Lab(root).go_on("mine")
+    assert [order["allow_code"] for order in orders] == [True, True, False]
+
+
+def test_a_study_goes_on_only_with_permission_and_its_file(root):
+    with pytest.raises(StudyError, match=REFUSED):
+        work(root, text=STUDY)
+    work(root, text=STUDY, allow_code=True)
+    work(root, allow_code=True)
+    (root / "marker").unlink()
+    _python._load.cache_clear()
+    with pytest.raises(StudyError, match=REFUSED):
+        work(root)
+    source = (root / "task.py").read_text()
+    (root / "task.py").write_text(source + "# changed")
+    with pytest.raises(
+        StudyError, match=r"task\.py in .* has SHA-256 \w{64}, and the results .* with \w{64}"
+    ):
+        work(root, allow_code=True)
+    (root / "task.py").unlink()
+    with pytest.raises(
+        StudyError, match=r"Resuming the study needs its Python file: .*task\.py cannot be read"
+    ):
+        work(root, allow_code=True)
+    assert not (root / "marker").exists()
+
+
+def test_module_in_the_labs_folder_is_not_run(root):
+    (root / "numpy.py").write_text(f"open({str(root / 'marker')!r}, 'w').close()\n")
+    checks = Checks(root, allow_code=False)
+    try:
+        assert REFUSED in checks.begin("check", STUDY).found.result(60)["mistakes"]
+    finally:
+        checks.end()
+    assert not (root / "marker").exists()
+
+
+def test_child_processes_do_not_look_for_modules_in_the_current_folder():
+    sources = Path(realitygap.__file__).parent.rglob("*.py")
+    launches = [
+        part for path in sources for part in re.findall(r"\[sys\.executable, (.*)", path.read_text("utf-8"))
+    ]
+    assert len(launches) >= 4
+    assert all(part.startswith(('"-P"', '"-I"')) for part in launches)

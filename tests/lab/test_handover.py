@@ -1,0 +1,70 @@
+"""A robot that somebody has is handed over with their consent, or if they do not answer."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from realitygap.errors import StudyError
+from realitygap.lab import _lab as module
+from realitygap.lab._lab import Lab, Visitor
+
+ANNA, BEN, CARL = Visitor("a", "anna"), Visitor("b", "ben"), Visitor("c", "carl")
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """Return a lab in which anna drives a robot by hand."""
+    lab = Lab(tmp_path)
+    lab.stops = []
+    lab.hand = SimpleNamespace(is_over=False, stop=lambda: lab.stops.append("stop"))
+    lab.take_robot(ANNA)
+    return lab
+
+
+def test_robot_stays_with_its_operator_until_they_answer(lab):
+    lab.ask_for_robot(BEN)
+    assert lab.operator is ANNA
+    assert not lab.may_operate(BEN)
+    with pytest.raises(StudyError, match="ben asks for the robot already"):
+        lab.ask_for_robot(CARL)
+    with pytest.raises(StudyError, match="Nobody asks you"):
+        lab.answer_request(BEN, yes=True)
+    lab.answer_request(ANNA, yes=False)
+    assert lab.operator is ANNA
+    assert lab.request.is_refused
+    with pytest.raises(StudyError, match="Nobody asks you"):
+        lab.answer_request(ANNA, yes=True)
+
+
+def test_robot_driven_by_hand_stops_as_it_is_handed_over(lab):
+    lab.ask_for_robot(BEN)
+    lab.answer_request(ANNA, yes=True)
+    assert (lab.operator, lab.request, lab.stops) == (BEN, None, ["stop"])
+    assert not lab.may_operate(ANNA)
+
+
+def test_robot_is_handed_over_without_an_answer(lab, monkeypatch):
+    monkeypatch.setattr(module, "HANDOVER_S", 0.05)
+    lab.ask_for_robot(BEN)
+    until = time.monotonic() + 10
+    while lab.operator is ANNA:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    assert (lab.operator, lab.stops) == (BEN, ["stop"])
+
+
+def test_request_ends_when_somebody_else_begins_with_the_robot(lab, monkeypatch):
+    lab.ask_for_robot(BEN)
+    request = lab.request
+    lab.take_robot(CARL)
+    assert not lab._answer(request, yes=True)
+    assert lab.operator is CARL
+
+
+def test_robot_that_nobody_has_needs_no_consent(lab):
+    lab.hand = None
+    lab.ask_for_robot(BEN)
+    assert lab.operator is BEN

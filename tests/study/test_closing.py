@@ -14,7 +14,7 @@ from realitygap.report import goal_table, write_closing_page
 from realitygap.robots import SimPlatform
 from realitygap.study import SMALL, ClosingPlan, summarize_closing
 from realitygap.study._closing_plan import adopt_plan
-from realitygap.study._closing_summary import median_interval, share_interval
+from realitygap.study._closing_summary import is_met, median_interval, share_interval
 from realitygap.study._closing_twin import ClosingTwin, held_out
 from realitygap.trials import SimTarget, TrialPlan
 from realitygap.world import Calibration, paper_arena
@@ -25,7 +25,7 @@ FAMILIES = {
     "blind": {f"range.{k}.decay": 0.06 for k in range(3)} | {"drive.lag": 0.3},
 }
 PLAN = replace(
-    SMALL, families=tuple(FAMILIES), twins=1, controllers=10, trials=8, budgets=(0, 4), transfer_budget=4
+    SMALL, families=tuple(FAMILIES), twins=1, controllers=14, trials=8, budgets=(0, 4), transfer_budget=4
 )
 
 
@@ -78,22 +78,46 @@ def goals_of(summary):
     }
 
 
-def test_a_right_calibration_closes_the_gap_and_meets_its_goals(right):
+def test_a_right_calibration_closes_the_gap(right):
     summary, _, _ = right
     assert summary["n_done"] == summary["n_units"] == 2 * 5
     assert summary["n_counted"] == 2
     goals = goals_of(summary)
-    assert goals["fall of the RMS gap, track"]["met"]
     assert goals["fall of the RMS gap, track"]["figure"] > 0.8
-    assert goals["smallest fall of a family, cells"]["met"]
+    assert goals["smallest fall of a family, cells"]["figure"] > 0
 
 
 def test_a_useless_calibration_misses_them_and_says_on_which_twins(tmp_path):
     summary = carry_out(tmp_path, Twins(right=False))
     missed = goals_of(summary)["fall of the RMS gap, track"]
-    assert missed["met"] is False
     assert {each["twin"] for each in missed["why"]} == {"slow-1", "blind-1"}
     assert abs(missed["figure"]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "goal", "sense", "expected"),
+    [
+        (0.778, 0.826, 0.6, "at least", True),
+        (
+            0.775,
+            0.833,
+            0.8,
+            "at least",
+            None,
+        ),  # the figure, 0.804, reaches the goal; the interval contains it
+        (0.3, 0.39, 0.4, "at least", False),
+        (2.53, 4.59, 2.0, "at most", False),
+        (0.5, 0.9, 0.5, "more than", None),
+        (None, None, 0.4, "at least", None),
+    ],
+)
+def test_goal_is_decided_only_by_its_whole_interval(low, high, goal, sense, expected):
+    assert is_met(low, high, goal, sense) is expected
+
+
+def test_goal_of_two_twins_is_open(right):
+    verdicts = {row[0]: row[-1] for row in goal_table(right[0])}
+    assert verdicts["fall of the RMS gap, track"] == "open"
 
 
 def test_what_is_done_is_not_done_again(right):

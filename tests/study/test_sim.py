@@ -14,6 +14,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report import save_view, write_report
 from realitygap.runs import Condition, frame_of, replay, run_replicates, run_rows
 from realitygap.study import Study, load_study, parse_study, run_study
+from realitygap.tasks import PythonTask
 
 STUDY = """
 [study]
@@ -172,7 +173,7 @@ def far(arrays, step_s, fitness):
 
 def with_task(tmp_path: Path, source: str, function: str = "far", **settings: Any) -> Condition:
     (tmp_path / "task.py").write_text(source)
-    task = {"kind": f"python:{tmp_path}/task.py:{function}"}
+    task = PythonTask.from_file(f"python:{tmp_path}/task.py:{function}").allowed()
     values = {"name": "t", "platform": "sim", "sim": {"steps": 15}, "task": task, **settings}
     return Condition(**values)
 
@@ -218,6 +219,12 @@ def test_the_text_of_the_file_is_part_of_the_condition(tmp_path):
     assert run_replicates(other, 0, 1).height == 40
 
 
+def test_conditions_of_python_tasks_keep_their_hash(tmp_path):
+    """They are what studies on disk were run with."""
+    condition = with_task(tmp_path, PYTHON_TASK)
+    assert condition.hash().startswith("c40b8def978e53fc")
+
+
 @pytest.mark.parametrize(
     ("function", "text"),
     [
@@ -235,17 +242,27 @@ def test_a_function_that_fails_gives_one_message(tmp_path, function, text):
 @pytest.mark.parametrize(
     ("task", "text"),
     [
-        ('kind = "python:no.py:f"', "task: task file no.py cannot be read"),
+        ('kind = "python:no.py:f"', "no.py cannot be read: No such file"),
+        ('kind = "python:folder.py:f"', "folder.py cannot be read: it is not a plain file"),
+        ('kind = "python:latin.py:f"', "latin.py cannot be read: 'utf-8' codec"),
+        ('kind = "python:no-function.py"', "task.kind: expected"),
         ('kind = "fly"', "task.kind: unknown kind 'fly'. Known: avoid"),
-        ('kind = "python:task.py:gone"', "task: task.py has no function 'gone'"),
-        ('kind = "python:broken.py:f"', "task: broken.py cannot be run: line 1: SyntaxError"),
+        ('kind = "python:task.py:far"\nsource = "code"', "task.source: code in a study file is not run"),
+        (
+            'kind = "python:task.py:far"\n[condition.task]\nsource = "code"',
+            "task.source: code in a study file",
+        ),
+        ('source = "code"', "task.source: code in a study file is not run"),
     ],
 )
 def test_a_task_that_is_not_there_is_one_mistake(tmp_path, task, text):
     (tmp_path / "task.py").write_text(PYTHON_TASK)
-    (tmp_path / "broken.py").write_text("def f(:\n")
+    (tmp_path / "folder.py").mkdir()
+    (tmp_path / "latin.py").write_bytes(b"# \xe4")
     path = tmp_path / "s.toml"
-    path.write_text(f'[study]\nname = "s"\n[task]\n{task}\n[[condition]]\nname = "a"\nplatform = "sim"\n')
+    task, bracket, below = task.partition("[")
+    condition = f'[[condition]]\nname = "a"\nplatform = "sim"\n{bracket}{below}\n'
+    path.write_text(f'[study]\nname = "s"\n[task]\n{task}\n{condition}')
     with pytest.raises(StudyError, match="has 1 mistake") as raised:
         load_study(path)
     assert text in str(raised.value)

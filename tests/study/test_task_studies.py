@@ -54,11 +54,12 @@ def test_a_task_of_ones_own_is_worth_the_same_as_python_and_compiled_and_names_i
     condition = study.conditions[0]
     assert isinstance(condition.task, PythonTask)
     least = shortened(condition, population=20, generations=3)
+    least = least.model_copy(update={"task": condition.task.allowed()})
     rows = run_replicates(least, 0, 2)
-    compiled = PythonTask(
-        kind=f"python:{EXAMPLE.with_suffix('.py')}:there_and_back_compiled", inputs=condition.task.inputs
+    compiled = PythonTask.from_file(
+        f"python:{EXAMPLE.with_suffix('.py')}:there_and_back_compiled", inputs=condition.task.inputs
     )
-    again = run_replicates(least.model_copy(update={"task": compiled}), 0, 2)
+    again = run_replicates(least.model_copy(update={"task": compiled.allowed()}), 0, 2)
     first = pl.col("generation") == 0
     one, other = (each.filter(first)["task_fitness"].to_numpy() for each in (rows, again))
     assert one == pytest.approx(other, abs=1e-6)
@@ -72,7 +73,9 @@ def test_a_task_of_ones_own_is_worth_the_same_as_python_and_compiled_and_names_i
 def test_what_run_prints_and_summarizes_is_fitness_by_the_task(tmp_path: Path, capsys) -> None:
     study = load_study(EXAMPLE, replicates=7)
     conditions = tuple(shortened(each, population=5, generations=2) for each in study.conditions)
-    result = run_study(study.model_copy(update={"conditions": conditions}), out=tmp_path / "out")
+    result = run_study(
+        study.model_copy(update={"conditions": conditions}), out=tmp_path / "out", allow_code=True
+    )
     summary = summarize_tasks(result.folder)
     assert summary.schema == TASK_SCHEMA
     assert summary["condition"].to_list() == ["evolved", "random"]

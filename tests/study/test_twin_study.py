@@ -95,11 +95,11 @@ def test_trials_are_those_of_the_twin(file: Path, results: ResultsFolder) -> Non
     trajectory = replay(condition, row)  # which compares it with the row
     robot = open_twin(load_twin(file), paper_arena())
     from realitygap.kernels._philox import PURPOSE_NOISE
-    from realitygap.trials._twin_trials import _number
+    from realitygap.trials._twin_trials import twin_number
 
     individual, generation = row["individual"], row["generation"]
     counter = np.array([individual << 8 | int(PURPOSE_NOISE), generation << 12, row["replicate"]], np.uint32)
-    robot.number = _number(row["key"], counter)
+    robot.number = twin_number(row["key"], counter)
     robot.reset()
     for step, command in enumerate(trajectory.commands):
         assert max(robot.observe().readings) == trajectory.inputs[step, 0]

@@ -11,6 +11,7 @@ from ._closing import ClosingProgress, closing_the_gap
 from ._closing_plan import NAME as CLOSING
 from ._closing_plan import SMALL, ClosingPlan
 from ._closing_summary import summarize_closing
+from ._code import AllowCode, check_files, python_tasks
 from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
@@ -54,6 +55,7 @@ __all__ = [
     "SECTIONS",
     "SMALL",
     "STRATEGIES",
+    "AllowCode",
     "CameraAttendant",
     "CameraOperator",
     "ClosingPlan",
@@ -86,6 +88,7 @@ __all__ = [
     "calibrate_all",
     "calibrate_from",
     "calibration_of",
+    "check_files",
     "choose_condition",
     "closing_the_gap",
     "connect_robot",
@@ -112,6 +115,7 @@ __all__ = [
     "place_trial",
     "placing_words",
     "plan_gap",
+    "python_tasks",
     "read_camera",
     "recorded_spreads",
     "refuse_port_without_robot",

@@ -159,20 +159,28 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
             f"{' or '.join(made.observes)}); `calibrate all` makes do with cells."
         )
     refuse_more_than_is_seen(target, observe)
-    refuse_other_sensors(base, target)
+    refuse_other_sensors(base, target, str(robot))
 
 
-def refuse_other_sensors(robot: RobotModel, target: Target) -> None:
-    """Return where a target has as many range sensors as the robot on whose numbers a fit builds.
+def refuse_other_sensors(robot: RobotModel, target: Target, named: str = "") -> None:
+    """Raise an error if a target has another number of range sensors than the robot on whose numbers a fit builds.
+
+    Args:
+        robot: The robot.
+        target: The target.
+        named: What the user called the robot; its name if not given.
 
     Raises:
-        StudyError: It has not.
+        StudyError: The numbers differ.
     """
-    if len(robot.range) != target.n_sensors:
-        raise StudyError(
-            f"{target.name} has {target.n_sensors} range sensors and robot {robot.name!r} {len(robot.range)}. Build on "
-            "the robot that it is (--base ROBOT, or a study whose robot it is)."
-        )
+    if len(robot.range) == target.n_sensors:
+        return
+    advice = "Name the robot that the target is: --base ROBOT, or a study with that robot."
+    if target.name.partition(":")[0] == "sim":
+        advice = f"To simulate that robot, name the target sim:{named or robot.name}. Otherwise n{advice[1:]}"
+    raise StudyError(
+        f"{target.name} has {target.n_sensors} range sensors and robot {robot.name!r} {len(robot.range)}. {advice}"
+    )
 
 
 def calibrate_from(

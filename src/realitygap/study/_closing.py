@@ -88,7 +88,7 @@ def closing_the_gap(
         _carry_out_apart(plan, missing, folder, processes, show)
     show()
     summary = summarize_closing(folder)
-    write_whole(folder / "summary.json", json.dumps(summary, indent=2).encode())
+    write_whole(folder / "summary.json", json.dumps(summary, indent=2).encode(), within=folder)
     return summary
 
 
@@ -111,7 +111,7 @@ def _write_twins(folder: Path, names: Iterable[TwinName]) -> None:
             from_extra("mujoco", "twin")
         path = folder / "twins" / f"{name}.toml"
         if not path.exists():
-            write_whole(path, model.to_toml().encode())
+            write_whole(path, model.to_toml().encode(), within=folder)
 
 
 def _carry_out(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
+import operator
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 
 from realitygap import _special as special
 from realitygap._version import __version__
+from realitygap.records import read_object
 from realitygap.world import Fitted
 
 from ._closing_plan import ClosingPlan, TwinName, read_plan
@@ -38,7 +39,7 @@ def summarize_closing(folder: str | Path) -> dict[str, Any]:
     Returns:
         `plan`; `twins`: of each one the RMS gap before and after by observation and budget, whether it counts, and
         what its calibrations found; `families`; `strategies`; `goals`: each with `name`, `figure`, `low`, `high` (95 %
-        interval, over twins), `n`, `goal`, `met` (None where nothing counts), `why` for those twins that miss it, and
+        interval, over twins), `n`, `goal`, `met` (as `is_met` returns it), `why` for those twins that miss it, and
         `unknown`: twins of which the figure is not known, and why; `n_done` and `n_units`.
 
     Raises:
@@ -71,7 +72,7 @@ def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
         for unit in plan.units():
             path = folder / "units" / f"{name}-{unit}.json"
             if path.exists():
-                found.setdefault(str(name), {})[unit] = json.loads(path.read_text("utf-8"))
+                found.setdefault(str(name), {})[unit] = read_object(path)
     return found
 
 
@@ -225,15 +226,33 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
             yield _wins(counted, observe, other, least)
 
 
+def is_met(low: float | None, high: float | None, goal: float, sense: str) -> bool | None:
+    """Return whether a figure's whole interval meets a goal.
+
+    Args:
+        low: Lower end of the interval; None if there is no interval.
+        high: Upper end.
+        goal: The value wanted.
+        sense: `at least`, `more than` or `at most`.
+
+    Returns:
+        True if the whole interval meets the goal, False if none of it does, and None if the interval contains values of
+        both kinds or if there is none: such data do not decide.
+    """
+    if low is None or high is None:
+        return None
+    meets = {"at least": operator.ge, "more than": operator.gt, "at most": operator.le}[sense]
+    ends = {bool(meets(low, goal)), bool(meets(high, goal))}
+    return ends.pop() if len(ends) == 1 else None
+
+
 def _median_goal(
     name: str, found: Sequence[tuple[Row, Row, float | None]], goal: float, *, above: bool
 ) -> Row:
     """A goal of a median over twins; a twin of which the figure is not known is said, and not counted."""
     known = [(twin, after, value) for twin, after, value in found if value is not None]
     figure = median_interval([value for _, _, value in known])
-    met = None if figure["estimate"] is None else (figure["estimate"] >= goal) == above
-    if figure["estimate"] == goal:
-        met = True
+    sense = "at least" if above else "at most"
     missing = [
         (twin, after, value) for twin, after, value in known if (value < goal) == above and value != goal
     ]
@@ -249,8 +268,8 @@ def _median_goal(
             if value is None
         ],
         "goal": goal,
-        "sense": "at least" if above else "at most",
-        "met": met,
+        "sense": sense,
+        "met": is_met(figure["low"], figure["high"], goal, sense),
         "why": [_why(twin, after, value) for twin, after, value in missing],
     }
 
@@ -273,7 +292,7 @@ def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row,
         "unknown": [],
         "goal": 0.0,
         "sense": "at least",
-        "met": None if worst is None else figure["estimate"] >= 0,
+        "met": is_met(figure["low"], figure["high"], 0.0, "at least"),
         "why": [_why(twin, after, value) for twin, after, value in worse],
     }
 
@@ -288,8 +307,7 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
     wins = [1.0 if difference > 0 else 0.5 if difference == 0 else 0.0 for _, difference in pairs]
     share = float(np.mean(wins)) if wins else None
     low, high = share_interval(sum(wins), len(wins))
-    most = other != "direct"
-    met = None if share is None else (share > least if most else share >= least)
+    sense = "at least" if other == "direct" else "more than"
     return {
         "name": f"posterior, {observe}, better than {other}",
         "figure": share,
@@ -302,8 +320,8 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
             if twin["twin"] not in [each["twin"] for each, _ in pairs]
         ],
         "goal": least,
-        "sense": "more than" if most else "at least",
-        "met": met,
+        "sense": sense,
+        "met": is_met(low, high, least, sense),
         "why": [
             {"twin": twin["twin"], "family": twin["family"], "figure": difference}
             for twin, difference in pairs

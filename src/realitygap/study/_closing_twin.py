@@ -14,7 +14,7 @@ import numpy as np
 
 from realitygap.evolution import Genome, Population
 from realitygap.gap import GapSide, measure_gap
-from realitygap.records import Observe, write_whole
+from realitygap.records import Observe, read_object, write_whole
 from realitygap.runs import Condition
 from realitygap.trials import NoiseKey, Target
 from realitygap.world import Calibration, load_calibration
@@ -64,7 +64,7 @@ class ClosingTwin:
                 found = self._unit(unit, target)
                 found |= {"family": self.name.family, "seed": self.name.seed, "unit": unit}
                 found["seconds"] = round(time.perf_counter() - since, 1)
-                write_whole(self._path(unit), json.dumps(found).encode())
+                write_whole(self._path(unit), json.dumps(found).encode(), within=self.folder)
                 self.tell(f"{self.name} {unit}")
 
     def _path(self, unit: str) -> Path:
@@ -104,7 +104,7 @@ class ClosingTwin:
         }
 
     def _on_twin(self) -> GapSide:
-        judged = json.loads(self._path("judged").read_text("utf-8"))
+        judged = read_object(self._path("judged"))
         crossed = np.zeros((self.plan.controllers, self.plan.trials, judged["n_cells"]), bool)
         for k, trials in enumerate(judged["cells"]):
             for j, cells in enumerate(trials):
@@ -157,7 +157,7 @@ class ClosingTwin:
                     seed=self.name.seed,
                     effort=self.plan.effort,
                 )
-            write_whole(path, found.to_toml().encode())
+            write_whole(path, found.to_toml().encode(), within=self.folder)
         return load_calibration(path)
 
     # transfer

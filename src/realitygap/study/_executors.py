@@ -7,6 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from realitygap._interrupts import kept_interrupts
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
 from realitygap.trials import close_twins, release_twins, usable_processors
@@ -62,7 +63,8 @@ class Threads:
 
     def prepare(self, conditions: Sequence[Condition]) -> None:
         """Compile the kernels, or load them from disk."""
-        prepare_kernels(conditions)
+        with kept_interrupts():
+            prepare_kernels(conditions)
 
     def carry_out(self, folder: ResultsFolder, tasks: Iterator[ChunkTask], listener: Listener) -> None:
         """See `Executor`."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.errors import StudyError
-from realitygap.gap import Needed, plan_correlation, plan_effect, plan_margin, trial_reliability
+from realitygap.errors import StudyError, whole_number
+from realitygap.gap import Needed, check_plan, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.records import read_observations
 from realitygap.trials import those_that_count
 from realitygap.world import Arena, load_arena
@@ -133,8 +134,9 @@ def plan_gap(
         seed: Of simulated studies.
 
     Raises:
-        StudyError: A number that cannot be.
+        StudyError: A number is out of range; no pilot is made then.
     """
+    _refuse_unanswerable(question, value, spread, least, power, trials)
     known = spreads or pilot_spreads(seed)
     apart = known.controllers / 2 if spread is None else spread
     rows = []
@@ -153,3 +155,19 @@ def plan_gap(
     except ValueError as error:
         raise StudyError(str(error)) from None
     return GapPlan(question, value, apart, known, tuple(rows))
+
+
+def _refuse_unanswerable(
+    question: Question, value: float, spread: float | None, least: float, power: float, trials: Sequence[int]
+) -> None:
+    """Refuse a question before a pilot is made for it."""
+    if question not in get_args(Question):
+        raise StudyError(f"question is {question!r}, expected one of {', '.join(get_args(Question))}.")
+    if spread is not None and not 0 <= spread < math.inf:
+        raise StudyError(f"spread is {spread}, expected a number from 0 on, in coverage.")
+    try:
+        check_plan(power, **{question: value}, least=least)
+        for r in trials:
+            whole_number("trials", r, 1)
+    except ValueError as error:
+        raise StudyError(str(error)) from None

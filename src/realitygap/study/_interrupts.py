@@ -7,6 +7,8 @@ import signal
 import threading
 from collections.abc import Iterator
 
+from realitygap._interrupts import on_interrupt
+
 
 @contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
@@ -19,7 +21,8 @@ def held_interrupts() -> Iterator[None]:
         KeyboardInterrupt: It came in the block.
     """
     is_main = threading.current_thread() is threading.main_thread()
-    if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    handler = signal.getsignal(signal.SIGINT)
+    if not is_main or handler not in (signal.default_int_handler, on_interrupt):
         yield
         return
     came = False
@@ -34,6 +37,6 @@ def held_interrupts() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, handler)
     if came:
         raise KeyboardInterrupt

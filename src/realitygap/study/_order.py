@@ -15,7 +15,9 @@ from realitygap._version import __version__
 from realitygap.errors import ClusterError, RecordError
 from realitygap.records import RESULTS_VERSION, MissingInboxError, deliver
 from realitygap.runs import Condition, run_replicates
+from realitygap.tasks import PythonTask
 
+from ._code import with_code
 from ._executors import ChunkTask
 
 
@@ -50,6 +52,8 @@ def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
         "hash": condition.hash(),
         "first": task.first,
         "n_runs": task.n_runs,
+        # The worker has nobody to ask: whoever gave the order has the permission.
+        "may_run_code": isinstance(condition.task, PythonTask) and condition.task.may_run,
     }
 
 
@@ -65,6 +69,8 @@ def carry_out_order(order: dict[str, Any]) -> None:
     if not inbox.is_dir():
         raise _refusal(_no_shared_folder(inbox))
     condition = Condition.from_settings(order["condition"], order["settings"])
+    if order["may_run_code"]:
+        condition = with_code(condition)
     frame = run_replicates(condition, order["first"], order["n_runs"])
     try:
         deliver(inbox, condition.name, order["first"], frame, order["hash"])

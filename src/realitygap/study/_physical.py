@@ -340,7 +340,10 @@ class PhysicalStudy:
         found = preflight(robot, self._ledger.robots())
         if (found.problems or not self._is_looked_at) and not self._operator.accept(found):
             said = "; ".join(found.problems) or "the operator stopped there"
-            raise StudyError(f"The pre-flight was not accepted, and nothing was driven: {said}.")
+            raise StudyError(
+                f"The pre-flight was not accepted, and nothing was driven: {said}. Put that right, or accept it "
+                "(--despite-preflight)."
+            )
         self._is_looked_at = True
         self._sitting = self._ledger.begin_sitting(
             robot.label, self._port, found.robot, found.to_dict(), [each.name for each in self._conditions]

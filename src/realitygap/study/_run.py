@@ -13,8 +13,10 @@ from typing import Any
 from realitygap.errors import OutgrownError, StudyError, whole_number
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
+from realitygap.tasks import source_hash
 from realitygap.trials import Operator
 
+from ._code import AllowCode, with_code_allowed
 from ._executors import ChunkTask, Executor, Threads, usable_processors
 from ._file import load_study
 from ._physical import OpenRobot, PhysicalResult, PhysicalStudy, n_complete, physical_conditions
@@ -79,6 +81,7 @@ def run_study(
     tell: Callable[[Progress], None] | None = None,
     port: str | None = None,
     operator: Operator | None = None,
+    allow_code: AllowCode = False,
 ) -> StudyResult:
     """Carry out a study, or what is missing of it; conditions on a robot only where its port is given.
 
@@ -103,8 +106,11 @@ def run_study(
             `socket://HOST:PORT`, or `emulator://s2?speed=off`, an emulated one in this program.
         operator: Who places the robot and says what it drew; the emulator's witness when not given, which only an
             emulated robot in this program has.
+        allow_code: Whether Python files of tasks (`kind = "python:FILE.py:FUNCTION"`) may run that the user has not
+            allowed before; or a function that gets the `PythonTask` and returns whether its file may run.
 
     Raises:
+        TaskError: A Python file is not allowed, cannot be run, or lacks its function; nothing was written.
         StudyError: The study cannot be carried out as written, or the folder holds another one: the
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
@@ -121,6 +127,9 @@ def run_study(
     if port is not None:
         refuse_port_without_robot(study)
     path = Path(out) if out is not None else Path("results") / study.about.name
+    if not fresh and (path / "study.json").exists():
+        _refuse_other_settings(ResultsFolder.open(path), study)
+    study = with_code_allowed(study, allow_code)
     with _executor(threads, cluster) as executor:
         folder = _open_folder(path, study, fresh=fresh)
         with folder.locked():
@@ -267,7 +276,26 @@ def _open_folder(path: Path, study: Study, *, fresh: bool) -> ResultsFolder:
 
 
 def _adopt(folder: ResultsFolder, study: Study) -> None:
-    """Bring the folder's description up to date; refuse another study, and a condition that has changed."""
+    """Bring the folder's description up to date.
+
+    Raises:
+        StudyError: As `_refuse_other_settings`.
+    """
+    _refuse_other_settings(folder, study)
+    old, new = folder.description, study.description()
+    names = [condition["name"] for condition in new["conditions"]]
+    new["conditions"] += [each for each in old["conditions"] if each["name"] not in names]
+    new["replicates"] = max(new["replicates"], old["replicates"])
+    if new != old:
+        folder.update_description(new)
+
+
+def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
+    """Refuse a folder that holds another study, or a condition that has changed.
+
+    Raises:
+        StudyError: It does; each difference has a line.
+    """
     old = folder.description
     new = study.description()
     there = {condition["name"]: condition for condition in old["conditions"]}
@@ -303,10 +331,6 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
                 ]
             )
         )
-    new["conditions"] += list(there.values())
-    new["replicates"] = max(new["replicates"], old["replicates"])
-    if new != old:
-        folder.update_description(new)
 
 
 def _ways_out(folder: ResultsFolder) -> str:
@@ -325,7 +349,11 @@ def _differences(old: Any, new: Any, place: str = "") -> list[str]:
             else:
                 lines += _differences(old[key], new[key], where)
         return lines
-    return [] if old == new else [f"{place} is {old!r} there, {new!r} here"]
+    if old == new:
+        return []
+    if place == "task.source" and isinstance(old, str) and isinstance(new, str):
+        return [f"the text of the Python file has SHA-256 {source_hash(old)} there, {source_hash(new)} here"]
+    return [f"{place} is {old!r} there, {new!r} here"]
 
 
 class _Counter:

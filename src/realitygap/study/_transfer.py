@@ -13,7 +13,16 @@ import numpy as np
 
 from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, not_compared, read_observations, write_whole
+from realitygap.records import (
+    OBSERVATIONS,
+    Observe,
+    not_compared,
+    read_object,
+    read_observations,
+    refuse_links,
+    refuse_links_in,
+    write_whole,
+)
 from realitygap.robots import SimPlatform
 from realitygap.runs import Condition
 from realitygap.trials import Target, is_whole
@@ -186,7 +195,7 @@ def transfer(
         best,
         tuple(champions),
     )
-    write_whole(folder / "result.json", json.dumps(result.to_dict(), indent=2).encode())
+    write_whole(folder / "result.json", json.dumps(result.to_dict(), indent=2).encode(), within=folder)
     return result
 
 
@@ -316,11 +325,17 @@ class _Work:
         return tuple(coverage_of(trial, self.target) for trial in trials)
 
 
+_PARTS = ("trials", "fresh", "champions", "calibrations")
+"""Folders in that of a transfer."""
+
+
 def _adopt(folder: Path, plan: TransferPlan) -> None:
     """Make the folder that of a plan, or see that it is; more replicates, budgets and fresh trials extend it."""
     path = folder / "transfer.json"
+    refuse_links(folder, path, folder / "result.json")
+    refuse_links_in(folder, *_PARTS)
     if path.exists():
-        there = json.loads(path.read_text("utf-8"))
+        there = read_object(path)
         now = json.loads(json.dumps(asdict(plan)))
         extends = ("replicates", "budgets", "fresh_trials", "calibration", not_compared(there, now))
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
@@ -332,9 +347,9 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
                 f"{folder} belongs to another transfer ({shown or 'the condition has other settings'}); nothing was "
                 "tried and nothing is lost. Name another folder with -o."
             )
-    for part in ("trials", "fresh", "champions", "calibrations"):
+    for part in _PARTS:
         (folder / part).mkdir(parents=True, exist_ok=True)
-    write_whole(path, json.dumps(asdict(plan), indent=2).encode())
+    write_whole(path, json.dumps(asdict(plan), indent=2).encode(), within=folder)
 
 
 def _fit_of(calibration: str | Path) -> str:

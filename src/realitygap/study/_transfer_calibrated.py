@@ -129,5 +129,5 @@ class Calibrating:
                 )
             except ValueError as error:
                 raise StudyError(f"{error} The trials are kept in {trials}.") from error
-        write_whole(path, calibration.to_toml().encode())
+        write_whole(path, calibration.to_toml().encode(), within=self.folder)
         return calibration

@@ -41,7 +41,7 @@ class KeptTarget:
         self.spent = 0
         self._target = target
         self._first_number = first_number
-        self._file = ObservationsFile(path, observations_head(target, observe))
+        self._file = ObservationsFile(path, observations_head(target, observe), within=path.parent)
         self._kept = {trial.number: trial for trial in self._file.trials if is_whole(trial)}
 
     def carry_out(

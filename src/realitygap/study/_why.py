@@ -102,8 +102,10 @@ def why_gap(
     quality = _carry_out(SimPlatform(robot=robot, **pace), arena, genomes, steps, values, seed, trials)
     m, c = len(quality), len(genomes)
     squares = square_differences(quality, np.broadcast_to(target.values, (m, *target.values.shape)))
+    differences = target.means - quality.mean(axis=2)
     numbers = [sum(part_of(name) == part for name in fitted) for part in PARTS]
-    return explain_gap(squares.reshape(-1, 2 ** len(PARTS), c), PARTS, numbers, seed=seed)
+    shape = (-1, 2 ** len(PARTS), c)
+    return explain_gap(differences.reshape(shape), squares.reshape(shape), PARTS, numbers, seed=seed)
 
 
 def _rows(

@@ -262,6 +262,7 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
         (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "takes at least 2 trials"),
         (("path", "--robot", "sim", "--figure", "x.svg", "-o", "x.toml"), "--figure draws the readings"),
         (("sensors", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "has 3 range sensors"),
+        (("all", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "name the target sim:e-puck"),
         (("sensors", "--robot", "jyro", "--base", "jyro", "-o", "x.toml"), "expected ir or pulses"),
         (("sensors", "--from", "none.jsonl", "-o", "x.toml"), "There is no file none.jsonl"),
         (("sensors", "--robot", "sim", "--arena", "peper", "-o", "x.toml"), "Unknown arena"),

@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 from realitygap._version import __version__
-from realitygap.cli import app
+from realitygap.cli import _commands, app
 from tests.interrupted import INTERRUPTED
 
 DATA = Path(__file__).parent.parent / "data"
@@ -37,37 +38,39 @@ def one_message(done: subprocess.CompletedProcess, *texts: str) -> str:
     return done.stderr
 
 
-COMMANDS = sorted(typer.main.get_command(app).commands)
+APP = typer.main.get_command(app)
+COMMANDS = sorted(APP.commands)
 
 
-def test_all_commands_are_known():
-    assert COMMANDS == [
-        "audit-distance",
-        "audit-results",
-        "bench",
-        "calibrate",
-        "digest",
-        "emulate",
-        "export",
-        "gap",
-        "lab",
-        "lens",
-        "new-study",
-        "plan",
-        "print-sheet",
-        "print-tags",
-        "report",
-        "robot",
-        "run",
-        "score",
-        "show",
-        "simulate",
-        "track",
-        "transfer",
-        "trials",
-        "try",
-        "twin",
-    ]
+def test_list_of_commands_has_every_command_with_its_first_line():
+    summaries = {command.name: command.summary for command in _commands.COMMANDS}
+    assert sorted(summaries) == COMMANDS
+    for name, command in APP.commands.items():
+        assert summaries[name] == command.help.split("\n")[0]
+        assert len(summaries[name]) <= 58
+
+
+def test_list_of_commands_cuts_no_line_at_any_width():
+    for columns in (60, 80, 200):
+        text = _commands.root_help(columns)
+        assert max(map(len, text.splitlines())) <= min(columns, 80)
+        words = " ".join(text.split())
+        for command in _commands.COMMANDS:
+            assert f"{command.name} {command.summary}" in words
+
+
+def test_root_prints_the_same_list_with_and_without_typer():
+    done = realitygap("--help", env={**os.environ, "COLUMNS": "80"})
+    assert (done.returncode, done.stdout) == (0, _commands.root_help(80))
+    assert CliRunner().invoke(app, ["-h"], terminal_width=78).stdout == _commands.root_help(80)
+    bare = realitygap(env={**os.environ, "COLUMNS": "80"})
+    assert (bare.returncode, bare.stdout) == (2, done.stdout)
+
+
+def test_unknown_command_names_a_similar_one():
+    done = realitygap("reprot")
+    assert done.returncode == 2
+    assert "report" in done.stderr
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -92,10 +95,21 @@ def test_python_twins_exist():
 
 
 def test_help_imports_nothing_heavy():
-    code = "import sys, realitygap.cli; print([m for m in sys.modules if m.split('.')[0] in %r])"
-    heavy = ["numpy", "numba", "polars", "pydantic", "scipy", "matplotlib", "jinja2"]
-    done = subprocess.run([sys.executable, "-c", code % heavy], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    heavy = {"numpy", "numba", "polars", "scipy", "matplotlib", "jinja2"}
+    assert not loaded_for("run", "--help") & heavy
+    heavy |= {"typer", "pydantic"}  # newer versions of Typer load Pydantic for each command
+    assert not loaded_for("--help") & heavy
+    assert not loaded_for("--version") & heavy
+
+
+def loaded_for(*words: str) -> set[str]:
+    """The top-level modules that a command has imported when it ends."""
+    code = (
+        "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); "
+        "from realitygap.cli import main; main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    return {name.split(".")[0] for name in done.stderr.split()}
 
 
 def test_version():
@@ -366,6 +380,11 @@ def test_bench_of_a_task_prints_its_figures_beside_the_published_ones():
     ("words", "texts"),
     [
         ("bench xr", ["Unknown task 'xr'", "Did you mean 'xor'?"]),
+        (
+            "bench nonsense",
+            ["Unknown task 'nonsense'", "xor, double-pole,", "maze-medium", "maze-hard", "realism"],
+        ),
+        ("bench maze-x", ["Unknown task 'maze-x'", "Did you mean 'maze-hard'?", "maze-medium"]),
         ("bench xor --settings stanley", ["Unknown NEAT settings 'stanley'"]),
         ("bench xor --change crossover", ["expected KEY=VALUE"]),
         ("bench xor --change crossover=0 --change crossover=1", ["--change gives crossover twice: 0 and 1"]),
@@ -397,3 +416,10 @@ def test_wrong_usage_ends_with_2(words, tmp_path):
     done = realitygap(*words.split(), cwd=tmp_path)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+def test_message_shows_control_characters_of_a_file_as_escapes(tmp_path):
+    (tmp_path / "study.toml").write_text('["\\u001b[2Jx\\u202e"]\n')
+    done = realitygap("run", "study.toml", cwd=tmp_path)
+    one_message(done, "\\x1b[2Jx\\u202e: unknown section")
+    assert "\x1b" not in done.stderr

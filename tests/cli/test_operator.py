@@ -355,6 +355,27 @@ def test_an_unattended_run_tells_of_each_generation(tmp_path, study, monkeypatch
     assert "Trial 2, robot, run 0, generation 0, individual 1: " in run("--out", str(tmp_path / "slow")).err
 
 
+def test_despite_preflight_drives_an_emulated_robot_with_a_weak_battery(tmp_path, study, monkeypatch, capsys):
+    def run(*options):
+        port = "emulator://s2?fluke=1&speed=off"
+        command = ["realitygap", "run", str(study), "--port", port, "--out", str(tmp_path / "out"), *options]
+        monkeypatch.setattr(sys, "argv", command)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, capsys.readouterr().err
+
+    monkeypatch.setattr("realitygap.trials._preflight.LEAST_BATTERY_V", 20.0)
+    code, said = run()
+    assert code
+    assert re.search(
+        r"nothing was driven: the battery has .* V under load.*--despite-preflight", said, re.DOTALL
+    )
+    code, said = run("--despite-preflight")
+    assert not code
+    assert "Against driving: the battery has" in said
+    assert "2 trials, at most" in said
+
+
 @pytest.fixture
 def driven(tmp_path, study, no_terminal):
     """A folder whose two trials are driven and not scored."""

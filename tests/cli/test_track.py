@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from realitygap.cli import main
+from realitygap.errors import VisionError
 from realitygap.records import LEDGER_NAME, Ledger, read_observations, write_observations
 from realitygap.study import (
     calibrate_from,
@@ -298,6 +299,15 @@ def test_a_lens_is_refused_for_another_shape_and_without_a_board(command, tmp_pa
     with pytest.raises(Exception, match="no file of a lens"):
         read_lens(tmp_path / "bad.toml")
     assert command("lens", "--camera", "x", "-o", "l.toml", "--board", "9")[0] == 1
+
+
+@pytest.mark.parametrize(("number", "huge"), [("width = 640", "width = inf"), ("560.0, 560.0", "inf, 560.0")])
+def test_lens_with_an_infinite_number_is_refused(tmp_path, number, huge):
+    text = Lens(640, 360, (560.0, 560.0), (320.0, 180.0), rms=0.3).to_toml()
+    assert number in text
+    (tmp_path / "lens.toml").write_text(text.replace(number, huge))
+    with pytest.raises(VisionError, match="no file of a lens"):
+        read_lens(tmp_path / "lens.toml")
 
 
 def test_help_answers_with_examples():

@@ -5,18 +5,46 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shutil
 import sys
 import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from realitygap._interrupts import kept_interrupts
+from realitygap._version import __version__
 from realitygap.errors import RealityGapError
 
-from ._app import app
+from ._commands import COMMANDS, root_help
+
+if TYPE_CHECKING:
+    import typer
+
+    app: typer.Typer
+
+
+def __getattr__(name: str) -> Any:
+    """Make the application of all commands when somebody asks for it: this imports every one of them."""
+    if name == "app":
+        from ._app import make_app
+
+        globals()["app"] = make_app(COMMANDS)
+        return globals()["app"]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _print_error(message: str) -> None:
+    """Print a message; what files put into it cannot control the terminal."""
+    message = "".join(
+        letter if letter == "\n" or letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in message
+    )
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, or None
+        print(f"realitygap: {message}", file=sys.stderr, flush=True)
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    typer.echo(f"realitygap: note: {message}", err=True)
+    _print_error(f"note: {message}")
 
 
 def main() -> None:
@@ -31,24 +59,55 @@ def main() -> None:
     try:
         _run_command()
     except RealityGapError as error:
-        typer.echo(f"realitygap: {error}", err=True)
+        _print_error(str(error))
         sys.exit(1)
     except BrokenPipeError:
         _forget_output()
         sys.exit(1)
     except OSError as error:
         what = error.filename or "The output cannot be written"
-        typer.echo(f"realitygap: {what}: {error.strerror or error}.", err=True)
+        _print_error(f"{what}: {error.strerror or error}.")
         _forget_output()
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)
 
 
-def _run_command() -> None:
-    """Run a command, to the last of what it prints."""
+@contextlib.contextmanager
+def _safe_path_for_children() -> Iterator[None]:
+    """Keep child processes from looking for modules in the current folder, which may hold anybody's files.
+
+    Whoever calls `main` in a process of their own gets their environment back.
+    """
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = before or "1"
     try:
-        app()
+        yield
+    finally:
+        if before is None:
+            os.environ.pop("PYTHONSAFEPATH", None)
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
+@kept_interrupts()
+@_safe_path_for_children()
+def _run_command() -> None:
+    """Run a command, to the last of what it prints.
+
+    The list of commands and the version need no command, and answer without loading Typer.
+    """
+    arguments = sys.argv[1:]
+    try:
+        if not arguments or arguments in (["-h"], ["--help"]):
+            print(root_help(shutil.get_terminal_size().columns), end="")
+            sys.exit(0 if arguments else 2)
+        if arguments == ["--version"]:
+            print(f"realitygap {__version__}")
+            return
+        from ._app import app_for
+
+        app_for(arguments)()
     finally:
         if sys.stdout is not None:
             sys.stdout.flush()

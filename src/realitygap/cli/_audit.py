@@ -25,7 +25,7 @@ def audit_results(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the audit as JSON.")] = False,
 ) -> None:
-    """Say what a small table of results can show, and what it cannot.
+    """Report what a small table of results can show.
 
     For each two conditions: how likely a run of one is above a run of the other (A12), the p of a permutation
     test (exact up to ten runs against ten, drawn beyond), the smallest p that so many runs can give, and what

@@ -39,7 +39,7 @@ def audit_distance(
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of random walks and pairs.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Say what a distance of behaviors weighs: each cell, and how many there are.
+    """Report what a behavior distance weighs.
 
     The weight of a cell is what adding it to a random walk, or removing it, does to the distance. The relation with
     length is the rank correlation of the distance of two behaviors with the difference in visited cells: over random

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from typing import Annotated, Any
 
 import typer
 
-from realitygap.errors import StudyError
+from realitygap._limits import parse_toml
+from realitygap.errors import StudyError, did_you_mean
 
 DEFAULT_SEEDS = 100
 
@@ -43,7 +43,9 @@ def bench(
         typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]"),
     ] = None,
 ) -> None:
-    """Measure how fast this machine is or, with a task, how many evaluations NEAT needs for it.
+    """Measure the speed of this machine.
+
+    With a TASK, it counts how many evaluations NEAT needs for that task instead.
 
     Speed: robot-steps and whole paper runs a second, on one core and on all. A robot-step holds its noise and
     its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted.
@@ -86,6 +88,7 @@ def bench(
         return
     if seconds is not None:
         raise StudyError("--seconds goes with the measurement of speed, which has no task, and with realism.")
+    _check_task(task)
     measured = _bench_maze if task.startswith("maze") else _bench_task
     measured(
         task,
@@ -95,6 +98,16 @@ def bench(
         _changes(change or []),
         as_json=as_json,
     )
+
+
+def _check_task(task: str) -> None:
+    from realitygap.tasks import CLASSICAL_TASKS, MAZE_TASKS
+
+    known = [*CLASSICAL_TASKS, *MAZE_TASKS, "realism"]
+    if task not in known:
+        near = did_you_mean(task, known)
+        meant = f" {near}" if near.startswith("Did") else ""
+        raise StudyError(f"Unknown task {task!r}.{meant} Known: {', '.join(known)}.")
 
 
 def _changes(texts: list[str]) -> dict[str, Any]:
@@ -114,8 +127,8 @@ def _changed_setting(text: str) -> tuple[str, Any]:
     if not key or not sign:
         raise StudyError(f"--change {text}: expected KEY=VALUE, such as crossover=0.")
     try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        return key.strip(), parse_toml(f"value = {value}")["value"]
+    except ValueError:
         return key.strip(), value.strip()
 
 

@@ -80,7 +80,9 @@ def calibrate(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Measure a robot, and fit a simulated one to it: `sim:FILE` is the robot as it was measured.
+    """Fit the simulator to a robot.
+
+    The file that it writes describes the robot as it was measured. Use it as platform `sim:FILE`.
 
     path and sensors are the paper's calibrations: five full steps ahead and five turning, and fifty readings at each
     distance from a wall, 3 in apart. motion fits motors and drift, contact what happens at walls, all everything at
@@ -131,6 +133,8 @@ def _checked(
     choose: bool,
 ) -> Path:
     """Refuse what cannot be, before a trial is lost on it; where the calibration goes."""
+    from realitygap.records import refuse_links
+
     if (robot is None) == (data is None):
         raise StudyError(
             "Name what is calibrated (--robot PLATFORM), or trials that were recorded before (--from DATA), and not "
@@ -149,6 +153,7 @@ def _checked(
             raise StudyError(
                 f"There is no folder {path.parent} for {path.name}. Make it, or name another file."
             )
+    refuse_links(out.parent, out.with_suffix(".trials.jsonl"))
     if observe is not None and observe not in _OBSERVE:
         raise StudyError(f"--observe is {observe!r}, expected cells, encoders or track.")
     if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):

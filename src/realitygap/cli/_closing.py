@@ -111,9 +111,9 @@ def _print(summary: dict[str, Any]) -> None:
         f"{len(summary['twins'])} twins (TWIN), of which {summary['n_counted']} differ from the simulator (SIM) by "
         "more than three standard errors"
     )
-    typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'twins':>9}  met")
-    for name, wanted, figure, span, n, met in goal_table(summary):
-        typer.echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {met}")
+    typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'twins':>9}  verdict")
+    for name, wanted, figure, span, n, verdict in goal_table(summary):
+        typer.echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
     for sentence in not_counted(summary):
         typer.echo(sentence)
 

@@ -79,7 +79,7 @@ def emulate(
         ),
     ] = False,
 ) -> None:
-    """Pose as a Scribbler, with a simulated robot behind it, until Ctrl-C.
+    """Emulate a Scribbler on a pseudo-terminal or TCP port.
 
     The name of the port comes first: a pseudo-terminal for `--port` of other commands and for other programs, or a
     TCP port. In a terminal a live view follows: arena, robot, path, lights and the last command.

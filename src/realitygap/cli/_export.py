@@ -43,7 +43,9 @@ def export(
     generation: Annotated[int | None, typer.Option(help="Of an individual. [default: the last]")] = None,
     individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
 ) -> None:
-    """Write an individual of a study, or its species, innovations or lineage, to a file for other programs.
+    """Export a network as JSON, ONNX, or a graph.
+
+    It also exports the species, the innovations, or the lineage of a run.
 
     A folder alone gives one individual, which realitygap show network draws with the same options. json is the genome,
     which realitygap.Genome.load reads; onnx is its network, for any ONNX runtime; graphml is the genome as a graph. The

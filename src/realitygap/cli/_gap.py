@@ -100,7 +100,7 @@ def gap(
     camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of all random numbers.")] = 1,
 ) -> None:
-    """Measure the gap: the same controllers on a simulator and on a target, again and again.
+    """Measure the gap between a simulator and a target.
 
     Printed with intervals of 95 %: level, root mean square over controllers without the noise of trials, order,
     behavior, and equivalence at a margin. What so few trials cannot carry is refused, with how many would do.
@@ -313,9 +313,10 @@ def plan(
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of pilot and simulated studies.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
 ) -> None:
-    """Say how many controllers and trials a question about the gap takes, before any is driven.
+    """Estimate how many controllers and trials you need.
 
-    Numbers come from normal formulas, and simulated studies of that size say how often it is found in truth.
+    Numbers come from normal formulas. Simulated studies of that size give the power. For a correlation, controllers
+    are added until the simulated power reaches --power.
 
     Example: realitygap plan --effect 0.05
 
@@ -396,4 +397,9 @@ def _print_plan(found: GapPlan, least: float, power: float) -> None:
     if found.question == "effect":
         typer.echo(
             "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."
+        )
+    if found.question == "correlation":
+        typer.echo(
+            "A correlation is shown if it is above --least, one-sided at 5 %. `realitygap gap` prints the correlation "
+            "without noise if each controller has at least 2 trials."
         )

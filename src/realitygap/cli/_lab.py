@@ -19,13 +19,21 @@ def lab(
         str,
         typer.Option(
             metavar="H",
-            help="Address to answer at; 0.0.0.0 is for phones in the same network, which need the token that is "
-            "printed, also as a QR code.",
+            help="Address to answer at; 0.0.0.0 is for phones in the same network, for which the address is also "
+            "printed as a QR code.",
         ),
     ] = "127.0.0.1",
+    allow_code: Annotated[
+        bool,
+        typer.Option(
+            "--allow-code", help="Let every visitor start studies that run Python files in DIR as tasks."
+        ),
+    ] = False,
     no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in the browser.")] = False,
 ) -> None:
-    """Serve a web page on which studies are started and watched, and trials on a robot are led through and scored.
+    """Serve the web interface for studies, robots, and trials.
+
+    Every browser needs the token in the address that is printed. Each start makes a new one.
 
     It needs the extra 'lab', and no network beyond this machine. What is entered is in the study's folder and its
     ledger at once: a page that is loaded anew, or a lab that is started anew, goes on where it was. Ctrl-C ends the
@@ -39,7 +47,7 @@ def lab(
     """
     from realitygap.lab import open_lab
 
-    open_lab(folder, port=port, host=host, show=not no_open, tell=_say)
+    open_lab(folder, port=port, host=host, show=not no_open, tell=_say, allow_code=allow_code)
 
 
 def _say(line: str) -> None:

@@ -88,7 +88,9 @@ def choose_operator(
         from ._telling import telling_witness
 
         remote = None if witness is None or is_in_this_program(port) else connect_witness(witness)
-        return telling_witness(remote, answers.verdict or "void", quiet=quiet)
+        return telling_witness(
+            remote, answers.verdict or "void", despite_preflight=answers.despite_preflight, quiet=quiet
+        )
 
     def note(text: str, who: str, trial: int | None) -> None:
         with Ledger.open(folder / LEDGER_NAME) as ledger:

@@ -30,7 +30,9 @@ def print_sheet(
         str, typer.Option(metavar="a4|letter|a3|arena", help="Pages to join, or one as large as the sheet.")
     ] = "a4",
 ) -> None:
-    """Write the sheet for an arena as PDF at true scale: grid, start, four tags, and a box to try each pen in.
+    """Write the paper sheet of an arena (PDF, true scale).
+
+    It shows the grid, the start, four tags, and a box in which you try each pen.
 
     Print it at 100 %, cut the pages at their marks and join them edge to edge; lay tracing paper over it, or draw on it
     at once. Before a photo is taken draw a line with each pen in its box: so its color is known in that light.

@@ -24,7 +24,9 @@ def report(
     ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser.")] = False,
 ) -> None:
-    """Write the report of a study: one page with settings, tables and figures, that needs no network.
+    """Write the HTML report of a study.
+
+    The report is one page of settings, tables, and figures. It needs no network.
 
     Example: realitygap report results/paper
 
@@ -52,7 +54,7 @@ def written_report(
 
 
 def digest(folder: Folder) -> None:
-    """Print the digest of a study's rows.
+    """Print the hash of a study's results.
 
     It is equal for any number of threads, any chunks and any interruption; another digest means other
     results. That runs are missing is said on standard error.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 robot = typer.Typer(
     name="robot",
-    help="Talk to a Scribbler on a serial or Bluetooth port, or to an emulated one.\n\n"
+    help="Connect to a Scribbler and send it commands.\n\n"
     'In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0")',
     epilog="Example: realitygap robot info /dev/rfcomm0",
     no_args_is_help=True,

@@ -64,7 +64,7 @@ def score(
         bool, typer.Option("--json", help="Print as JSON; enters nothing without --yes.")
     ] = False,
 ) -> None:
-    """Read the crossed cells off a photo of a sheet from print-sheet, to be confirmed by eye.
+    """Read the crossed cells from a photo of a sheet.
 
     The sheet is found by its four tags and its grid; lens, tilt and light are taken out; pens are told apart by how
     they look in their boxes. Look at the picture that is written: cells less than 90 % sure are framed in it. In a
@@ -175,7 +175,7 @@ def _score_trials(
         for trial in on_sheet.waiting
     }
     place = overlay or folder / f"sheet-{on_sheet.sheet}.png"
-    write_whole(place, overlay_png(found, names))
+    write_whole(place, overlay_png(found, names), within=folder if overlay is None else None)
     if as_json:
         rows = [{"trial": trial.trial, **_as_json(traces[trial.pen])} for trial in on_sheet.waiting]
         typer.echo(json.dumps({"sheet": on_sheet.sheet, "overlay": str(place), "trials": rows}, indent=2))

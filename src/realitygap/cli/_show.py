@@ -65,7 +65,7 @@ def show(
         int | None, typer.Option(help="Of a divergence: trials on each of them. [default: 30]")
     ] = None,
 ) -> None:
-    """Draw a run, one trial, a network, species, a lineage, an arena or a robot into a file, or trials in motion.
+    """Draw a run, trial, network, arena, or robot.
 
     A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
     commands. FILE.gif and FILE.mp4 show a trial in motion (without --generation, the run's best), movie several of

@@ -12,7 +12,7 @@ def simulate(
     case: Annotated[Path, typer.Argument(metavar="CASE.json", help="The scene, and what drives its robots.")],
     out: Annotated[Path, typer.Option("--out", metavar="OUT.csv", help="Where the track is written.")],
 ) -> None:
-    """Run a case as the Jyro simulator would, and write what each robot did at each step.
+    """Run one case file as the Jyro simulator does.
 
     The case is a JSON file: walls, lights, robots with their devices, and commands or a network. The track
     is a CSV file: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy and the readings s0, s1, ...

@@ -15,6 +15,7 @@ from realitygap.errors import StudyError
 from ._browser import show_page
 from ._camera import CAMERA_HELP, operated_under_camera
 from ._closing import CLOSING, closing_plan, refuse_options, run_closing
+from ._code import ALLOW_CODE_HELP, code_permission
 from ._operator import Answers, choose_operator
 from ._results import written_report
 
@@ -122,15 +123,19 @@ def run(
     small: Annotated[
         bool, typer.Option("--small", help="Of closing-the-gap: minutes, to see that all of it works.")
     ] = False,
+    allow_code: Annotated[bool, typer.Option("--allow-code", help=ALLOW_CODE_HELP)] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
     ] = False,
 ) -> None:
-    """Carry out a study, or what is missing of it, and print a summary.
+    """Run a study, or resume one that was interrupted.
 
     Interrupt it at any moment: the same command goes on where it stopped. More replicates or new conditions
     extend what is there. The results do not depend on threads, clusters, chunks or interruptions.
+
+    A study may have tasks in Python files. The first time that such a file is met, it is shown, and you are asked
+    whether it may run. The answer is remembered until the file changes.
 
     With --port, a robot drives the conditions on the platform scribbler: you are led through its trials, and nothing
     that was scored is lost. Without it they are left as they are.
@@ -154,7 +159,14 @@ def run(
         others = {"replicates": replicates, "cluster": cluster, "chunk": chunk, "fresh": fresh, "port": port}
         refuse_options(
             study,
-            {**others, "randomize": randomize, "witness": witness, "camera": camera, "in-flight": in_flight},
+            {
+                **others,
+                "randomize": randomize,
+                "witness": witness,
+                "camera": camera,
+                "in-flight": in_flight,
+                "allow-code": allow_code,
+            },
         )
         plan = closing_plan(
             small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed
@@ -179,16 +191,24 @@ def run(
     resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     if port is not None:
         refuse_port_without_robot(resolved)
+    permission = code_permission(allow_code)
     try:
         with RunsBar(quiet=as_json) as bar:
             result = run_study(
-                resolved, out, threads=threads, chunk=chunk, fresh=fresh, cluster=cluster, tell=bar.show
+                resolved,
+                out,
+                threads=threads,
+                chunk=chunk,
+                fresh=fresh,
+                cluster=cluster,
+                tell=bar.show,
+                allow_code=permission,
             )
         if port is not None:
             path = result.folder.path
             operator = choose_operator(port, witness, answers, path, quiet=as_json)
             with operated_under_camera(camera, resolved, operator) as looking:
-                driven = run_study(resolved, path, port=port, operator=looking)
+                driven = run_study(resolved, path, port=port, operator=looking, allow_code=permission)
             result = dataclasses.replace(result, physical=driven.physical)
     except KeyboardInterrupt:
         typer.echo(
@@ -203,7 +223,7 @@ def run(
 def new_study(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")] = Path("my-study.toml"),
 ) -> None:
-    """Write a commented study file, in which every setting stands with its meaning and its default.
+    """Write a template study file that documents every setting.
 
     Example: realitygap new-study my-study.toml && realitygap run my-study.toml
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from realitygap.trials import Card, DrivenTrial, Verdict, WitnessOperator
+from realitygap.trials import Card, DrivenTrial, Preflight, Verdict, WitnessOperator
 
 if TYPE_CHECKING:
     from realitygap.emulator import Witness
@@ -19,15 +19,25 @@ _SILENCE_S = 10.0
 """After so long a silence the next trial is told of, too."""
 
 
-def telling_witness(witness: Witness | None, in_flight: Verdict, *, quiet: bool) -> WitnessOperator:
-    """The witness of an emulated robot, which tells of each generation unless it is to be quiet."""
-    return (WitnessOperator if quiet else _TellingWitness)(witness, in_flight=in_flight)
+def telling_witness(
+    witness: Witness | None, in_flight: Verdict, *, despite_preflight: bool, quiet: bool
+) -> WitnessOperator:
+    """Return the witness of an emulated robot, which reports each generation unless it is to be quiet."""
+    kind = WitnessOperator if quiet else _TellingWitness
+    return kind(witness, in_flight=in_flight, despite_preflight=despite_preflight)
 
 
 class _TellingWitness(WitnessOperator):
     """Tells of each generation that is closed, and of a trial where that takes long."""
 
     _told = 0.0
+
+    def accept(self, preflight: Preflight) -> bool:
+        """Report what speaks against driving if it drives all the same."""
+        accepts = super().accept(preflight)
+        for problem in preflight.problems if accepts else ():
+            self._say(f"Against driving: {problem}. The robot drives anyway (--despite-preflight).")
+        return accepts
 
     def place(self, card: Card) -> None:
         """Put the robot at the start."""

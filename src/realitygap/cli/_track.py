@@ -107,7 +107,7 @@ def track(
     who: Annotated[str, typer.Option(metavar="NAME", help="Enters it.")] = "camera",
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
 ) -> None:
-    """Follow a robot with a tag on it through a video, or under a camera that is plugged in.
+    """Track a tagged robot in a video or camera stream.
 
     The arena is known by a tag at each of its corners. What was not seen is filled in between, and marked. With --study
     or --trials and --trial, the trial is found in the video by its commands; its cells and path go to the ledger, and
@@ -161,7 +161,7 @@ def print_tags(
     ] = 0.06,
     paper: Annotated[str, typer.Option(metavar="PAPER", help="a4, letter or a3.")] = "a4",
 ) -> None:
-    """Make a PDF of the robot's tag and four tags for the arena's corners, at true scale.
+    """Write the tags for the camera (PDF, true scale).
 
     Print it at 100 %, and measure the printed ruler. A sheet of `realitygap print-sheet` has the corner tags already.
 
@@ -195,7 +195,7 @@ def lens(
     square: Annotated[float, typer.Option(metavar="M", help="Side of a square [m].")] = 0.025,
     seconds: Annotated[float, typer.Option(min=1, metavar="S", help="Of a camera: how long.")] = 30.0,
 ) -> None:
-    """Fit the lens of a camera to a video in which a chessboard is shown to it from many sides.
+    """Calibrate a camera lens from a checkerboard video.
 
     Without a lens, `realitygap track` fits one to the tags that it sees, which does for most cameras.
 

@@ -68,7 +68,9 @@ def transfer(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Evolve in simulation, spend a few trials on a target, and see which strategy makes the most of them.
+    """Compare strategies that transfer controllers.
+
+    Controllers evolve in simulation. Each strategy then spends a few trials on the target.
 
     Each strategy has the same evolution in simulation and may spend the same trials. What it chose is judged by fresh
     trials. Every trial on the target is kept as it comes: the same command goes on where it was interrupted.

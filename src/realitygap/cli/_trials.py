@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def trials(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """List the trials that a robot drove, enter what they drew, take it back, declare one void, add a note.
+    """List, score, and annotate physical trials.
 
     Cells are numbered columns * row + column, 0 at the lower left of the reachable ones. Without --cells and --file
     they are picked in the terminal. A score can be taken back until its generation is closed; later only --correct is
@@ -102,6 +103,10 @@ def trials(
                 typer.echo(f"Trial {number} is void; it will be driven again.")
 
 
+_LONGEST_NUMBER = 19
+"""Digits of a number that surely fits into SQLite's."""
+
+
 def _needed(value: str | None, what: str) -> str:
     if value is None:
         raise StudyError(f"{what} is missing. See `realitygap trials --help` for an example.")
@@ -110,7 +115,7 @@ def _needed(value: str | None, what: str) -> str:
 
 def _number(ledger: Ledger, text: str) -> int:
     """A trial's number, from itself or its code."""
-    if text.isdecimal():
+    if text.isdecimal() and len(text) < _LONGEST_NUMBER:
         return ledger.trial(int(text)).trial
     codes = {each.code: each.trial for each in ledger.trials()}
     if text.upper() not in codes:
@@ -157,7 +162,7 @@ def _cells(text: str, where: str) -> list[int]:
 def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
     """The cells of each trial in a file, all of it read before anything is entered."""
     try:
-        lines = path.read_text("utf-8").splitlines()
+        lines = read_file(path, MOST_TABLE_BYTES).decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise StudyError(f"{path} cannot be read ({error}). Expected lines such as '12: 0 1 13'.") from error
     found: dict[int, list[int]] = {}

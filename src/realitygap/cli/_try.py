@@ -34,7 +34,9 @@ def try_genome(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the coverage as JSON.")] = False,
 ) -> None:
-    """Drive the controller of a genome's file on a platform, and say how much of the arena it covers.
+    """Drive one exported controller on any platform.
+
+    The command prints how much of the arena the controller covers.
 
     What evolved anywhere drives anywhere: in simulation, on a twin, and over the wire on a robot or an emulated one.
     With -o, trials that are in the file already are not driven again.

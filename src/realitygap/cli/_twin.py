@@ -12,7 +12,8 @@ from realitygap.errors import RealityGapError
 
 twin = typer.Typer(
     name="twin",
-    help="Draw twins from families, and look at them: robots of real wheels, motors and sensors, as pseudo-reality.\n\n"
+    help="Sample and inspect MuJoCo twins (pseudo-reality).\n\n"
+    "A twin is a simulated robot with modeled wheels, motors, and sensors. It is drawn from a family.\n\n"
     'In Python: realitygap.robots.twin.sample_twin("worn", 1)',
     epilog="Example: realitygap twin sample --family worn --seed 1 -o worn-1.toml",
     no_args_is_help=True,

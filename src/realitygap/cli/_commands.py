@@ -1,0 +1,102 @@
+"""The list of commands. `realitygap --help` prints it without loading Typer or any command."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+
+NARROWEST = 50
+WIDEST = 80
+PURPOSE = (
+    "Evolve robot controllers in simulation, run them on a real robot, and measure and close the gap between "
+    "the two."
+)
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command or a group of commands.
+
+    Attributes:
+        name: The word on the command line.
+        summary: One line for the list; for a command, the first line of its docstring.
+        module: The module of `realitygap.cli` that defines it.
+        attribute: The function or the Typer group in that module.
+    """
+
+    name: str
+    summary: str
+    module: str
+    attribute: str
+
+
+SECTIONS: dict[str, tuple[Command, ...]] = {
+    "Run a study": (
+        Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
+        Command(
+            "new-study", "Write a template study file that documents every setting.", "_study", "new_study"
+        ),
+        Command("lab", "Serve the web interface for studies, robots, and trials.", "_lab", "lab"),
+    ),
+    "Look at results": (
+        Command("report", "Write the HTML report of a study.", "_results", "report"),
+        Command("show", "Draw a run, trial, network, arena, or robot.", "_show", "show"),
+        Command("export", "Export a network as JSON, ONNX, or a graph.", "_export", "export"),
+        Command("digest", "Print the hash of a study's results.", "_results", "digest"),
+    ),
+    "Measure and close the gap": (
+        Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
+        Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
+        Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
+        Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
+        Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
+        Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
+    ),
+    "Use a robot": (
+        Command("robot", "Connect to a Scribbler and send it commands.", "_robot", "robot"),
+        Command("emulate", "Emulate a Scribbler on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
+        Command("trials", "List, score, and annotate physical trials.", "_trials", "trials"),
+    ),
+    "Score physical trials": (
+        Command(
+            "print-sheet",
+            "Write the paper sheet of an arena (PDF, true scale).",
+            "_print_sheet",
+            "print_sheet",
+        ),
+        Command("score", "Read the crossed cells from a photo of a sheet.", "_score", "score"),
+        Command("track", "Track a tagged robot in a video or camera stream.", "_track", "track"),
+        Command("print-tags", "Write the tags for the camera (PDF, true scale).", "_track", "print_tags"),
+        Command("lens", "Calibrate a camera lens from a checkerboard video.", "_track", "lens"),
+    ),
+    "Check and compare": (
+        Command("audit-results", "Report what a small table of results can show.", "_audit", "audit_results"),
+        Command(
+            "audit-distance", "Report what a behavior distance weighs.", "_audit_distance", "audit_distance"
+        ),
+        Command("simulate", "Run one case file as the Jyro simulator does.", "_simulate", "simulate"),
+        Command("bench", "Measure the speed of this machine.", "_bench", "bench"),
+    ),
+}
+COMMANDS = tuple(command for commands in SECTIONS.values() for command in commands)
+
+
+def root_help(columns: int) -> str:
+    """Return the text of `realitygap --help` for a terminal of that many columns."""
+    width = max(NARROWEST, min(columns, WIDEST) - 2)
+    lines = ["Usage: realitygap [OPTIONS] COMMAND [ARGS]...", ""]
+    lines += textwrap.wrap(PURPOSE, width, initial_indent="  ", subsequent_indent="  ")
+    lines += ["", "Options:", "  --version   Print the version.", "  -h, --help  Show this message and exit."]
+    for title, commands in SECTIONS.items():
+        lines += ["", f"{title}:"]
+        for command in commands:
+            start = f"  {command.name:<15} "
+            lines += textwrap.wrap(
+                command.summary,
+                width,
+                initial_indent=start,
+                subsequent_indent=" " * len(start),
+                break_on_hyphens=False,
+            )
+    lines += ["", "  Example: realitygap run paper", "", "  `realitygap COMMAND --help` describes a command."]
+    return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import make_billion  # noqa: E402
+import make_faults  # noqa: E402
 import make_gallery  # noqa: E402
 import make_lab  # noqa: E402
 import make_sensors  # noqa: E402
@@ -104,6 +105,7 @@ def setup(app):
         "parts/billion.md": make_billion.page_tables(),
         "parts/gallery.md": make_gallery.page_part(),
         **make_speed.page_parts(),
+        **make_faults.page_parts(),
         **make_lab.page_parts(),
         **make_sensors.page_parts(),
     }

@@ -3,7 +3,8 @@
     uv run python docs/make_calibration.py
 
 Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and docs/data/closing/summary.json,
-and writes tables into the pages and each parameter into docs/data/calibration.csv. Measuring takes an hour, by hand:
+and writes tables into the pages and each parameter into docs/data/calibration.csv and docs/data/calibration-kinds.csv.
+Measuring takes an hour, by hand:
 
     data="--out docs/data/calibration.jsonl"
     uv run python benchmarks/calibration.py sim --n 24 --first-seed 1000 --observe track cells $data
@@ -25,14 +26,89 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import binom
+
+from realitygap.report._effects import mean_interval
+from realitygap.report._permutation import holm
+from realitygap.report._questions import Share
 
 DOCS = Path(__file__).parent
 PAGES = (DOCS / "explanations" / "calibration.md", DOCS / "explanations" / "inference.md")
 MEASURED = DOCS / "data" / "calibration.jsonl"
 EACH = DOCS / "data" / "calibration.csv"
+EACH_OF_KINDS = DOCS / "data" / "calibration-kinds.csv"
 CLOSING = DOCS / "data" / "closing" / "summary.json"
 BLOCK = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+GOAL = 0.9
+"""The share of robots whose interval must hold a parameter."""
+
+RARE = 0.05
+"""Parameters held so seldom that this or less is the chance of it, if the true share is the goal, are listed."""
+
+HALF_AS_GOOD = 0.8
+"""A true share with twice as many misses as the goal allows."""
+
 Row = dict[str, Any]
+
+
+def over_robots(rows: Sequence[Row]) -> str:
+    """Return the 95 % interval of the share held, over robots, as the parameters of a robot are not independent."""
+    interval = mean_interval(np.array([np.mean(list(row["held"].values())) for row in rows]))
+    return "–" if interval is None else f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %"
+
+
+def held_by_name(rows: Sequence[Row]) -> dict[str, Share]:
+    """Return for each parameter how many intervals hold it, of how many robots."""
+    return {
+        name: Share(sum(row["held"][name] for row in rows), len(rows))
+        for name in (rows[0]["held"] if rows else ())
+    }
+
+
+def bounds(part: Share) -> str:
+    """Return the exact 95 % interval of a share in percent."""
+    low, high = part.interval
+    return f"{100 * low:.0f} to {100 * high:.0f} %"
+
+
+def chance(part: Share) -> float:
+    """Return the probability of so few or fewer if the true share is the goal."""
+    return float(binom.cdf(part.count, part.n, GOAL))
+
+
+def below(groups: dict[str, Sequence[Row]], column: str) -> str:
+    """List the parameters that are held too seldom to be chance, one by one, and what so many robots can show."""
+    found = [
+        (group, name, part) for group, rows in groups.items() for name, part in held_by_name(rows).items()
+    ]
+    chances = np.array([chance(part) for *_, part in found])
+    corrected = holm(chances)
+    lines = [
+        f"| {column} | parameter | held | 95 % interval | p | p (Holm, {len(found)}) |",
+        "|---|---|---|---|---|---|",
+    ]
+    listed = sorted(np.flatnonzero(chances <= RARE), key=lambda k: (chances[k], k))
+    for k in listed:
+        group, name, part = found[k]
+        lines.append(
+            f"| `{group}` | `{name}` | {part.count} of {part.n} | {bounds(part)} | {chances[k]:.2g} | "
+            f"{corrected[k]:.2g} |"
+        )
+    n = max(part.n for *_, part in found)
+    expected = sum(binom.cdf(most_listed(part.n), part.n, GOAL) for *_, part in found)
+    power = binom.cdf(most_listed(n), n, HALF_AS_GOOD)
+    text = (
+        f"{len(listed)} of {len(found)} parameters have a p of {RARE} or less. If the true share were "
+        f"{100 * GOAL:.0f} % for every parameter,\n{expected:.1f} would have such a p on average. A parameter that is "
+        f"held in only {100 * HALF_AS_GOOD:.0f} % of robots has such a p in\n{100 * power:.0f} of 100 measurements of "
+        f"{n} robots. So a larger p does not show that a parameter reaches the goal."
+    )
+    return ("\n".join(lines) + "\n\n" if listed else "") + text + "\n"
+
+
+def most_listed(n: int) -> int:
+    """Return the largest number of robots, of n, with which a parameter is listed."""
+    return max((k for k in range(n) if binom.cdf(k, n, GOAL) <= RARE), default=-1)
 
 
 def share(held: Sequence[bool]) -> str:
@@ -49,28 +125,32 @@ def by_draws(rows: Sequence[Row]) -> str:
 def intervals(rows: Sequence[Row]) -> str:
     """How many intervals hold the truth, and how many estimates are near it."""
     lines = [
-        "| observed | robots | 90 % intervals that hold the truth | identified parameters near it | by the draws |",
-        "|---|---|---|---|---|",
+        "| observed | robots | 90 % intervals that hold the truth | 95 % interval, over robots | identified parameters "
+        "near it | by the draws |",
+        "|---|---|---|---|---|---|",
     ]
     for observe in ("track", "cells"):
         some = [row for row in rows if row["what"] == "sim" and row["observe"] == observe]
         held = [inside for row in some for inside in row["held"].values()]
         near = [close for row in some for close in row["near"].values()]
-        lines.append(f"| `{observe}` | {len(some)} | {share(held)} | {share(near)} | {by_draws(some)} |")
+        lines.append(
+            f"| `{observe}` | {len(some)} | {share(held)} | {over_robots(some)} | {share(near)} | {by_draws(some)} |"
+        )
     return "\n".join(lines) + "\n"
 
 
 def kinds(rows: Sequence[Row]) -> str:
     """The same of calibrations of one kind of parameters."""
     lines = [
-        "| `calibrate` | robots | 90 % intervals that hold the truth | identified parameters near it |",
-        "|---|---|---|---|",
+        "| `calibrate` | robots | 90 % intervals that hold the truth | 95 % interval, over robots | identified "
+        "parameters near it |",
+        "|---|---|---|---|---|",
     ]
     for kind in ("motion", "contact", "sensors"):
         some = [row for row in rows if row["what"] == kind]
         held = [inside for row in some for inside in row["held"].values()]
         near = [close for row in some for close in row["near"].values()]
-        lines.append(f"| `{kind}` | {len(some)} | {share(held)} | {share(near)} |")
+        lines.append(f"| `{kind}` | {len(some)} | {share(held)} | {over_robots(some)} | {share(near)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -98,30 +178,70 @@ def flagged(rows: Sequence[Row], closing: Row) -> str:
     )
 
 
+def by_observation(rows: Sequence[Row]) -> dict[str, Sequence[Row]]:
+    """Return the calibrations of everything, by what they observe."""
+    return {
+        observe: [row for row in rows if row["what"] == "sim" and row["observe"] == observe]
+        for observe in ("track", "cells")
+    }
+
+
+def by_kind(rows: Sequence[Row]) -> dict[str, Sequence[Row]]:
+    """Return the calibrations of one kind of parameters, by kind."""
+    return {kind: [row for row in rows if row["what"] == kind] for kind in ("motion", "contact", "sensors")}
+
+
 def each(rows: Sequence[Row]) -> str:
     """A line for each parameter: robots whose interval holds it, that identify it, and that are near it."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
+    groups = by_observation(rows)
     head = ["parameter"]
-    ways = {}
-    for observe in ("track", "cells"):
-        ways[observe] = [row for row in rows if row["what"] == "sim" and row["observe"] == observe]
-        head += [f"{observe}: held, of {len(ways[observe])}", "identified", "near"]
-    writer.writerow(head)
-    for name in ways["track"][0]["held"]:
-        line = [name]
-        for some in ways.values():
+    for observe, some in groups.items():
+        head += [f"{observe}: held, of {len(some)}", "95 % interval", "identified", "near"]
+    held = {observe: held_by_name(some) for observe, some in groups.items()}
+    lines: list[list[object]] = [head]
+    for name in held["track"]:
+        line: list[object] = [name]
+        for observe, some in groups.items():
+            part = held[observe][name]
             near = [row["near"][name] for row in some if name in row["near"]]
-            line += [sum(row["held"][name] for row in some), len(near), sum(near)]
-        writer.writerow(line)
+            line += [part.count, bounds(part), len(near), sum(near)]
+        lines.append(line)
+    return _csv(lines)
+
+
+def each_of_kinds(rows: Sequence[Row]) -> str:
+    """The same of calibrations of one kind of parameters."""
+    lines: list[list[object]] = [["calibrate", "parameter", "robots", "held", "95 % interval"]]
+    lines += [
+        [kind, name, part.n, part.count, bounds(part)]
+        for kind, some in by_kind(rows).items()
+        for name, part in held_by_name(some).items()
+    ]
+    return _csv(lines)
+
+
+def _csv(lines: Sequence[Sequence[object]]) -> str:
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerows(lines)
     return file.getvalue()
+
+
+def measured() -> list[Row]:
+    """Return what `benchmarks/calibration.py` measured."""
+    return [json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]
 
 
 def rewrite(text: str) -> str:
     """A page with the tables of what was measured."""
-    rows = [json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]
+    rows = measured()
     closing = json.loads(CLOSING.read_text("utf-8"))
-    blocks = {"intervals": intervals(rows), "kinds": kinds(rows), "flagged": flagged(rows, closing)}
+    blocks = {
+        "intervals": intervals(rows),
+        "below": below(by_observation(rows), "observed"),
+        "kinds": kinds(rows),
+        "below_kinds": below(by_kind(rows), "`calibrate`"),
+        "flagged": flagged(rows, closing),
+    }
     return BLOCK.sub(lambda found: found[1] + blocks[found[2]] + found[3], text)
 
 
@@ -129,7 +249,8 @@ def main() -> None:
     """Write the tables."""
     for page in PAGES:
         page.write_text(rewrite(page.read_text("utf-8")), "utf-8")
-    EACH.write_text(each([json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]), "utf-8")
+    EACH.write_text(each(measured()), "utf-8")
+    EACH_OF_KINDS.write_text(each_of_kinds(measured()), "utf-8")
 
 
 if __name__ == "__main__":

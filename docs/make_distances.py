@@ -133,10 +133,21 @@ def coverage(study: ResultsFolder) -> str:
                 f"{each.a12:.2f} ({_span(each.a12_interval, '.2f')})",
                 f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
                 "" if each.detectable is None else f"{each.detectable:.3f}",
-                each.verdict.partition(";")[0],
+                each.difference_verdict.partition(";")[0],
+                "" if each.is_shown else each.equivalence,
             ]
-        rows.append([*row, *[""] * (8 - len(row))])
-    head = ["Condition", "n", "median", "mean less paper’s", "A12", "p (Holm)", "finds", "What may be said"]
+        rows.append([*row, *[""] * (9 - len(row))])
+    head = [
+        "Condition",
+        "n",
+        "median",
+        "mean less paper’s",
+        "A12",
+        "p (Holm)",
+        "finds",
+        "What may be said",
+        "Equivalence",
+    ]
     return _csv(head, rows)
 
 

@@ -4,7 +4,8 @@
 
 Carries out `realitygap run paper` and `realitygap run examples/constant-input.toml` in a temporary folder and writes
 docs/data/reproduced/*.csv and docs/images/reproduced/*.svg: those tables and figures of the paper's report that the
-page shows, where each value that the paper prints lies among our runs, and what the constant input does.
+page shows, where each value that the paper prints lies among our runs, and what the constant input does. The last also
+with more runs, and with the NEAT settings of an old neat-python.
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ import numpy as np
 import polars as pl
 
 from realitygap import ResultsFolder, run_study, write_report
-from realitygap.report import Interval, compare_conditions
+from realitygap.report import Interval, bca_interval, compare_conditions, holm
+from realitygap.report._comparisons import MARGIN, is_within, paired_values
+from realitygap.report._effects import difference_of_means
+from realitygap.report._tally import Tally, read_tally
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "reproduced"
@@ -39,6 +43,14 @@ WANTED_TABLES = (
 )
 WANTED_FIGURES = ("figure-4", "figure-5", "figure-6a", "figure-8", "figure-7")
 CELLS = 72
+NEAT_SETS = ("rosenzweig-remy", "rosenzweig-remy-neat-python")
+RUNS_OF_SETS = 1000
+INPUTS = {
+    "novelty only, as in the paper": ("with", "without"),
+    "neither search": ("without", "without"),
+    "both searches": ("with", "with"),
+}
+"""Which search has the constant input: endings of the names of the conditions of novelty and coverage."""
 
 
 def make(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
@@ -50,6 +62,7 @@ def make(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
         f"{name}.csv": (folder / "figures" / f"{name}.csv").read_text("utf-8") for name in WANTED_TABLES
     }
     tables |= {"published.csv": published(result.folder), "constant-input.csv": comparisons(inputs.folder)}
+    tables["neat-sets.csv"] = neat_sets({name: _with_settings(name, folder) for name in NEAT_SETS})
     figures = {
         f"{name}.svg": (folder / "figures" / f"{name}.svg").read_text("utf-8") for name in WANTED_FIGURES
     }
@@ -92,12 +105,57 @@ def comparisons(folder: ResultsFolder) -> str:
             _signed(each.difference),
             _span(each.difference_interval),
             f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
-            each.verdict,
+            each.difference_verdict,
+            "" if each.is_shown else each.equivalence,
         ]
         for each in compare_conditions(folder)
         if each.reason in ("selection", "baseline")
     ]
-    return _csv(["First", "Second", "n", "difference", "95 % interval", "p (Holm)", "What may be said"], rows)
+    head = [
+        "First",
+        "Second",
+        "n",
+        "difference",
+        "95 % interval",
+        "p (Holm)",
+        "What may be said",
+        "Equivalence",
+    ]
+    return _csv(head, rows)
+
+
+def _with_settings(name: str, folder: Path) -> Tally:
+    """Both searches with and without the constant input, by a named set of NEAT settings."""
+    file = folder / f"{name}.toml"
+    file.write_text(f'{INPUTS_STUDY.read_text("utf-8")}\n[neat]\nsettings = "{name}"\n', "utf-8")
+    return read_tally(run_study(file, folder / name, replicates=RUNS_OF_SETS).folder)
+
+
+def neat_sets(tallies: dict[str, Tally]) -> str:
+    """Novelty less coverage by NEAT settings, inputs and noise; p corrected over all rows."""
+    rows, chances = [], []
+    for settings, tally in tallies.items():
+        for inputs, (novelty, coverage) in INPUTS.items():
+            for level in (10, 50, 80):
+                pair = paired_values(tally, f"novelty-{level}-{novelty}", f"coverage-{level}-{coverage}")
+                interval = bca_interval(difference_of_means, pair.one, pair.other, paired=True)
+                within = pair.equivalence_interval()
+                difference = float((pair.one - pair.other).mean())
+                chances.append(pair.p())
+                row = [settings, inputs, f"{level} %", len(pair.one), _signed(difference), _span(interval)]
+                rows.append([*row, _span(within), "yes" if is_within(within) else "not shown"])
+    corrected = [f"{p:.2g}" if p >= 1e-4 else "< 0.0001" for p in holm(np.array(chances))]
+    lines = [[*row[:6], p, *row[6:]] for row, p in zip(rows, corrected, strict=True)]
+    head = [
+        "NEAT settings",
+        "constant input",
+        "noise",
+        "n",
+        "novelty less coverage",
+        "95 % interval",
+        "p (Holm)",
+    ]
+    return _csv([*head, "90 % interval", f"equivalent within ±{MARGIN:g}"], lines)
 
 
 def _signed(value: float) -> str:

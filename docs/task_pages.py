@@ -20,6 +20,7 @@ from realitygap.tasks import (
 TASK_STUDIES_DATA = Path(__file__).parent / "data" / "tasks.csv"
 MAZES_DATA = Path(__file__).parent / "data" / "mazes.csv"
 TASKS_DATA = Path(__file__).parent / "data" / "classical-tasks.csv"
+XOR_SIZES_DATA = Path(__file__).parent / "data" / "xor-sizes.csv"
 
 
 def task_parts() -> dict[str, str]:
@@ -27,6 +28,7 @@ def task_parts() -> dict[str, str]:
     return {
         "parts/classical-tasks.md": classical_tasks(),
         "parts/open-choices.md": open_choices(),
+        "parts/xor-sizes.md": xor_sizes(),
         "parts/ablations.md": ablations(),
         "parts/mazes.md": mazes(),
         "parts/tasks.md": task_studies(),
@@ -208,6 +210,38 @@ def open_choices() -> str:
             f"| {figure(row['median_evaluations'])} |"
         )
     return "\n".join(lines) + "\n"
+
+
+XOR_GROUPS = {
+    "one change": "one choice changed",
+    "together": "several changed together",
+    "counted": "nothing changed, another network counted",
+}
+
+
+def xor_sizes() -> str:
+    """Return evaluations and sizes of XOR's solvers under other readings of the paper, below the published ones."""
+    with XOR_SIZES_DATA.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    published = CLASSICAL_TASKS["xor"].published
+    lines = [
+        "| `stanley-2002` with | solved | mean evaluations (SE) | hidden nodes (SE) | connections (SE) |",
+        "|---|---|---|---|---|",
+        f"| **published** | {published['solved']} of {published['n']} | {published['mean_evaluations']:,} "
+        f"({published['sd_evaluations'] / published['n'] ** 0.5:,.0f}) "
+        f"| {published['mean_hidden']} ({1.11 / published['n'] ** 0.5:.2f}) | {published['mean_connections']} |",
+    ]
+    for group, title in XOR_GROUPS.items():
+        lines.append(f"| **{title}** | | | | |")
+        for row in rows:
+            if row["group"] == group:
+                cells = [row["name"], f"{row['solved']} of {row['runs']}"]
+                cells += [
+                    f"{figure(row[f'mean_{name}'], digits)} ({figure(row[f'se_{name}'], digits)})"
+                    for name, digits in (("evaluations", 0), ("hidden", 2), ("connections", 2))
+                ]
+                lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join([*lines, "", f"Seed {rows[0]['seed']}. SE: standard error of the mean."]) + "\n"
 
 
 def share_failed(solved: int, n: int) -> str:

@@ -141,13 +141,99 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
     assert {path.name for path in make_reproduced.FIGURES.iterdir()} == set(figures)
 
 
+def test_tables_on_the_page_of_closing_the_gap_follow_from_its_data():
+    make_closing = _load("make_closing")
+    for name, text in make_closing.texts(make_closing.stored_summary()).items():
+        assert (make_closing.TABLES / name).read_text("utf-8") == text, name
+
+
+def test_means_of_controllers_are_the_points_of_the_figure():
+    make_closing = _load("make_closing")
+    summary = make_closing.stored_summary()
+    svg = (make_closing.FIGURES / "scatter.svg").read_text("utf-8")
+    corners = re.findall(r'd="M (\S+) (\S+) L (\S+) \S+ L \S+ (\S+) L', svg)[
+        1:
+    ]  # of panels; the first is the figure
+    points = re.findall(r'<use x="(\S+)" y="(\S+)" style="[^"]*fill-opacity', svg)
+    assert (len(corners), len(points)) == (3, 3 * 40 * 30)
+    for k, observe in enumerate(("none", "cells", "track")):
+        left, bottom, right, top = map(float, corners[k])
+        x, y = np.array(points[1200 * k : 1200 * (k + 1)], float).T
+        source, target = make_closing.means_of(summary, observe)
+        # a hundredth of a point is 0.00005; a cell in one of 20 trials is 0.0007
+        assert np.abs((x - left) / (right - left) - source.ravel()).max() < 0.0001
+        assert np.abs((bottom - y) / (bottom - top) - target.ravel()).max() < 0.0001
+
+
+def test_levels_of_twins_are_those_of_the_means_of_controllers():
+    make_closing = _load("make_closing")
+    summary = make_closing.stored_summary()
+    for observe in ("none", "cells", "track"):
+        source, target = make_closing.means_of(summary, observe)
+        rows = [
+            twin if observe == "none" else make_closing._at_goal(twin, 20, observe)
+            for twin in summary["twins"]
+        ]
+        levels = [row["gap"]["level"] for row in rows]
+        assert np.abs((target - source).mean(axis=1) - levels).max() < 1e-6
+
+
+def test_last_of_the_earlier_runs_is_the_one_on_the_page():
+    make_closing = _load("make_closing")
+    goals = {goal["name"]: goal for goal in make_closing.stored_summary()["goals"]}
+    with (make_closing.TABLES / "earlier.csv").open(encoding="utf-8") as file:
+        *_, last = list(csv.reader(file))
+    for place, observe in ((3, "cells"), (5, "track")):
+        goal = goals[f"fall of the RMS gap, {observe}"]
+        assert last[place] == f"{100 * goal['figure']:.1f} %"
+        assert last[place + 1] == f"{100 * goal['low']:.1f} to {100 * goal['high']:.1f} %"
+
+
+def test_what_the_page_of_closing_the_gap_says_of_random_controllers_is_what_the_table_says():
+    make_closing = _load("make_closing")
+    with (make_closing.TABLES / "kinds.csv").open(encoding="utf-8") as file:
+        rows = {(row["controllers"], row["observed"]): row for row in csv.DictReader(file)}
+
+    def numbers(kind, observe, column):
+        return [
+            float(word) for word in re.findall(r"-?[\d.]+", rows[kind, observe][column].replace("−", "-"))
+        ]
+
+    assert (
+        numbers("champions", "cells", "RMS gap before")[0]
+        > 2 * numbers("random", "cells", "RMS gap before")[0]
+    )
+    low, high = numbers("random", "cells", "95 %, seeds and controllers")
+    assert low < 0 < high
+    for observe, goal in (("cells", 40), ("track", 60)):
+        low, high = numbers("random", observe, "95 %, seeds and controllers")
+        assert low < goal < high
+
+
 def test_tables_of_calibrations_are_of_what_was_measured():
     make_calibration = _load("make_calibration")
     for page in make_calibration.PAGES:
         text = page.read_text("utf-8")
         assert make_calibration.rewrite(text) == text
-    rows = [json.loads(line) for line in make_calibration.MEASURED.read_text("utf-8").splitlines()]
+    rows = make_calibration.measured()
     assert make_calibration.each(rows) == make_calibration.EACH.read_text("utf-8")
+    assert make_calibration.each_of_kinds(rows) == make_calibration.EACH_OF_KINDS.read_text("utf-8")
+
+
+def test_parameters_that_the_page_of_inference_calls_missed_are_those_held_too_seldom():
+    make_calibration = _load("make_calibration")
+    held = {
+        observe: make_calibration.held_by_name(rows)
+        for observe, rows in make_calibration.by_observation(make_calibration.measured()).items()
+    }
+    jitter = [part["drive.delay_jitter"] for part in held.values()]
+    assert (sum(part.count for part in jitter), sum(part.n for part in jitter)) == (33, 48)
+    seldom = {name for name, part in held["track"].items() if make_calibration.chance(part) <= 0.05}
+    assert seldom == {"drive.delay", "drive.delay_jitter", "drive.dead_band"}
+    assert {held["track"][name].count for name in seldom} == {18}
+    assert {name for name, part in held["cells"].items() if make_calibration.chance(part) <= 0.05} == {
+        "drive.delay_jitter"
+    }
 
 
 def test_the_picture_of_several_robots_is_drawn_by_its_page():
@@ -209,6 +295,31 @@ def test_what_the_page_of_the_paper_says_of_its_table_2_is_what_the_numbers_say(
     assert [
         row["The paper"] for row in objective if row["our runs at or below it: along the line"] == "0"
     ] == below_all
+    lowest = {row["The paper"]: int(row["our runs at or below it: ends of steps"]) for row in rows}
+    assert sorted(lowest[value] for value in below_all) == [2, 3, 3, 7]
+    lowest = {row["The paper"]: int(row["our runs at or below it: ends of steps"]) for row in objective}
+    assert sum(lowest[value] > 0 for value in below_all) == 3
+
+
+def test_what_the_page_of_the_paper_says_of_plateaus_is_what_the_numbers_say():
+    shares = {row["Condition"]: row for row in _rows("table-4")}
+    plateaus = {name: int(row["plateaus"].split()[0]) for name, row in shares.items()}
+    assert max(plateaus[f"coverage-{level}"] for level in (10, 50, 80)) == 29
+    assert [plateaus[f"novelty-{level}"] for level in (10, 50, 80)] == [32, 38, 43]
+    ends = [shares[f"novelty-{level}"]["plateaus: interval"].split()[0].split("–") for level in (10, 80)]
+    assert int(ends[1][0]) < int(ends[0][1])  # the intervals overlap
+
+
+def test_what_the_page_of_the_paper_says_of_neat_settings_is_what_the_numbers_say():
+    for row in _rows("neat-sets"):
+        difference = float(row["novelty less coverage"].replace("−", "-"))
+        if row["constant input"].startswith("novelty only"):
+            assert (difference > 0) == (row["NEAT settings"] == "rosenzweig-remy")
+            assert float(row["p (Holm)"].removeprefix("< ")) < 0.05
+        else:
+            assert row["equivalent within ±0.02"] == "yes"
+    equivalence = [row["Equivalence"] for row in _rows("constant-input")]
+    assert sum(text.startswith("equivalent") for text in equivalence) == 3
 
 
 def test_what_the_page_of_the_paper_says_of_the_constant_input_is_what_the_numbers_say():
@@ -349,9 +460,10 @@ def test_weights_on_the_page_of_distances_are_those_of_the_audit():
 def test_what_the_page_of_distances_says_is_what_the_numbers_say():
     _, coverage = _distance_rows("coverage")
     for name in ("paper-by-y", "ordered", "hamming", "edit", "coverage"):
-        assert coverage[name][-1].startswith("not shown"), name
+        assert coverage[name][-2] == "not shown", name
+        assert coverage[name][-1].startswith("equivalent within ±0.02"), name
     for name in ("jaccard", "alignment", "final", "random"):
-        assert coverage[name][-1] == f"paper above {name}"
+        assert coverage[name][-2:] == [f"paper above {name}", ""]
     assert _number(coverage["random"][1]) < min(
         _number(coverage[name][1]) for name in ("jaccard", "alignment")
     )

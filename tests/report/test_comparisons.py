@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from realitygap.report import compare_conditions, holm, sign_flip_p
-from realitygap.report._comparisons import p_in_words, signed
+from realitygap.report._comparisons import Samples, p_in_words, signed
 from tests.report.results import describe, random_runs, settings, write_results
 
 
@@ -113,6 +114,47 @@ def test_what_is_not_shown_says_what_would_be_found(out):
     assert not found.is_shown
     assert found.can_claim
     assert found.verdict.startswith(f"not shown; n finds {found.detectable:.3f} in 80 %")
+
+
+def _pair_with_differences(out, differences):
+    base = np.full(len(differences), 30)
+    folder = write_results(
+        out,
+        [_paired("a", noise=0.1), _paired("b", noise=0.5)],
+        {"a": _runs(base), "b": _runs(base + differences)},
+    )
+    (found,) = compare_conditions(folder)
+    return found
+
+
+def test_small_difference_is_equivalent_if_its_interval_lies_within_the_margin(out):
+    differences = np.array([1, -1, 2, -2, 0] * 8)
+    found = _pair_with_differences(out, differences)
+    reach = stats.t.ppf(0.95, 39) * differences.std(ddof=1) / 40**0.5 / 72
+    assert (found.equivalence_interval.low, found.equivalence_interval.high) == pytest.approx((-reach, reach))
+    assert found.is_equivalent
+    assert found.verdict.endswith("equivalent within ±0.02 (90 %: −0.005 to +0.005)")
+
+
+def test_difference_that_is_not_shown_is_not_called_equivalent_if_its_interval_is_wide(out):
+    found = _pair_with_differences(out, np.array([20, -20, 15, -15, 2] * 4))
+    assert not found.is_shown
+    assert found.is_equivalent is False
+    assert "; not shown equivalent within ±0.02 (90 %: " in found.verdict
+
+
+def test_few_runs_give_no_verdict_on_equivalence(out):
+    found = _pair_with_differences(out, np.array([1, -1, 0] * 3))
+    assert found.is_equivalent is None
+    assert "equivalent" not in found.verdict
+
+
+def test_unpaired_equivalence_interval_is_that_of_welch():
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(0.3, 0.02, 12), rng.normal(0.3, 0.05, 30)
+    found = Samples(one, other, paired=False).equivalence_interval()
+    expected = stats.ttest_ind(one, other, equal_var=False).confidence_interval(0.9)
+    assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
 
 
 def test_equal_runs_and_single_runs_are_no_accident(out):

@@ -75,6 +75,28 @@ def test_intervals_come_with_enough_runs(out):
     assert content["champions"]["problem"] == "its rows were not drawn with the key of its settings"
 
 
+@pytest.mark.parametrize(
+    ("cells", "verdict"),
+    [
+        ([1, -1, 2, -2, 0] * 4, "not shown to differ, and equivalent within ±0.02."),
+        ([20, -20, 15, -15, 2] * 4, "not shown to differ, nor to be equivalent within ±0.02."),
+    ],
+)
+def test_selection_sentence_gives_equivalence_beside_a_difference_that_is_not_shown(out, cells, verdict):
+    conditions = [
+        describe(name, settings=settings(selection=name, noise=0.1) | {"pair": True, "seed": 1})
+        for name in ("coverage", "novelty")
+    ]
+    runs = {
+        "coverage": [[[30 / 72, 0.0]] * 2 for _ in cells],
+        "novelty": [[[(30 + difference) / 72, 0.0]] * 2 for difference in cells],
+    }
+    (sentence,) = statistics_content(read_tally(write_results(out, conditions, runs)))["deception"][
+        "sentences"
+    ]
+    assert sentence.endswith(verdict)
+
+
 def test_studies_of_every_shape_have_the_section(out):
     for name, conditions, runs in (
         ("one", [describe("c")], {"c": random_runs(1, 1, 1)}),

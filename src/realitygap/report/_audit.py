@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import math
 import reprlib
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap.errors import TableError, whole_number
 from realitygap.report._effects import (
     POWER,
@@ -37,6 +39,7 @@ from realitygap.report._statistics import SMALLEST_N, median_interval
 COLUMNS = ("condition", "run", "value")
 _MOST_MISTAKES = 20
 _LONGEST_NUMBER = 40
+_LARGEST_EXPONENT = 400
 
 
 @dataclass(frozen=True)
@@ -318,7 +321,8 @@ def doubt(text: str, denominator: int) -> tuple[str, int] | None:
 
 def _read(path: Path) -> list[_Row]:
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        text = read_file(path, MOST_TABLE_BYTES).decode("utf-8-sig")
+        with io.StringIO(text, newline="") as file:
             reader = csv.reader(file, skipinitialspace=True, strict=True)
             lines = [(reader.line_num, line) for line in reader if any(cell.strip() for cell in line)]
     except UnicodeDecodeError as error:
@@ -382,6 +386,8 @@ def _problem(row: _Row) -> str:
         is_number = (
             len(row.text) <= _LONGEST_NUMBER and math.isfinite(float(row.text)) and "_" not in row.text
         )
+        # its fraction is computed exactly
+        is_number = is_number and abs(int(row.text.lower().partition("e")[2] or 0)) <= _LARGEST_EXPONENT
     except ValueError:
         is_number = False
     # float() takes a little more than Decimal() does

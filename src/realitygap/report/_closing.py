@@ -13,7 +13,7 @@ from realitygap.report._closing_figures import draw_closing
 from realitygap.report._drawing import NARROW, WIDE, inline
 
 PAGE_NAME = "report.html"
-GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "met")
+GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
 FAMILY_HEAD = (
     "family",
     "observed",
@@ -83,8 +83,8 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
 
 
 def goal_table(summary: Mapping[str, Any]) -> Table:
-    """A row a goal, in the columns of `GOAL_HEAD`."""
-    met = {True: "met", False: "missed", None: "–"}
+    """Return one row per goal, in the columns of `GOAL_HEAD`; a goal that the interval does not decide is open."""
+    verdicts = {True: "met", False: "missed", None: "open"}
     return [
         (
             goal["name"],
@@ -92,7 +92,7 @@ def goal_table(summary: Mapping[str, Any]) -> Table:
             _plain(goal, goal["figure"]),
             _span(goal, lambda value, goal=goal: _plain(goal, value)),
             _counted(goal),
-            met[goal["met"]],
+            verdicts[goal["met"]] if goal["n"] else "–",
         )
         for goal in summary["goals"]
     ]

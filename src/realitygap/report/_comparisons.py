@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from realitygap import _special as special
 from realitygap.records import ResultsFolder
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
@@ -38,6 +39,10 @@ from realitygap.report._statistics import CONFIDENCE
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 
 _MOST_RUNS_NAMED = 100_000
+
+MARGIN = 0.02
+"""Difference of mean coverage up to which conditions count as equivalent: 1.4 of the paper's 72 cells, and about half
+of the smallest effect of the constant input."""
 
 Reason = Literal["noise", "selection", "baseline"]
 """Why two conditions are compared: they differ in nothing else, or one names the other as its baseline."""
@@ -67,6 +72,8 @@ class Comparison:
             of comparisons; None without spread.
         runs_for_difference: runs with which the observed difference would be found so often; None above a
             million.
+        equivalence_interval: its 90 % interval by t, which lies within `MARGIN` if the conditions are equivalent (two
+            one-sided tests at 5 %); None with fewer than 10 runs.
     """
 
     one: str
@@ -86,6 +93,7 @@ class Comparison:
     runs_for_a_claim: int
     detectable: float | None
     runs_for_difference: int | None
+    equivalence_interval: Interval | None
 
     @property
     def can_claim(self) -> bool:
@@ -99,7 +107,28 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """What may be said, in words."""
+        """The conclusion on the difference and, if none is shown, on equivalence, in words."""
+        if self.equivalence and not self.is_shown and self.can_claim:
+            return f"{self.difference_verdict}; {self.equivalence}"
+        return self.difference_verdict
+
+    @property
+    def is_equivalent(self) -> bool | None:
+        """Whether equivalence within `MARGIN` is shown; None if there are too few runs."""
+        interval = self.equivalence_interval
+        return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
+
+    @property
+    def equivalence(self) -> str:
+        """Whether equivalence is shown, in words, with the margin; empty if there are too few runs."""
+        if self.equivalence_interval is None:
+            return ""
+        shown = "equivalent" if self.is_equivalent else "not shown equivalent"
+        return f"{shown} within ±{MARGIN:g} (90 %: {span(self.equivalence_interval, signs=True)})"
+
+    @property
+    def difference_verdict(self) -> str:
+        """The conclusion on the difference, in words."""
         if not self.can_claim:
             return (
                 f"no claim possible: with n = {min(self.n, self.n_other)} corrected p cannot be below "
@@ -115,6 +144,11 @@ class Comparison:
             f"{runs:,}" if runs is not None and runs <= _MOST_RUNS_NAMED else f"over {_MOST_RUNS_NAMED:,}"
         )
         return f"not shown; n finds {self.detectable:.3f} in 80 %, this difference takes {needed} runs"
+
+
+def is_within(interval: Interval | None) -> bool | None:
+    """Return whether an interval of a difference lies within `MARGIN`; None without one."""
+    return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
 
 
 def compare_conditions(folder: ResultsFolder | str | Path) -> list[Comparison]:
@@ -182,6 +216,21 @@ class Samples:
         n, m = len(self.one), len(self.other)
         pooled = ((n - 1) * self.one.var(ddof=1) + (m - 1) * self.other.var(ddof=1)) / (n + m - 2)
         return math.sqrt(float(pooled))
+
+    def equivalence_interval(self) -> Interval | None:
+        """The 90 % interval of the difference by t, for two one-sided tests at 5 %; None with fewer than 10 runs.
+
+        Source: Schuirmann (1987), Journal of Pharmacokinetics and Biopharmaceutics 15(6); unpaired, Welch (1947).
+        """
+        if min(len(self.one), len(self.other)) < BCA_SMALLEST_N:
+            return None
+        groups = [self.one - self.other] if self.paired else [self.one, self.other]
+        parts = np.array([group.var(ddof=1) / len(group) for group in groups])
+        shares = parts / parts.sum() if parts.any() else parts
+        freedom = 1 / max(sum(shares**2 / [len(group) - 1 for group in groups]), 1e-9)
+        reach = float(special.stdtrit(freedom, 1 - ALPHA)) * math.sqrt(parts.sum())
+        difference = float(self.one.mean() - self.other.mean())
+        return Interval(difference - reach, difference + reach, "t")
 
 
 def paired_values(tally: Tally, one: str, other: str) -> Samples:
@@ -290,6 +339,7 @@ def _comparison(
         runs_for_difference=runs_needed(difference / spread, paired=paired, alpha=alpha)
         if has_spread
         else None,
+        equivalence_interval=samples.equivalence_interval(),
     )
 
 
@@ -369,6 +419,11 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
         notes.append(
             f"A dash: no interval. Below n = {BCA_SMALLEST_N} resamples of so few runs vary too little, and "
             "where all resamples are alike there is nothing to go by."
+        )
+    if any(each.can_claim and not each.is_shown and each.equivalence for each in comparisons):
+        notes.append(
+            f"Equivalent: the 90 % interval of the difference by t lies within ±{MARGIN:g}. This is two one-sided "
+            "tests at 5 %, not corrected. A difference that is not shown does not prove equivalence."
         )
     if any(each.a12_interval and each.a12_interval.method == "Newcombe" for each in comparisons):
         notes.append("Marked *: Newcombe’s interval, which needs no resampling.")

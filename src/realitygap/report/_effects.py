@@ -44,12 +44,12 @@ class Interval:
     Attributes:
         low: lower bound, in the unit of the effect.
         high: upper bound.
-        method: `BCa`, a bootstrap; `Newcombe`, by formula.
+        method: `BCa`, a bootstrap; `Newcombe` and `t`, by formula.
     """
 
     low: float
     high: float
-    method: Literal["BCa", "Newcombe"]
+    method: Literal["BCa", "Newcombe", "t"]
 
 
 def a12(one: Values, other: Values) -> float:

@@ -76,22 +76,24 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
     for figure in sorted(_figures(list(content.values())), key=_number):
         name = _slug(figure.title)
         for ending in (".svg", ".pdf"):
-            write_whole(folder / (name + ending), drawing_bytes(figure.drawing, ending, figure.title))
+            write_whole(
+                folder / (name + ending), drawing_bytes(figure.drawing, ending, figure.title), within=folder
+            )
         figures.append(name)
         notes.append(f"{name}.svg, {name}.pdf\n    {figure.title}. {figure.drawing.caption}")
     tables = []
     for name, caption, rows in tables_of(page):
-        write_whole(folder / f"{name}.csv", _csv(rows))
+        write_whole(folder / f"{name}.csv", _csv(rows), within=folder)
         tables.append(f"{name}.csv")
         notes.append(f"{name}.csv\n    {caption}")
     data = []
     for name, caption, frame in _frames(tally, content):
-        write_whole(folder / f"{name}.csv", frame.write_csv().encode("utf-8"))
+        write_whole(folder / f"{name}.csv", frame.write_csv().encode("utf-8"), within=folder)
         data.append(f"{name}.csv")
         notes.append(f"{name}.csv\n    {caption}")
     about = f"Figures and tables of {content['title']}, digest {content['digest']}, realitygap {content['version']}."
     text = "\n\n".join([about, *notes]) + "\n"
-    write_whole(folder / _NOTES, text.encode("utf-8", "replace"))
+    write_whole(folder / _NOTES, text.encode("utf-8", "replace"), within=folder)
     return Exported(folder, tuple(figures), tuple(tables), tuple(data))
 
 

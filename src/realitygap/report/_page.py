@@ -22,6 +22,7 @@ from realitygap.records import (
     ResultsFolder,
     column_table,
     is_special,
+    refuse_links,
     refuse_results,
     write_whole,
 )
@@ -99,6 +100,9 @@ def write_report(
     """
     if out is not None:
         _check_out(Path(out))
+    else:
+        folder_path = folder.path if isinstance(folder, ResultsFolder) else Path(folder)
+        refuse_links(folder_path, folder_path / REPORT_NAME)
     with warnings.catch_warnings(), _uncollected():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
@@ -108,8 +112,9 @@ def write_report(
         if figures is not None:
             content["exported"] = export_page(Path(figures), tally, content, page)
             page = _render(content)
+    within = tally.folder.path if out is None else None
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
-    write_whole(path, page.encode("utf-8", "replace"))
+    write_whole(path, page.encode("utf-8", "replace"), within=within)
     return path
 
 

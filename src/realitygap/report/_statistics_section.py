@@ -13,6 +13,7 @@ import polars as pl
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_tally
 from realitygap.report._comparisons import (
     INTERVAL_NAME,
+    MARGIN,
     Comparison,
     compare_tally,
     comparisons_content,
@@ -142,7 +143,12 @@ def _apart(
     if comparison.is_shown:
         where = "above" if difference > 0 else "below"
         return f"{words[0]} {where} {words[1]} by {abs(difference):.3f}{within}"
-    why = "not shown to differ" if comparison.can_claim else "too few runs for a claim"
+    if not comparison.can_claim:
+        why = "too few runs for a claim"
+    elif comparison.is_equivalent:
+        why = f"not shown to differ, and equivalent within ±{MARGIN:g}"
+    else:
+        why = f"not shown to differ, nor to be equivalent within ±{MARGIN:g}"
     return f"{words[0]} less {words[1]} {signed(difference)}{within}, {why}"
 
 

@@ -40,6 +40,14 @@ def _ctrl_c_is_heard() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _no_file_is_allowed_yet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the answers of this machine's user out of the tests, and theirs out of this machine."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("REALITYGAP_STATE", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
 def twin_processes() -> list[int]:
     """Processes in which a twin lives, children of this one; none are found where there is no /proc."""
     listed = Path("/proc/self/task").glob("*/children")

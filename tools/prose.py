@@ -1,0 +1,161 @@
+"""Count what the editorial rules forbid in the project's prose, and fail if a file got worse.
+
+The check reads Markdown, the first lines of docstrings, and help texts. It counts listed words, openings that
+invert a sentence, sentences over 30 words, long summaries of commands, and option helps that do not begin with
+the thing. A baseline holds the present count of each file; a new file starts at 0.
+
+    python tools/prose.py            compare with the baseline
+    python tools/prose.py --update   lower the baseline to the present counts; counts that rose stay refused
+    python tools/prose.py FILE ...   print every finding in these files
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+BASELINE = ROOT / "tools" / "prose.json"
+LONGEST_SENTENCE = 30  # words
+LONGEST_SUMMARY = 58  # characters: the list of commands shows whole lines in 80 columns
+
+OPENING = re.compile(r"^(Of|Where|Whoever|Whose|That which|What|By|Nor|In place of|How)\b")
+WORDS = re.compile(
+    r"\b("
+    r"carr(y|ies|ied|ying) out|go(es)? on\b(?! (to|the))|anew|what it takes|in all\b(?! )|what is there"
+    r"|somebody|whoever|is said|are said|be said|is told|are told|of its own|of your own|of their own"
+    r"|comes? of|comes? apart|how far apart|looked at|held to|not told|not seen|so many|so few"
+    r"|beside\b(?! the point)|stands? (beside|in|there)|says of itself|attendants?|onlookers?"
+    r"|where there (is|are) none|mend(s|ed|ing)?|what was seen|at once"
+    r")\b",
+    re.IGNORECASE,
+)
+BAD_HELP = re.compile(r"^(Of|By|Where|What|Whether|Who|To|In|For|How|Also|Not|With|At)\b")
+
+
+@dataclass(frozen=True)
+class Text:
+    """A piece of prose: what kind it is, the line that it begins at, and its words."""
+
+    kind: str
+    line: int
+    words: str
+
+
+def main() -> int:
+    """Compare the counts of all files with the baseline; return the exit status."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("files", nargs="*", type=Path, help="Files whose findings to print.")
+    parser.add_argument("--update", action="store_true", help="Lower the baseline where a count fell.")
+    options = parser.parse_args()
+    if options.files:
+        for path in options.files:
+            for line, finding in findings(path.resolve()):
+                print(f"{path}:{line}: {finding}")
+        return 0
+    counts = {name: n for name in tracked() if (n := sum(1 for _ in findings(ROOT / name)))}
+    baseline = json.loads(BASELINE.read_text("utf-8")) if BASELINE.exists() else counts
+    worse = [name for name, n in counts.items() if n > baseline.get(name, 0)]
+    for name in worse:
+        print(
+            f"{name}: {counts[name]} findings, {baseline.get(name, 0)} allowed. See: python tools/prose.py {name}"
+        )
+    if options.update or not BASELINE.exists():
+        kept = {name: min(n, baseline.get(name, 0)) for name, n in counts.items() if baseline.get(name, 0)}
+        BASELINE.write_text(json.dumps(kept, indent=0, sort_keys=True) + "\n", "utf-8")
+    print(f"{sum(counts.values())} findings in {len(counts)} files; {len(worse)} files got worse.")
+    return 1 if worse else 0
+
+
+def tracked() -> list[str]:
+    """Return the names of the files that hold prose."""
+    listed = subprocess.run(
+        ["git", "ls-files", "*.md", "src/*.py"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
+
+
+def findings(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the line and a description of each finding in a file."""
+    source = path.read_text("utf-8")
+    texts = markdown(source) if path.suffix == ".md" else python(source, in_cli="cli" in path.parts)
+    for text in texts:
+        if text.kind == "summary" and len(text.words) > LONGEST_SUMMARY:
+            yield (
+                text.line,
+                f"summary of {len(text.words)} characters, at most {LONGEST_SUMMARY}: {text.words}",
+            )
+        if text.kind == "help" and (match := BAD_HELP.match(text.words)):
+            yield text.line, f"help begins with '{match[0]}': {text.words[:60]}"
+        for sentence in sentences(text.words):
+            if text.kind != "help" and (match := OPENING.match(sentence)) and not sentence.endswith("?"):
+                yield text.line, f"begins with '{match[0]}': {sentence[:60]}"
+            if match := WORDS.search(sentence):
+                yield text.line, f"'{match[0]}': {sentence[:60]}"
+            if (n := len(sentence.split())) > LONGEST_SENTENCE:
+                yield text.line, f"{n} words: {sentence[:60]}"
+
+
+def sentences(text: str) -> list[str]:
+    """Split prose into sentences, without code."""
+    plain = re.sub(r"`[^`]*`", "CODE", " ".join(text.split()))
+    plain = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", plain)
+    return [part for part in re.split(r"(?<=[.!?])\s+(?=[A-Z])", plain) if part]
+
+
+def markdown(source: str) -> Iterator[Text]:
+    """Yield the paragraphs and list items of a page, without code, tables, directives and switched-off parts."""
+    source = re.sub(
+        r"<!-- prose: off -->.*?(<!-- prose: on -->|\Z)|<!--.*?-->|^(```+|~~~+|:::+).*?^\2\s*$",
+        lambda match: "\n" * match[0].count("\n"),
+        source,
+        flags=re.DOTALL | re.MULTILINE,
+    )
+    paragraph: list[str] = []
+    start = 0
+    for number, line in enumerate([*source.splitlines(), ""], 1):
+        bare = line.strip()
+        is_item = re.match(r"([*+-]|\d+\.)\s", bare) is not None
+        is_prose = bare and not bare.startswith(("|", "#", ">", "(")) and not re.match(r"(\t| {4})\S", line)
+        if paragraph and (not is_prose or is_item):
+            yield Text("text", start, " ".join(paragraph))
+            paragraph = []
+        if is_prose:
+            start = start if paragraph else number
+            paragraph.append(re.sub(r"^([*+-]|\d+\.)\s+", "", bare))
+
+
+def python(source: str, *, in_cli: bool) -> Iterator[Text]:
+    """Yield first lines of docstrings, and the values of `help=` and `description=`."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            if text:
+                is_command = in_cli and "Example: realitygap" in text and isinstance(node, ast.FunctionDef)
+                yield Text(
+                    "summary" if is_command else "docstring", node.body[0].lineno, text.split("\n\n")[0]
+                )
+                for paragraph in text.split("\n\n")[1:] if is_command else ():
+                    if not paragraph.startswith(("Example:", "In Python:")):
+                        yield Text("text", node.body[0].lineno, paragraph)
+        elif isinstance(node, ast.keyword) and node.arg in ("help", "description"):
+            words = "".join(
+                part.value
+                for part in ast.walk(node.value)
+                if isinstance(part, ast.Constant) and isinstance(part.value, str)
+            )
+            if words:
+                yield Text("help", node.value.lineno, words)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -174,6 +174,16 @@ def test_networks_driven_through_a_twin_are_its_trials(twin):
     envs.close()
 
 
+def test_closed_environment_of_a_twin_starts_again_as_others_do(twin):
+    """The checker of stable-baselines3 closes an environment after its picture, and goes on with it."""
+    env = gymnasium.make(COVERAGE, platform=twin)
+    first, _ = env.reset(seed=1)
+    env.close()
+    again, _ = env.reset(seed=1)
+    assert again.tolist() == first.tolist()
+    env.close()
+
+
 def test_network_driven_through_a_maze_is_its_path():
     arena = ArenaSettings(preset="maze-medium").arena()
     genome = networks(10, activation="tanh", activation_slope=2.45)[0]

@@ -42,6 +42,10 @@ class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
 
 
+class ControllerError(RealityGapError, ValueError):
+    """A controller does not say what its inputs are, or a platform does not have them."""
+
+
 class DescriptionError(RealityGapError, ValueError):
     """The file of a robot or an arena cannot be used as written, or there is none of that name."""
 

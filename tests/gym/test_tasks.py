@@ -221,7 +221,7 @@ def test_defaults_are_those_of_the_study_of_the_task(kind):
         (
             {"kind": "avoid", "platform": "jyro", "task": {"inputs": ["range.0"]}},
             ValueError,
-            "Choose platform 'sim'",
+            "Choose another platform",
         ),
         ({"kind": "light", "platform": "jyro", "arena": {"preset": "paper"}}, TaskError, "wants a light"),
         ({"kind": "goal", "arena": {"preset": "avoid"}}, ValueError, "goal"),

@@ -22,7 +22,7 @@ from realitygap.world import Distribution
         ({"noise": 0.3, "sim": {"set": {"range.0.noise_uniform": 0.1}}}, "Leave one of them out"),
         (
             {"arena": {"preset": "goal"}, "task": {"kind": "goal", "inputs": ["goal_sector.4"]}},
-            "there are goal_sector.0 to .3",
+            "goal_sector.4 is missing",
         ),
         ({"platform": "jyro", "task": {"kind": "avoid"}}, "Choose platform 'sim'"),
     ],

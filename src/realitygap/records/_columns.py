@@ -234,9 +234,10 @@ def _check_ranges(frame: pl.DataFrame) -> None:
         if name in frame.columns and not frame[name].drop_nulls().is_between(0.0, 1.0).all():
             raise ValueError(f"Column {name!r} holds a value that is not from 0 to 1.")
     if {"parents", "individual"} <= set(frame.columns) and not frame.is_empty():
-        last, largest = frame["parents"].list.max().max(), frame["individual"].max()
-        if last is not None and last > largest:  # type: ignore[operator]
-            raise ValueError(f"Column 'parents' holds individual {last}, expected at most {largest}.")
+        n = len(frame["individual"].unique())
+        last = frame["parents"].explode().drop_nulls().to_numpy().max(initial=0)
+        if last >= n:
+            raise ValueError(f"Column 'parents' holds individual {last}, expected at most {n - 1}.")
 
 
 def _check_order(frame: pl.DataFrame, first: int) -> int:

@@ -8,7 +8,7 @@ from functools import partial
 
 from realitygap.errors import ControllerError
 
-PAPER_INPUTS = ("obstacle", "stall", "time")
+PAPER_INPUTS: tuple[str, ...] = ("obstacle", "stall", "time")
 OUTPUTS = ("move", "turn")
 CONSTANT = "bias"
 

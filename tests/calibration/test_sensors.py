@@ -57,6 +57,7 @@ def drawn(scales, rng) -> dict[str, float]:
     return {scale.name: float(scale.of(rng.random())) for scale in scales}
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_numbers_of_pulse_sensors_as_often_as_they_say():
     hits = []
     for run in range(10):
@@ -95,6 +96,7 @@ def test_a_mixture_is_recovered_from_its_readings():
     assert all(len(values) == 500 for values in fit.draws.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "scales", "make"),
     [("scribbler-s2-fluke2", PULSES, "pulses"), ("scribbler-s2-fluke1", MIXTURE, "mixture")],

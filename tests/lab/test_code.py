@@ -14,24 +14,9 @@ from realitygap.lab import _check_work, _lab, _study_work
 from realitygap.lab._checks import Checks
 from realitygap.lab._lab import Lab
 from realitygap.tasks import _python
+from tests.python_tasks import marking_source, study_text
 
-STUDY = """
-[study]
-name = "mine"
-replicates = 1
-[neat]
-settings = "rosenzweig-remy"
-population = 2
-generations = 1
-[platform.sim]
-steps = 3
-[task]
-kind = "python:task.py:far"
-inputs = ["obstacle", "stall", "time"]
-[[condition]]
-name = "far"
-platform = "sim"
-"""
+STUDY = study_text()
 REFUSED = "start the lab with: realitygap lab --allow-code"
 
 
@@ -43,8 +28,7 @@ class SilentChannel:
 
 @pytest.fixture
 def root(tmp_path) -> Path:
-    source = f"open({str(tmp_path / 'marker')!r}, 'w').close()\ndef far(t): return t.poses[:, -1, 0]\n"
-    (tmp_path / "task.py").write_text(source)
+    (tmp_path / "task.py").write_text(marking_source(tmp_path / "marker"))
     return tmp_path.resolve()
 
 

@@ -112,6 +112,7 @@ def _kill(child: subprocess.Popen[bytes]) -> None:
     child.stdout.close()
 
 
+@pytest.mark.slow
 def test_writers_killed_at_any_time_leave_whole_chunks_and_a_free_lock(tmp_path):
     folder = make_folder(tmp_path / "r", 0)
     done = 0
@@ -159,6 +160,7 @@ def test_a_full_disk_is_told_and_loses_nothing(tmp_path):
     _check([*inside, *_child(_FILL, str(disk), "0")])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limits on file sizes")
 def test_a_limit_on_the_size_of_files_is_told_and_loses_nothing(tmp_path):
     _limited(tmp_path)

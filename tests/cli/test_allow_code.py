@@ -167,6 +167,7 @@ def test_a_task_file_is_looked_for_beside_the_study_file_alone(study, monkeypatc
     assert load_study(moved).conditions[0].task.kind == "python:task.py:far"
 
 
+@pytest.mark.slow
 def test_run_asks_at_a_real_terminal(study):
     ours, theirs = pty.openpty()
     command = [sys.executable, "-m", "realitygap", "run", str(study), "--out", str(study.parent / "out")]

@@ -167,6 +167,7 @@ def test_what_stands_in_an_arena_is_shown(name):
     assert not same or (np.abs(shown - bare).max(axis=2) > 30).sum() > 20
 
 
+@pytest.mark.slow
 def test_an_mp4_plays_as_long_as_the_trial(tmp_path):
     path = save_movie(turning(4), tmp_path / "a.mp4", width=241, speed=2.0)
     ffmpeg = _movie.find_ffmpeg()

@@ -144,6 +144,7 @@ def test_a_writer_killed_between_writing_and_renaming_leaves_a_file_that_the_nex
     assert folder.read().equals(make_rows(n=5))
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_loses_nothing(tmp_path):
     """A file system of 1 MB where one can be mounted, else a limit on the size of files in its place."""
     disk = tmp_path / "disk"

@@ -64,6 +64,27 @@ def states(ledger):
     return [(trial.individual, trial.attempt, trial.state) for trial in ledger.trials()]
 
 
+@pytest.mark.parametrize("verdict", ["void", "driven"])
+def test_an_interrupted_trial_keeps_its_steps_and_is_settled(ledger, verdict):
+    ledger.start(1, sit(ledger))
+    ledger.interrupt(1, "aborted", [STEP], stalls=1, problem="no answer")
+    trial = ledger.trial(1)
+    assert (trial.state, trial.end, trial.n_steps) == ("running", "aborted", 1)
+    assert ledger.steps(1) == [STEP]
+    assert ledger.events()[-1]["what"] == "interrupted"
+    assert ledger.events()[-1]["details"] == {"end": "aborted", "problem": "no answer"}
+    ledger.settle(1, verdict, "it stood at the wall")
+    assert ledger.trial(1).state == verdict
+    assert ((0, 1, "planned") in states(ledger)) == (verdict == "void")
+    assert "it stood at the wall" in str(ledger.events())
+
+
+def test_undoing_a_score_is_an_event(ledger):
+    drive(ledger, 1)
+    ledger.undo(1)
+    assert (ledger.trial(1).state, ledger.events()[-1]["what"]) == ("driven", "undone")
+
+
 def test_a_trial_goes_from_planned_to_scored(ledger):
     number = ledger.trials()[0].trial
     ledger.start(number, sit(ledger))

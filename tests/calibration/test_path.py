@@ -49,6 +49,7 @@ def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) 
     return replace(trial, end_pose=end)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seen", ["track", "ruler"])
 def test_intervals_cover_gains_and_track_as_often_as_they_say(seen):
     rng = np.random.default_rng(17)

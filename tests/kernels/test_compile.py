@@ -31,6 +31,7 @@ def value_and_cache(done: subprocess.CompletedProcess) -> tuple[float, tuple[int
     return float(first), tuple(int(word) for word in second.split())
 
 
+@pytest.mark.slow
 def test_the_second_start_loads_what_the_first_compiled(tmp_path):
     first = value_and_cache(start(tmp_path))
     assert first == (first[0], (0, 1))
@@ -111,6 +112,7 @@ def test_a_relative_folder_for_caches_is_none(folder, monkeypatch):
     assert _cache.cache_root() == Path.home() / ".cache" / "realitygap"
 
 
+@pytest.mark.slow
 def test_another_source_means_another_folder(tmp_path):
     start(tmp_path)
     (folder,) = tmp_path.iterdir()

@@ -56,6 +56,7 @@ def test_check_refuses_a_python_task_unless_the_lab_may_run_code(root):
     assert not (root / "marker").exists()  # a check runs none
 
 
+@pytest.mark.slow
 def test_lab_passes_its_permission_to_its_processes(root, orders):
     lab = Lab(root, allow_code=True)
     assert lab.checks._allow_code
@@ -68,6 +69,7 @@ def test_lab_passes_its_permission_to_its_processes(root, orders):
     assert [order["allow_code"] for order in orders] == [True, True, False]
 
 
+@pytest.mark.slow
 def test_a_study_goes_on_only_with_permission_and_its_file(root):
     with pytest.raises(StudyError, match=REFUSED):
         work(root, text=STUDY)

@@ -31,6 +31,7 @@ SMALL = {"population": 4, "generations": 2}
 compiled_only = pytest.mark.skipif(not COMPILED, reason="takes minutes as plain Python")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", CLASSICAL_TASKS)
 def test_figures_have_their_keys_and_the_published_ones_beside(task: str) -> None:
     told: list[Progress] = []
@@ -126,6 +127,7 @@ def test_counts_and_seeds_that_cannot_be_are_refused(
         measure_task("xor", **{name: number})  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @compiled_only
 @pytest.mark.parametrize(
     ("task", "settings", "seeds", "lost", "low", "high"),

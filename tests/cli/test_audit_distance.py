@@ -16,7 +16,6 @@ from tests.cli.test_commands import one_message, realitygap
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.slow
 def test_the_papers_distance_has_both_biases_and_is_drawn(tmp_path):
     done = CliRunner().invoke(app, ["audit-distance", "paper", "-o", str(tmp_path / "paper.png")])
     assert done.exit_code == 0, done.output

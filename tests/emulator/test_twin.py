@@ -154,7 +154,6 @@ def wander(robot, seed):
         robot.drive(Command(-0.3, 0.9 if step // 10 % 2 else -0.9) if near else Command(1.0, turn))
 
 
-@pytest.mark.slow
 def test_coverage_with_the_real_driver_agrees_with_the_twin_alone():
     """Each mean of 8 trials has a standard error of about 2 cells: chance alone fails this once in 10,000 draws."""
     model = sample_twin("close", 2)

@@ -60,7 +60,6 @@ def test_what_cannot_be_is_told_before_anything_is_served(tmp_path: Path):
         open_lab(tmp_path, port=0, show=False)
 
 
-@pytest.mark.slow
 def test_it_answers_at_the_address_that_it_tells_and_ends_with_ctrl_c(tmp_path: Path):
     command = [*COMMAND, str(tmp_path), "--port", "0", "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as lab:

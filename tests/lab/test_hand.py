@@ -37,7 +37,6 @@ def x(hand: Hand) -> float:
     return float(hand.senses["pose"][0])
 
 
-@pytest.mark.slow
 def test_a_word_moves_the_robot_and_silence_stops_it(hand):
     began = x(hand)
     hand.drive(1.0, 0.0, 0)
@@ -49,7 +48,6 @@ def test_a_word_moves_the_robot_and_silence_stops_it(hand):
     assert x(hand) == pytest.approx(stood, abs=1e-3)
 
 
-@pytest.mark.slow
 def test_stop_is_heard_while_it_drives(hand):
     hand.drive(1.0, 0.0, 0)
     wait_for(lambda: hand.senses["moves"])
@@ -57,7 +55,6 @@ def test_stop_is_heard_while_it_drives(hand):
     wait_for(lambda: not hand.senses["moves"])
 
 
-@pytest.mark.slow
 def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
     hand.drive(1.0, 0.0, 0)
     wait_for(lambda: hand.senses["moves"])
@@ -79,7 +76,6 @@ def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
     wait_for(lambda: hand.senses["moves"])
 
 
-@pytest.mark.slow
 def test_a_press_that_began_before_a_stop_and_whose_first_word_comes_after_it_drives_nowhere(hand):
     began = x(hand)
     hand.stop()
@@ -88,7 +84,6 @@ def test_a_press_that_began_before_a_stop_and_whose_first_word_comes_after_it_dr
     assert x(hand) == pytest.approx(began, abs=1e-6)
 
 
-@pytest.mark.slow
 def test_what_is_no_number_drives_nowhere(hand):
     hand.drive("fast", float("nan"), 0)  # type: ignore[arg-type]
     hand.drive([], {}, 0)  # type: ignore[arg-type]
@@ -105,7 +100,6 @@ def test_a_robot_that_is_not_there_is_told_in_words(tmp_path):
     assert "/dev/no-such-port" in str(hand.outcome)
 
 
-@pytest.mark.slow
 def test_its_process_ends_with_the_lab(hand):
     hand._child._process.stdin.close()  # as when the lab is killed
     wait_for(lambda: hand.is_over)

@@ -15,7 +15,6 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.slow
 def test_pages_that_watch_hear_and_are_answered():
     command = [
         sys.executable,

@@ -46,7 +46,6 @@ def audits():
     return {name: audit_distance(name, n_walks=150, n_pairs=800) for name in DISTANCES}
 
 
-@pytest.mark.slow
 def test_low_numbered_cells_weigh_most_in_the_papers_distance_alone(audits):
     """Its authors' own finding (section 4); three standard errors are far from the other side of each bound."""
     paper = audits["paper"]

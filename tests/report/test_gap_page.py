@@ -30,7 +30,6 @@ def gap():
     return GapBetween(found.study, WHY)
 
 
-@pytest.mark.slow
 def test_the_page_has_verdict_measures_figures_and_no_address(gap, tmp_path):
     path = write_gap_report(gap, tmp_path / "gap.html")
     page = path.read_text("utf-8")

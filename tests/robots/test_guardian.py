@@ -282,7 +282,6 @@ def test_guardian_that_is_killed_while_the_robot_stands_is_replaced_without_a_wo
         robot.observe()
 
 
-@pytest.mark.slow
 def test_ctrl_c_for_the_whole_group_lets_the_program_stop_its_robot():
     with serve_pty(Emulator("s2", "1")) as server:
         with program(DRIVE + LOOP, server.name) as (process, guardian):

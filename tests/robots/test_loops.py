@@ -52,7 +52,6 @@ def test_a_loop_of_senses_and_motors_is_one_write_a_command():
         assert port.n_writes - before == 5  # three obstacle sensors, stall and motors, a write each
 
 
-@pytest.mark.slow
 def test_the_benchmark_measures_every_set_up_with_every_peer(monkeypatch):
     path = Path(__file__).parents[2] / "benchmarks" / "robot_loops.py"
     spec = importlib.util.spec_from_file_location("robot_loops", path)

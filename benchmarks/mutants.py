@@ -156,7 +156,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("modules", nargs="*", default=list(MODULES), metavar="MODULE")
-    parser.add_argument("--most", type=int, default=40, help="Mutants per module, drawn at random.")
+    parser.add_argument("--most", type=int, default=25, help="Mutants per module, drawn at random.")
     parser.add_argument("--seed", type=int, default=1, help="Seed of the draw.")
     options = parser.parse_args()
     os.environ["NUMBA_DISABLE_JIT"] = "1"

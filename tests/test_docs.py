@@ -471,6 +471,7 @@ def test_numbers_on_the_page_of_distances_are_those_of_its_commands(tmp_path):
     assert {path.name for path in make_distances.FIGURES.iterdir()} == set(figures)
 
 
+@pytest.mark.slow
 def test_weights_on_the_page_of_distances_are_those_of_the_audit():
     make_distances = _load("make_distances")
     audits = {name: audit_distance(name) for name in ("paper", "hamming")}

@@ -16,6 +16,8 @@ from realitygap.study._calibrate_kinds import _moved_in_sim
 from realitygap.trials import SimTarget
 from realitygap.world import INCH, load_robot, paper_arena
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot("scribbler-s2-fluke2")
 ARENA = paper_arena()
 
@@ -49,7 +51,6 @@ def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) 
     return replace(trial, end_pose=end)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seen", ["track", "ruler"])
 def test_intervals_cover_gains_and_track_as_often_as_they_say(seen):
     rng = np.random.default_rng(17)

@@ -89,6 +89,7 @@ def test_settings_of_matplotlib_make_no_difference(drawn, tmp_path):
         assert save_movie(trials, tmp_path / "b.gif", width=400).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_trial_of_87_steps_is_less_than_a_megabyte(tmp_path):
     condition = Condition(name="novelty-50", selection="novelty", noise=0.5)
     rows = run_replicates(condition, 3, 1)

@@ -66,6 +66,7 @@ def test_figures_are_over_the_runs_that_solved_the_task() -> None:
     assert summarize_runs(task, "default", runs[:1])["sd_evaluations"] is None
 
 
+@pytest.mark.slow
 def test_runs_do_not_depend_on_threads_and_differ_by_seed() -> None:
     changes = {"population": 20 if COMPILED else 8, "generations": 60 if COMPILED else 3}
     one = measure_task("xor", seeds=5, seed=3, changes=changes, threads=1)

@@ -207,9 +207,12 @@ def test_the_first_individual_represents_its_species_when_it_is_the_fittest() ->
 def test_a_table_that_was_cleared_has_no_species_left() -> None:
     species = Speciation(2)
     species.place(0.0, 5.0)
+    species.table.floats[:] = 7.0
+    species.table.improved_at[0] = 7
     _species.clear_species(species.rules, species.table)
     assert species.table.counts.tolist() == [0, 0]
-    assert species.table.floats[1] == -math.inf
+    assert species.table.floats.tolist() == [1.0, -math.inf]
+    assert species.table.improved_at.tolist() == [0]
     assert species.place(3.0, 9.0) == [0, 1]
 
 

@@ -76,6 +76,7 @@ def test_a_peer_that_cannot_be_built_is_said_to_be_not_measured(monkeypatch):
     assert result["figures"]["steps_core"]["jyro"] == {"not_measured": "no connection"}
 
 
+@pytest.mark.slow
 def test_our_loops_breed_what_population_breeds():
     from our_loops import KEY, begin_run, breed
     from realitygap.evolution import Population

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 DROPS = {
     "callback of a weak reference": """
 import weakref

@@ -22,6 +22,8 @@ from realitygap.tasks import TASKS
 from realitygap.trials import NoiseKey, trace_genomes
 from realitygap.world import ArenaSettings
 
+pytestmark = pytest.mark.slow
+
 COVERAGE = "realitygap/ScribblerCoverage-v1"
 IDS = {"avoid": "realitygap/Avoid-v0", "light": "realitygap/Light-v0", "wall": "realitygap/Wall-v0"}
 IDS["goal"] = "realitygap/Goal-v0"

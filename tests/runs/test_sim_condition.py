@@ -11,6 +11,8 @@ from realitygap.runs import Condition
 from realitygap.trials import Trajectory
 from realitygap.world import Distribution
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("values", "said"),

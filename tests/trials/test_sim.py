@@ -31,6 +31,8 @@ from realitygap.world import (
     robot_names,
 )
 
+pytestmark = pytest.mark.slow
+
 KEY = NoiseKey(0x9E3779B97F4A7C15, replicate=3, generation=2, individual=5, repeat=1)
 RANDOM: dict[str, Any] = {
     "drive.track": {"normal": [0.153, 0.002], "per": "run"},

@@ -359,7 +359,9 @@ def command_page(name: str, command: Any) -> str:
 
 def option_text(option: Any) -> str:
     """An option with what it takes: a name, else a number."""
-    word = option.metavar or ("NAME" if option.type_descriptor.annotation is str else "N")
+    kind = getattr(option, "type_descriptor", None)  # since Typer has a Click of its own
+    is_text = option.type.name == "text" if kind is None else kind.annotation is str
+    word = option.metavar or ("NAME" if is_text else "N")
     takes = "" if option.is_flag else f" {word}"
     return ", ".join(f"`{each}{takes}`" for each in option.opts)
 

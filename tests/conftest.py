@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +20,9 @@ settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
 
 WITH_DEVICE = "_with_device.py"
+
+PARTS = ("jyro", "sim")
+"""Of `tests/warm.py`, each in a process of its own."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -31,6 +37,30 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out:
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if not item.path.name.endswith(WITH_DEVICE)]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int | None:
+    """Use one process more than there are cores: many tests wait, for a page or for a robot at its own speed."""
+    if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ:
+        return None  # xdist's own
+    return (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1) + 1
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the most used kernels before several processes start, each of which would compile them."""
+    config = session.config
+    is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
+    if not is_controller or config.option.collectonly:
+        return
+    began = time.monotonic()
+    command = [sys.executable, "-m", "tests.warm"]
+    parts = [subprocess.Popen([*command, part], cwd=config.rootpath) for part in PARTS]
+    failed = [name for name, part in zip(PARTS, parts, strict=True) if part.wait()]
+    if failed:
+        raise pytest.UsageError(f"Kernels could not be compiled: run {' '.join(command)} {failed[0]}")
+    if (seconds := time.monotonic() - began) > 10:
+        session.config.get_terminal_writer().line(f"compiled kernels in {seconds:.0f} s")
 
 
 @pytest.fixture(autouse=True)

@@ -88,6 +88,7 @@ def test_a_measured_command_that_fails_is_an_error():
         memory_and_start.run([sys.executable, "-c", "raise SystemExit(3)"])
 
 
+@pytest.mark.slow
 def test_our_loops_breed_what_population_breeds():
     from our_loops import KEY, begin_run, breed
     from realitygap.evolution import Population

@@ -2,8 +2,13 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+from realitygap.errors import from_extra
+
+pytestmark = pytest.mark.slow
 
 DROPS = {
     "callback of a weak reference": """
@@ -166,3 +171,16 @@ def test_process_of_the_lab_ends_with_130_after_an_interrupt_that_python_drops()
     done = run(DROPS["callback from C"] + IN_A_PROCESS_OF_THE_LAB)
     assert done.returncode == 130, done.stderr
     assert '"interrupted"' in done.stdout
+
+
+def test_interrupt_while_a_module_of_an_extra_is_loaded_is_no_missing_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo reports Ctrl-C as 'ImportError: initialization failed', whose cause is the interrupt."""
+    (tmp_path / "loaded_in_c.py").write_text(
+        "try:\n    raise KeyboardInterrupt\nexcept KeyboardInterrupt as error:\n"
+        "    raise ImportError('initialization failed') from error\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        from_extra("loaded_in_c", "twin")

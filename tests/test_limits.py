@@ -54,6 +54,7 @@ def parsers_called(path: Path) -> set[str]:
     return {ast.unparse(call) for call in calls} & PARSERS
 
 
+@pytest.mark.slow
 def test_every_reader_goes_through_the_limits():
     found = {path.relative_to(SOURCES).as_posix(): parsers_called(path) for path in SOURCES.rglob("*.py")}
     assert {name: called for name, called in found.items() if called} == ALLOWED
@@ -177,6 +178,7 @@ def test_text_that_is_no_path_is_no_file():
     assert not is_file("a\0b")
 
 
+@pytest.mark.slow
 def test_image_beyond_a_size_is_refused_before_it_is_decoded():
     large = io.BytesIO()
     Image.new("1", (30_000, 30_000)).save(large, "PNG")

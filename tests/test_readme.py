@@ -5,6 +5,8 @@ import re
 import sys
 from pathlib import Path
 
+import pytest
+
 from realitygap import __version__
 from realitygap.cli import app
 
@@ -20,6 +22,7 @@ def _make_outputs():
     return module
 
 
+@pytest.mark.slow
 def test_commands_print_what_the_readme_shows_and_its_python_runs():
     _, problems = _make_outputs().rewrite(README, "README.md")
     assert problems == []

@@ -42,6 +42,10 @@ class CaseError(RealityGapError):
     """A case file for `realitygap simulate` cannot be carried out as written."""
 
 
+class ControllerError(RealityGapError, ValueError):
+    """A controller does not say what its inputs are, or a platform does not have them."""
+
+
 class DescriptionError(RealityGapError, ValueError):
     """The file of a robot or an arena cannot be used as written, or there is none of that name."""
 
@@ -79,10 +83,13 @@ def from_extra(module: str, extra: str) -> Any:
 
     Raises:
         MissingExtraError: it is not installed; the text has the command that installs it.
+        KeyboardInterrupt: Ctrl-C came while it was loaded; some modules written in C report that as an ImportError.
     """
     try:
         return import_module(module)
     except ImportError as error:
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
         raise MissingExtraError(
             f"This needs {module.partition('.')[0]}, which comes with the extra '{extra}' and cannot be imported "
             f"({error}). Install it: pip install 'realitygap[{extra}]'"

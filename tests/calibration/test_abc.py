@@ -53,6 +53,7 @@ def observed(rng):
     return standard[0], evidence_with(simulate(None, numbers, int(rng.integers(2**60)))[0])
 
 
+@pytest.mark.slow
 def test_intervals_cover_as_often_as_they_say():
     # 3 x 50 intervals of 90 %: outside of 81 to 97 % by chance once in 1000 suites.
     inside = []

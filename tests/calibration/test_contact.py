@@ -12,6 +12,8 @@ from realitygap.calibration._handles import CONTACT
 
 from .drawn_robots import ARENA, ENSEMBLE, PRIOR, ROBOT, carried_out, drawn
 
+pytestmark = pytest.mark.slow
+
 PLANS = contact_plans(ARENA, ROBOT)
 
 

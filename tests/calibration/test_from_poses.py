@@ -49,6 +49,7 @@ def test_a_command_counts_where_the_robot_was_seen_before_and_after_it() -> None
     assert np.flatnonzero(~shots.known[0]).tolist() == [4, 5]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_robot_of_sim_is_found_again(seed: int) -> None:
     """What poses identify comes within a twentieth of the prior's width, of robots drawn from the prior."""

@@ -16,6 +16,8 @@ from realitygap.world import load_arena, load_robot
 
 from .drawn_robots import ARENA, ENSEMBLE, PRIOR, ROBOT, carried_out, drawn
 
+pytestmark = pytest.mark.slow
+
 NAMES = (*MOTION, *MOTION_NOISE, "drive.dead_band")
 PLANS = motion_plans(ARENA, ROBOT)
 

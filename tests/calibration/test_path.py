@@ -16,6 +16,8 @@ from realitygap.study._calibrate_kinds import _moved_in_sim
 from realitygap.trials import SimTarget
 from realitygap.world import INCH, load_robot, paper_arena
 
+pytestmark = pytest.mark.slow
+
 ROBOT = load_robot("scribbler-s2-fluke2")
 ARENA = paper_arena()
 

@@ -57,6 +57,7 @@ def drawn(scales, rng) -> dict[str, float]:
     return {scale.name: float(scale.of(rng.random())) for scale in scales}
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_numbers_of_pulse_sensors_as_often_as_they_say():
     hits = []
     for run in range(10):
@@ -72,6 +73,7 @@ def test_intervals_cover_the_numbers_of_pulse_sensors_as_often_as_they_say():
     assert 0.80 <= np.mean(hits) <= 0.99
 
 
+@pytest.mark.slow
 def test_a_mixture_is_recovered_from_its_readings():
     truth = {
         **{"amplitude": 1.2, "decay": 0.15, "noise_gain": 0.03},
@@ -95,6 +97,7 @@ def test_a_mixture_is_recovered_from_its_readings():
     assert all(len(values) == 500 for values in fit.draws.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "scales", "make"),
     [("scribbler-s2-fluke2", PULSES, "pulses"), ("scribbler-s2-fluke1", MIXTURE, "mixture")],
@@ -152,6 +155,7 @@ def test_readings_that_follow_each_other_count_less():
     assert placed.effective < 30
 
 
+@pytest.mark.slow
 def test_fewer_independent_readings_widen_intervals():
     read = placements("scribbler-s2-fluke2", {"drop_most": 0.4, "drop_at": 0.15, "drop_width": 0.03}, 31)
     rows = [Placement(each.distances, np.repeat(each.readings, 4)) for each in read]
@@ -187,6 +191,7 @@ def test_a_battery_that_did_not_vary_is_not_identified():
     assert "full and with a nearly empty battery" in own.advice
 
 
+@pytest.mark.slow
 def test_readings_that_the_model_cannot_make_are_flagged():
     read = placements("scribbler-s2-fluke2", {}, 51)
     # a sensor that answers 2 pulses more or 2 less than it should, half of the time each

@@ -17,28 +17,9 @@ from realitygap.cli import _code, app
 from realitygap.errors import StudyError, TaskError
 from realitygap.records import ResultsFolder
 from realitygap.study import load_study, run_study
+from tests.python_tasks import study_text
 
-STUDY = """
-[study]
-name = "mine"
-replicates = 1
-[neat]
-settings = "rosenzweig-remy"
-population = 2
-generations = 1
-[platform.sim]
-steps = 3
-[task]
-kind = "python:task.py:far"
-inputs = ["obstacle", "stall", "time"]
-[[condition]]
-name = "far"
-platform = "sim"
-[[condition]]
-name = "random"
-platform = "sim"
-selection = "random"
-"""
+STUDY = study_text('[[condition]]\nname = "random"\nplatform = "sim"\nselection = "random"\n')
 SOURCE = "def far(trajectories):\n    return trajectories.poses[:, -1, 0]  # \x1b[2K\u202e\n"
 
 
@@ -186,6 +167,7 @@ def test_a_task_file_is_looked_for_beside_the_study_file_alone(study, monkeypatc
     assert load_study(moved).conditions[0].task.kind == "python:task.py:far"
 
 
+@pytest.mark.slow
 def test_run_asks_at_a_real_terminal(study):
     ours, theirs = pty.openpty()
     command = [sys.executable, "-m", "realitygap", "run", str(study), "--out", str(study.parent / "out")]

@@ -13,6 +13,8 @@ from realitygap.evolution import DISTANCES
 from realitygap.report import audit_distance
 from tests.cli.test_commands import one_message, realitygap
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_papers_distance_has_both_biases_and_is_drawn(tmp_path):
     done = CliRunner().invoke(app, ["audit-distance", "paper", "-o", str(tmp_path / "paper.png")])

@@ -10,6 +10,8 @@ import pytest
 from realitygap.report import audit_results
 from tests.cli.test_commands import one_message, realitygap
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "table-2.csv"
 
 

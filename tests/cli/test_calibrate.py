@@ -22,6 +22,8 @@ from realitygap.study._targets import observations_head
 from realitygap.trials import SimTarget, _target_robot
 from realitygap.world import Fitted, load_calibration, load_robot, paper_arena
 
+pytestmark = pytest.mark.slow
+
 PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 
 

@@ -16,6 +16,8 @@ from realitygap.cli import app
 from realitygap.emulator import connect_witness
 from realitygap.errors import RobotError
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "realitygap", "emulate", "scribbler"]
 MOTORS = bytes((109, 150, 150)) + bytes(6)
 

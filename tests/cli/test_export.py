@@ -77,7 +77,10 @@ def test_json_holds_the_genome_of_the_row_and_where_it_comes_from(results, tmp_p
     assert values["origin"] | WHICH == values["origin"]
     assert values["origin"]["label"] == "SIM"
     assert values["origin"]["coverage_line"] == row["coverage_line"]
-    assert values["input_names"] == ["obstacle", "stall", "time", "bias"]
+    assert values["interface"] == {
+        "inputs": ["obstacle", "stall", "time", "bias"],
+        "outputs": ["move", "turn"],
+    }
 
 
 def test_onnx_answers_as_the_network_of_the_row(results, tmp_path):

@@ -39,50 +39,27 @@ from realitygap.study import (
 from realitygap.tasks import _python
 from realitygap.world import Calibration, load_arena, load_robot, read_calibration
 from realitygap.world._toml import toml_table
+from tests.python_tasks import marking_source, study_text
 from tests.records.test_observations_file import HEAD
 from tests.records.test_observations_file import trial as observed_trial
 from tests.robots.test_recording import record
 
-STUDY = """
-[study]
-name = "theirs"
-replicates = 2
-[neat]
-settings = "rosenzweig-remy"
-population = 4
-generations = 2
-[platform.sim]
-steps = 5
-[task]
-kind = "python:task.py:far"
-inputs = ["obstacle", "stall", "time"]
-[[condition]]
-name = "far"
-platform = "sim"
-[[condition]]
-name = "coverage"
-platform = "sim"
-[condition.task]
-kind = "coverage"
-"""
-SOURCE = """
-from pathlib import Path
+pytestmark = pytest.mark.slow
 
-MARKER = Path({marker!r})
-MARKER.write_text("run by the file")
-
-
-def far(trajectories):
-    MARKER.write_text("run by the function")
-    return trajectories.poses[:, -1, 0]
-"""
+STUDY = study_text(
+    '[[condition]]\nname = "coverage"\nplatform = "sim"\n[condition.task]\nkind = "coverage"\n',
+    replicates=2,
+    population=4,
+    generations=2,
+    steps=5,
+)
 
 
 @pytest.fixture(scope="module")
 def theirs(tmp_path_factory) -> Path:
     """A study of others with its results, whose task leaves a mark when it runs."""
     root = tmp_path_factory.mktemp("theirs")
-    (root / "task.py").write_text(SOURCE.format(marker=str(root / "marker")))
+    (root / "task.py").write_text(marking_source(root / "marker"))
     (root / "study.toml").write_text(STUDY)
     run_study(root / "study.toml", root / "results", threads=1, allow_code=True)
     assert (root / "marker").read_text() == "run by the function"

@@ -10,6 +10,8 @@ from realitygap.cli import main
 from realitygap.gap import MEASURES
 from tests.cli.test_commands import realitygap
 
+pytestmark = pytest.mark.slow
+
 SMALL = ("gap", "sim", "jyro", "--n-controllers", "6", "--trials", "3")
 
 

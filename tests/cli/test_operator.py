@@ -23,6 +23,8 @@ from realitygap.world import paper_arena
 
 from .fake_port import STUDY, open_fake
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-m", "tests.cli.fake_port"]
 PATIENCE_S = 60

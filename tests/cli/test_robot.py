@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ from typer.testing import CliRunner
 
 from realitygap.cli import app
 from realitygap.cli._robot import robot
+from tests.commands import run_command
 
 PORT = "emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 S1 = "emulator://s1?fluke=none&arena=paper&seed=1&speed=off"
@@ -25,12 +24,7 @@ def run(*arguments: object) -> str:
 
 
 def failed(*arguments: object) -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "realitygap", "robot", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_command("robot", *map(str, arguments))
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert done.stderr.startswith("realitygap: ")

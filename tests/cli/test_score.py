@@ -19,6 +19,8 @@ from realitygap.world import paper_arena
 
 from .fake_port import STUDY, open_fake
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass
 class Done:

@@ -30,6 +30,8 @@ from realitygap.world import paper_arena
 from tests.cli.test_commands import realitygap
 from tests.study.physical import small_study
 
+pytestmark = pytest.mark.slow
+
 LEAD_S = 0.8
 STEP_S = 0.5
 CAMERA = FilmedCamera(width=960, height=540, noise=3.0)

@@ -6,6 +6,8 @@ from typer.testing import CliRunner
 from realitygap.cli import app
 from realitygap.errors import RealityGapError, RecordError, StudyError
 
+pytestmark = pytest.mark.slow
+
 SMALL = ["--budget", "3", "--runs", "4", "--repeats", "1", "--fresh-trials", "2"]
 
 

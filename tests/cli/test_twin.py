@@ -9,6 +9,8 @@ from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.robots.twin import FAMILIES, family_rows, load_twin, sample_twin
 
+pytestmark = pytest.mark.slow
+
 
 def twin(*words):
     """What the command prints; its errors as they reach `main`, which prints them as one message."""

@@ -50,14 +50,14 @@ def test_every_command_of_the_robot_is_echoed_and_answered_in_full(model, fluke,
 
 
 @pytest.mark.parametrize("model", ["s1", "s2"])
-@pytest.mark.parametrize("op", sorted(set(range(256)) - set(ROBOT_ANSWERS) - set(S2_ANSWERS)))
-def test_unknown_commands_are_echoed_and_not_answered(model, op):
-    assert ask(make(model), op, 1, 2, 3, 4, 5, 6, 7, 8) == b""
+def test_unknown_commands_are_echoed_and_not_answered(model):
+    for op in sorted(set(range(256)) - set(ROBOT_ANSWERS) - set(S2_ANSWERS)):
+        assert ask(make(model), op, 1, 2, 3, 4, 5, 6, 7, 8) == b"", op
 
 
-@pytest.mark.parametrize("op", sorted(S2_ANSWERS))
-def test_an_s1_does_not_know_the_commands_of_an_s2(op):
-    assert ask(make("s1"), op) == b""
+def test_an_s1_does_not_know_the_commands_of_an_s2():
+    for op in sorted(S2_ANSWERS):
+        assert ask(make("s1"), op) == b"", op
 
 
 def test_the_filler_is_echoed_as_it_came():

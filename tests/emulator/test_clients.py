@@ -319,6 +319,7 @@ def test_scribbler2_python_restarts_a_cabled_robot():
     client.sensors(65)
 
 
+@pytest.mark.slow
 def test_scribbler2_python_uses_the_fluke_2():
     client = Scribbler2Python(open_port("s2", "2"), fluke=True)
     for size, shape in ((213, (1280, 800)), (71, (427, 266))):

@@ -184,6 +184,7 @@ def test_dtr_resets_a_cabled_s2_only():
         assert (robot.wheel_speeds() == (0.0, 0.0)) == stops
 
 
+@pytest.mark.slow
 def test_motors_run_on_for_ever():
     robot = make("s2", "2")
     robot.place((0.5, 0.3, 0.0), 1)

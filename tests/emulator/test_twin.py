@@ -15,6 +15,8 @@ from realitygap.world import Pose, paper_arena
 
 from .wire import ask, packet, say, signed
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("mujoco")
 
 QUIET = {

@@ -95,7 +95,7 @@ def changed(values: dict, path: str, value: object) -> str:
 @pytest.mark.parametrize(
     ("path", "value", "error", "message"),
     [
-        ("version", 2, RecordVersionError, "is a genome of version 2, this realitygap reads version 1"),
+        ("version", 3, RecordVersionError, "is a genome of version 3, this realitygap reads version 1 and 2"),
         ("format", "other", RecordError, "has the format 'other', expected 'realitygap genome'"),
         ("format", "realitygap network", RecordError, "has the format 'realitygap network'"),
         ("activation", "relu", RecordError, "activation: Input should be 'tanh', 'sigmoid' or 'identity'"),

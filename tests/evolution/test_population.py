@@ -98,6 +98,7 @@ def assert_is_a_genome(genome: Genome, settings: NeatSettings, n_inputs: int, n_
         assert all(node.bias == 0.0 for node in genome.nodes)
 
 
+@pytest.mark.slow
 @given(neat_settings, st.integers(1, 3), st.integers(1, 3), st.booleans(), st.integers(0, 2**32))
 @hypothesis_settings(max_examples=cases(60, 6), deadline=None, derandomize=True)
 def test_a_population_keeps_its_promises_for_thirty_generations(
@@ -205,6 +206,7 @@ def test_species_and_parents_are_copies() -> None:
     assert population.parents.max() == -1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="takes minutes when not compiled")
 def test_xor_is_solved_about_as_fast_as_published() -> None:
     """A smoke test of eight seeds by ask and tell; `tests/study/test_task.py` has more.

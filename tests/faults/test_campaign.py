@@ -11,6 +11,8 @@ from .campaign import KINDS, Kind, read_lines, run_campaign, strike
 from .forked import run_forked
 from .mutations import mutated
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def fake(monkeypatch):

@@ -5,6 +5,8 @@ import pytest
 
 from realitygap.gap import GapSide, bootstrap, interval, mean_difference, shrunk_means
 
+pytestmark = pytest.mark.slow
+
 
 def sides(rng, c, r, level, spread, noise=0.08):
     quality = rng.normal(0.3, 0.1, (c, 1))

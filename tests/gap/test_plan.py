@@ -18,6 +18,8 @@ from realitygap.gap import (
     trial_reliability,
 )
 
+pytestmark = pytest.mark.slow
+
 
 def test_effect_needs_what_tables_say():
     # Cohen (1988): a paired t test finds half a standard deviation with 34 pairs in 80 of 100

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 import warnings
 
 import gymnasium
@@ -63,6 +62,7 @@ def placed(settings: dict[str, object]) -> tuple[JyroPlatform, object]:
 NETWORKS = [{}, {"recurrent": True}, {"activation": "identity"}]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("network", NETWORKS, ids=["plain", "recurrent", "identity"])
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_a_network_driven_through_the_environment_is_its_trial_bit_for_bit(settings, network):
@@ -97,6 +97,7 @@ def test_a_network_driven_through_the_environment_is_its_trial_bit_for_bit(setti
         assert n_blocked > 0, "no wall was met, so that contact was not tested"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_the_commands_of_a_trial_give_that_trial_in_either_precision_bit_for_bit(precision):
     platform, arena = JyroPlatform(precision=precision), ArenaSettings().arena()
@@ -121,6 +122,7 @@ def k_bias(network: dict[str, object]) -> bool:
     return bool(network)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_networks_driven_through_the_vector_environment_are_the_batch_bit_for_bit(settings):
     platform, arena = placed(settings)
@@ -276,31 +278,13 @@ def test_wrong_calls_are_refused():
         realitygap.gym.RobotVectorEnv(0)
 
 
-def test_thousands_of_robots_are_stepped_in_one_call():
-    """Far from the speed of a single environment: 4,096 steps in less than the time of 200 of one robot at a time."""
-    envs = realitygap.gym.RobotVectorEnv(4096)
-    env = realitygap.gym.RobotEnv()
-    commands = np.random.default_rng(0).uniform(-1, 1, (4096, 2))
-    envs.reset(seed=1), env.reset(seed=1)
-    envs.step(commands), env.step(commands[0])
-
-    def seconds(call: object, times: int) -> float:
-        began = time.thread_time()
-        for _ in range(times):
-            call()
-        return (time.thread_time() - began) / times
-
-    many = min(seconds(lambda: envs.step(commands), 5) for _ in range(5))
-    one = min(seconds(lambda: env.step(commands[0]), 5) for _ in range(5))
-    assert many < 200 * one
-
-
 def test_a_missing_extra_is_one_message_with_the_command():
     code = "import sys; sys.modules['gymnasium'] = None; import realitygap.gym"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.strip().endswith("Install it: pip install 'realitygap[gym]'")
 
 
+@pytest.mark.slow
 def test_gymnasium_finds_the_environment_by_module_and_name():
     name = f"realitygap.gym:{ENV}"
     code = f"import gymnasium; print(gymnasium.make({name!r}).reset(seed=1)[0].shape)"
@@ -318,6 +302,7 @@ SIMS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("platform", "settings"), SIMS)
 def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, settings):
     platform, arena = SimPlatform(precision="double", **platform), ArenaSettings().arena()
@@ -347,6 +332,7 @@ def test_a_network_driven_through_sim_is_its_trial_bit_for_bit(platform, setting
     assert n_blocked > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_many_robots_of_sim_are_the_trials_of_the_batch(precision):
     """More than a block of them, so that the last one is not full."""
@@ -369,6 +355,7 @@ def test_many_robots_of_sim_are_the_trials_of_the_batch(precision):
     assert infos["coverage_ends"].tolist() == [trial.coverage_ends for trial in trials]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("platform", "settings"), SIMS)
 def test_the_checker_of_gymnasium_finds_nothing_in_sim(platform, settings):
     env = gymnasium.make(ENV, platform=SimPlatform(**platform), **settings).unwrapped
@@ -378,6 +365,7 @@ def test_the_checker_of_gymnasium_finds_nothing_in_sim(platform, settings):
         check_env(env)
 
 
+@pytest.mark.slow
 def test_platforms_have_names_and_noise_of_their_own(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('base = "scribbler-s2"\n[drive]\nspeed = 0.05\n')

@@ -31,6 +31,7 @@ def value_and_cache(done: subprocess.CompletedProcess) -> tuple[float, tuple[int
     return float(first), tuple(int(word) for word in second.split())
 
 
+@pytest.mark.slow
 def test_the_second_start_loads_what_the_first_compiled(tmp_path):
     first = value_and_cache(start(tmp_path))
     assert first == (first[0], (0, 1))
@@ -44,15 +45,27 @@ def damage(content: bytes) -> list[bytes]:
     return [content[:kept] for kept in (0, 1, 40, len(content) // 2)] + [bytes(bits) for bits in flipped]
 
 
+def test_damage_anywhere_in_a_file_is_noticed(tmp_path):
+    path = tmp_path / "a.kernel"
+    _cache.write_sealed(path, list(range(1000)))
+    whole = path.read_bytes()
+    for damaged in damage(whole):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="is damaged"):
+            _cache.read_sealed(path)
+    path.write_bytes(whole)
+    assert _cache.read_sealed(path) == list(range(1000))
+
+
+@pytest.mark.slow
 def test_a_damaged_file_is_compiled_again_and_replaced(tmp_path):
     value, _ = value_and_cache(start(tmp_path))
     (path,) = tmp_path.rglob("*.kernel")
-    for damaged in damage(path.read_bytes()):
-        path.write_bytes(damaged)
-        done = start(tmp_path)
-        assert value_and_cache(done) == (value, (0, 1))
-        assert "Traceback" not in done.stderr
-        assert value_and_cache(start(tmp_path)) == (value, (1, 0))
+    path.write_bytes(damage(path.read_bytes())[-2])
+    done = start(tmp_path)
+    assert value_and_cache(done) == (value, (0, 1))
+    assert "Traceback" not in done.stderr
+    assert value_and_cache(start(tmp_path)) == (value, (1, 0))
 
 
 def test_the_cache_folder_is_private_even_if_it_was_open(tmp_path):
@@ -99,6 +112,7 @@ def test_a_relative_folder_for_caches_is_none(folder, monkeypatch):
     assert _cache.cache_root() == Path.home() / ".cache" / "realitygap"
 
 
+@pytest.mark.slow
 def test_another_source_means_another_folder(tmp_path):
     start(tmp_path)
     (folder,) = tmp_path.iterdir()

@@ -64,6 +64,7 @@ def test_lines_between_points_of_a_lattice_are_exact(step: float, reach: int) ->
         assert_line(u0, v0, u1, v1)
 
 
+@pytest.mark.slow
 def test_random_lines_are_exact() -> None:
     rng = random.Random(4)
     for _ in range(cases(6_000, 300)):

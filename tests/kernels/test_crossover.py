@@ -77,6 +77,7 @@ def random_neat(rng: random.Random, **changes: Any) -> Neat:
     return Neat(settings(**chosen), rng.randint(1, 3), rng.randint(1, 3))
 
 
+@pytest.mark.slow
 def test_children_equal_the_reference() -> None:
     for seed in range(cases(150, 15)):
         rng = random.Random(seed)

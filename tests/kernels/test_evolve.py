@@ -78,6 +78,7 @@ def assert_equal_generations(population: Population, plain: Evolution) -> None:
     assert population.threshold == plain.threshold
 
 
+@pytest.mark.slow
 def test_evolution_equals_the_reference_whatever_the_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every gene, parent, species and threshold, generation by generation, from little room that has to grow."""
     monkeypatch.setattr(population_module, "FIRST_ROOM", 1)

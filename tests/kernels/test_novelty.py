@@ -183,6 +183,13 @@ def test_the_oldest_is_replaced_each_time_and_the_bar_is_that_of_the_archive_the
     assert archive.behaviors() == [[(5, 0)], [(9, 0)]]
 
 
+def test_a_newcomer_raises_the_bar_for_the_next_one() -> None:
+    archive = KernelPaperArchive(2, above_all=True, by_column=True)
+    archive.update([[0], [1]])
+    archive.update([[11], [5]])  # 10.5 and 4.5, above 1; after 11 entered the bar is 10
+    assert archive.behaviors() == [[(1, 0)], [(11, 0)]]
+
+
 # nearest neighbors
 
 

@@ -17,7 +17,7 @@ from tests.reference.effort import cases
 from tests.reference.neat import Neat
 from tests.reference.philox import GENOME, Stream
 
-pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:overflow encountered")]
 
 STEPS = cases(87, 15)
 WILD = {

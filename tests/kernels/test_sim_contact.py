@@ -26,6 +26,8 @@ from tests.kernels.sim_cases import (
 from tests.reference import contact as reference
 from tests.reference.effort import cases
 
+pytestmark = pytest.mark.slow
+
 MODELS = ["freeze", "stop", "slide"]
 TRACK = 0.153
 BOX = [(-0.06, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.06, 0.05)]

@@ -18,6 +18,8 @@ pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'realitygap[twin
 
 from tests.reference.pushed_body import Push, PushedBody, Wheels
 
+pytestmark = pytest.mark.slow
+
 CORNERS = [(0.079, -0.05), (0.079, 0.05), (0.06, 0.0695), (-0.06, 0.0695),
            (-0.079, 0.05), (-0.079, -0.05), (-0.06, -0.0695), (0.06, -0.0695)]  # fmt: skip
 RADIUS = 0.01

@@ -11,6 +11,8 @@ import pytest
 from realitygap.robots.twin._motors import NOMINAL, TICK_S, SpeedSteps
 from tests.kernels.sim_cases import OUTLINE, SCRIBBLER, drive_robots, outline, room
 
+pytestmark = pytest.mark.slow
+
 FIELD: dict[str, Any] = {
     **SCRIBBLER,
     **outline(OUTLINE),

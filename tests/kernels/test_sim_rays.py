@@ -13,6 +13,8 @@ from tests.kernels.sim_cases import DEPTH, SCRIBBLER, WIDTH, drive_robots, obsta
 from tests.reference import senses as reference
 from tests.reference.effort import cases
 
+pytestmark = pytest.mark.slow
+
 BOX = [(-0.06, -0.05), (0.06, -0.05), (0.06, 0.05), (-0.06, 0.05)]
 TRIANGLE = [(-0.05, -0.04), (0.07, 0.0), (-0.04, 0.05)]
 PLACES = [

@@ -198,6 +198,24 @@ def test_the_champion_of_the_generation_before_represents_a_species() -> None:
     assert species.place(0.9, 1.7, -1.1, fitness=[1.0, 5.0, 2.0]) == [0, 2, 1]  # 0.0, and -0.2 alone
 
 
+def test_the_first_individual_represents_its_species_when_it_is_the_fittest() -> None:
+    species = Speciation(3, representative="champion")
+    assert species.place(0.0, 0.9, -0.9) == [0, 0, 0]
+    assert species.place(-0.95, 1.5, 0.5, fitness=[3.0, 1.0, 2.0]) == [0, 1, 0]  # 0.0
+
+
+def test_a_table_that_was_cleared_has_no_species_left() -> None:
+    species = Speciation(2)
+    species.place(0.0, 5.0)
+    species.table.floats[:] = 7.0
+    species.table.improved_at[0] = 7
+    _species.clear_species(species.rules, species.table)
+    assert species.table.counts.tolist() == [0, 0]
+    assert species.table.floats.tolist() == [1.0, -math.inf]
+    assert species.table.improved_at.tolist() == [0]
+    assert species.place(3.0, 9.0) == [0, 1]
+
+
 def test_a_random_member_of_the_generation_before_represents_a_species() -> None:
     """Each of four as often: chi-square of four classes below 21 (1 in 9,000 by chance); and as the stream says."""
     n = cases(400, 60)

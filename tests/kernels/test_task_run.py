@@ -14,7 +14,10 @@ from realitygap.study import task_settings
 from realitygap.tasks import CLASSICAL_TASKS
 from tests.reference.effort import COMPILED
 
-pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered", "ignore:invalid value encountered")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:overflow encountered", "ignore:invalid value encountered"),
+]
 
 FIRST = np.int64(0)
 

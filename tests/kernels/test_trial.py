@@ -103,6 +103,7 @@ def limited(values: Sequence[float]) -> list[float]:
     return [min(max(value, -1.0), 1.0) for value in values]
 
 
+@pytest.mark.slow
 def test_random_trials_equal_the_reference() -> None:
     """The reference robot is given the commands that the kernel's network gave, and senses for itself.
 

@@ -42,6 +42,7 @@ def test_printed_address_opens_the_lab_and_the_token_leaves_the_address_bar(lab,
     assert cookie["sameSite"] == "Strict"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["token", "address"])
 def test_browser_without_the_token_sees_where_it_is_and_can_paste_it(lab, newcomer, what):
     answer = newcomer.goto(lab.address + LOADED)
@@ -56,6 +57,7 @@ def test_browser_without_the_token_sees_where_it_is_and_can_paste_it(lab, newcom
     check_is_in(newcomer)
 
 
+@pytest.mark.slow
 def test_file_with_the_address_opens_the_lab(lab, newcomer, tmp_path):
     entry = tmp_path / "entry.html"
     entry.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={lab.entry()}">')
@@ -63,6 +65,7 @@ def test_file_with_the_address_opens_the_lab(lab, newcomer, tmp_path):
     check_is_in(newcomer)
 
 
+@pytest.mark.slow
 def test_page_of_a_lab_that_was_started_again_tells_that_the_token_is_new(lab, visit):
     page = visit(LOADED, forgive=OUTAGE)
     lab.stop()
@@ -137,6 +140,7 @@ NOTHING = "; ".join(
 )
 
 
+@pytest.mark.slow
 def test_page_at_another_port_gets_nothing(lab, newcomer, elsewhere):
     newcomer.context.add_cookies([lab.cookie])
     newcomer.goto(elsewhere(ATTACK.replace("LAB", lab.address)))
@@ -152,6 +156,7 @@ def make_report(root: Path, text: str) -> None:
     (folder / "report.html").write_text(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_framed", [False, True])
 def test_hostile_report_gets_nothing(lab, visit, is_framed):
     make_report(lab.root, ATTACK.replace("LAB", lab.address))

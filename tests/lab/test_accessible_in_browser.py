@@ -11,6 +11,8 @@ from .conftest import DESKTOP, PHONE
 from .robot_study import begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
+pytestmark = pytest.mark.slow
+
 SIZES = {"desktop": DESKTOP, "phone": PHONE}
 GRAVE = ("serious", "critical")
 TEXT = """

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from realitygap.emulator import Emulator, serve_tcp
 from realitygap.records import read_observations
 from realitygap.world import read_calibration
 
 from .conftest import PHONE
+
+pytestmark = pytest.mark.slow
 
 
 def begin(page, **fields: str) -> None:

@@ -13,6 +13,8 @@ from realitygap.records import read_observations
 
 from .test_hand import wait_for
 
+pytestmark = pytest.mark.slow
+
 
 def asked(job: CalibrationJob, question: str) -> dict[str, Any]:
     wait_for(lambda: job.is_over or (job.ask is not None and job.ask["question"] == question))

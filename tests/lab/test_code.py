@@ -14,24 +14,9 @@ from realitygap.lab import _check_work, _lab, _study_work
 from realitygap.lab._checks import Checks
 from realitygap.lab._lab import Lab
 from realitygap.tasks import _python
+from tests.python_tasks import marking_source, study_text
 
-STUDY = """
-[study]
-name = "mine"
-replicates = 1
-[neat]
-settings = "rosenzweig-remy"
-population = 2
-generations = 1
-[platform.sim]
-steps = 3
-[task]
-kind = "python:task.py:far"
-inputs = ["obstacle", "stall", "time"]
-[[condition]]
-name = "far"
-platform = "sim"
-"""
+STUDY = study_text()
 REFUSED = "start the lab with: realitygap lab --allow-code"
 
 
@@ -43,8 +28,7 @@ class SilentChannel:
 
 @pytest.fixture
 def root(tmp_path) -> Path:
-    source = f"open({str(tmp_path / 'marker')!r}, 'w').close()\ndef far(t): return t.poses[:, -1, 0]\n"
-    (tmp_path / "task.py").write_text(source)
+    (tmp_path / "task.py").write_text(marking_source(tmp_path / "marker"))
     return tmp_path.resolve()
 
 
@@ -72,6 +56,7 @@ def test_check_refuses_a_python_task_unless_the_lab_may_run_code(root):
     assert not (root / "marker").exists()  # a check runs none
 
 
+@pytest.mark.slow
 def test_lab_passes_its_permission_to_its_processes(root, orders):
     lab = Lab(root, allow_code=True)
     assert lab.checks._allow_code
@@ -84,6 +69,7 @@ def test_lab_passes_its_permission_to_its_processes(root, orders):
     assert [order["allow_code"] for order in orders] == [True, True, False]
 
 
+@pytest.mark.slow
 def test_a_study_goes_on_only_with_permission_and_its_file(root):
     with pytest.raises(StudyError, match=REFUSED):
         work(root, text=STUDY)

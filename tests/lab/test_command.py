@@ -17,6 +17,8 @@ from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab import open_lab
 from realitygap.lab._server import _entry
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "realitygap", "lab"]
 
 

@@ -15,6 +15,8 @@ from .test_counts import begin, plan
 from .test_fuzz import carried_out, page_client
 from .test_studies_in_browser import TINY, start
 
+pytestmark = pytest.mark.slow
+
 LATE_S = 2.0
 """A loop that something blocks is late by many seconds; one on a busy machine, by less than this [s]."""
 

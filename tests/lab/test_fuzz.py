@@ -73,6 +73,7 @@ async def answers(page: Any) -> None:
     assert (await page.hear("notify", now))[1]
 
 
+@pytest.mark.slow
 @given(MAYBE_JSON)
 def test_whatever_comes_is_taken_or_not(value):
     assert is_of_page(json.dumps(["event", value])) is False

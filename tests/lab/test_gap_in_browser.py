@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from realitygap.lab._gap_work import rounds
 from realitygap.records import read_observations
+
+pytestmark = pytest.mark.slow
 
 
 def measure(page, **fields: str) -> None:

@@ -11,6 +11,8 @@ import pytest
 from realitygap.lab._hand import Hand
 from tests.interrupted import INTERRUPTED
 
+pytestmark = pytest.mark.slow
+
 PORT = "emulator://s2?fluke=2&speed=1"
 
 

@@ -9,6 +9,8 @@ from realitygap.study import parse_study, run_study
 
 from .conftest import PHONE
 
+pytestmark = pytest.mark.slow
+
 TEXT = """
 [study]
 name = "seen"

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import hashlib
 
+import pytest
+
 from realitygap.records import LEDGER_NAME, Ledger
 
 from .conftest import OUTAGE, PHONE
 from .robot_study import ledger_of, tap
 from .sheets import drive_sheet, photo_of, true_cells
+
+pytestmark = pytest.mark.slow
 
 PAGE = "trials/by-robot"
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from .conftest import PHONE
+
+pytestmark = pytest.mark.slow
 
 PORT = "emulator://s2?fluke=2"
 

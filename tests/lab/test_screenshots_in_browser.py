@@ -17,6 +17,8 @@ from .conftest import PHONE
 from .robot_study import begin_sitting, make_study, start_trial
 from .sheets import drive_sheet, photo_of
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PAGES = ["docs/how-to/lab.md", "docs/tutorials/lesson.md", "docs/tutorials/robot-lab.md"]
 MOST_BYTES = 200_000

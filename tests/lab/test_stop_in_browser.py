@@ -18,6 +18,8 @@ from .conftest import PATIENCE_MS, PHONE
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
 
+pytestmark = pytest.mark.slow
+
 STOP_S = 0.2
 """Within which the motors stand after a press [s]."""
 VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390, 400)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from realitygap.records import ResultsFolder
 
 from .conftest import OUTAGE, PHONE
@@ -26,6 +28,7 @@ def start(page, text: str) -> None:
     page.get_by_role("button", name="Start the study").click()
 
 
+@pytest.mark.slow
 def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
     page = visit("", size=PHONE)
     page.get_by_text("No study is here yet.").wait_for()
@@ -44,6 +47,7 @@ def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
     assert len(folder.read()) == 5 * 2 * 8
 
 
+@pytest.mark.slow
 def test_a_study_from_a_file_is_carried_out_and_survives_the_lab(lab, visit):
     page = visit("new", forgive=OUTAGE)
     start(page, TINY)
@@ -62,6 +66,7 @@ def test_mistakes_are_told_and_nothing_is_begun(lab, visit):
     assert list(lab.root.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_study_file_that_is_no_text_is_refused(lab, visit):
     page = visit("new")
     page.locator('input[type="file"]').set_input_files(
@@ -70,6 +75,7 @@ def test_a_study_file_that_is_no_text_is_refused(lab, visit):
     page.get_by_text("This is not a text file in UTF-8").wait_for()
 
 
+@pytest.mark.slow
 def test_no_study_reads_files_outside_the_folder(lab, visit):
     page = visit("new")
     start(page, TINY + '\n[arena]\nfile = "/etc/passwd"\n')
@@ -77,6 +83,7 @@ def test_no_study_reads_files_outside_the_folder(lab, visit):
     assert list(lab.root.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_stop_is_in_sight_on_every_page(visit):
     for path in ("", "new"):
         page = visit(path, size=PHONE)

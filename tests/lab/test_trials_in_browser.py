@@ -6,8 +6,12 @@ import re
 import time
 from collections.abc import Callable
 
+import pytest
+
 from .conftest import OUTAGE, PHONE
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
+
+pytestmark = pytest.mark.slow
 
 PAGE = "trials/by-robot"
 

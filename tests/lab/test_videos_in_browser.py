@@ -7,6 +7,8 @@ import pytest
 from .robot_study import begin_sitting, ledger_of, make_study, tap
 from .sheets import drive_paths, film_of, true_cells
 
+pytestmark = pytest.mark.slow
+
 PAGE = "trials/by-robot"
 
 

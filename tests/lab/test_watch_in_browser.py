@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from realitygap.study import parse_study, run_study
 
 from .conftest import PHONE
 from .robot_study import SLOW, begin_sitting, make_study, start_trial
+
+pytestmark = pytest.mark.slow
 
 TEXT = """
 [study]

@@ -135,6 +135,7 @@ def test_a_program_that_ends_itself_has_ended_well_only_with_0(tmp_path, ending,
     assert run(program, "--seeds", "4", "--json")[0] == code
 
 
+@pytest.mark.slow
 def test_a_signal_ends_all_of_a_grading(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(

@@ -11,6 +11,8 @@ import pytest
 from realitygap import myro
 from realitygap.emulator import Emulator, serve_pty, serve_tcp
 
+pytestmark = pytest.mark.slow
+
 WAYS = {
     "the end": "",
     "an exception": "1 / 0",

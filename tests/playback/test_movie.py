@@ -89,6 +89,7 @@ def test_settings_of_matplotlib_make_no_difference(drawn, tmp_path):
         assert save_movie(trials, tmp_path / "b.gif", width=400).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_trial_of_87_steps_is_less_than_a_megabyte(tmp_path):
     condition = Condition(name="novelty-50", selection="novelty", noise=0.5)
     rows = run_replicates(condition, 3, 1)
@@ -167,6 +168,7 @@ def test_what_stands_in_an_arena_is_shown(name):
     assert not same or (np.abs(shown - bare).max(axis=2) > 30).sum() > 20
 
 
+@pytest.mark.slow
 def test_an_mp4_plays_as_long_as_the_trial(tmp_path):
     path = save_movie(turning(4), tmp_path / "a.mp4", width=241, speed=2.0)
     ffmpeg = _movie.find_ffmpeg()

@@ -30,6 +30,7 @@ def notebook(tmp_path_factory):
     return dict(zip(CELLS, book.cells, strict=True)), told
 
 
+@pytest.mark.slow
 def test_trials_and_robots_are_shown_below_their_cells(notebook):
     cells, _ = notebook
     for name in ("trials", "robot"):

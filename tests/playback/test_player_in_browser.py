@@ -97,6 +97,7 @@ def test_the_slider_goes_through_the_trial(show):
     assert page.locator("input[type=range]").get_attribute("aria-valuetext") == "step 2 of 10, 0.2 seconds"
 
 
+@pytest.mark.slow
 def test_it_plays_as_fast_as_asked_and_stops_at_the_end(show):
     page = show(play(straight(10)))
     page.select_option("select", "8")
@@ -113,6 +114,7 @@ def test_it_plays_as_fast_as_asked_and_stops_at_the_end(show):
     assert page.text_content("[role=status]") == clock(page)
 
 
+@pytest.mark.slow
 def test_keys_do_what_buttons_do(show):
     page = show(play(straight(87)))
     field = page.locator("svg[role=img]")
@@ -133,6 +135,7 @@ def test_keys_do_what_buttons_do(show):
     assert field.get_attribute("aria-label").startswith("a: step")
 
 
+@pytest.mark.slow
 def test_rays_are_as_long_as_they_read_and_colored_by_nearness(show):
     page = show(play(straight(10)))
     rays = page.evaluate(
@@ -149,6 +152,7 @@ def test_rays_are_as_long_as_they_read_and_colored_by_nearness(show):
     assert not page.locator(".rg-trail").first.is_visible()
 
 
+@pytest.mark.slow
 def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(show):
     trials = [straight(4, title=name) for name in ("one", "two", "<b>three")]
     page = show(play([*trials, turning(2)], title="four"))
@@ -161,6 +165,7 @@ def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(
     assert clock(page) == "step 4 of 4 · 1.0 s", "it lasts as long as the longest"
 
 
+@pytest.mark.slow
 def test_who_wants_no_motion_sees_steps(show):
     page = show(play(turning(2)), reduced_motion="reduce")
     page.click("button[aria-label=Play]")
@@ -169,6 +174,7 @@ def test_who_wants_no_motion_sees_steps(show):
     assert turns.endswith(f"rotate({-(360 - 22.918):.2f})") or clock(page).startswith("step 1")
 
 
+@pytest.mark.slow
 def test_every_control_has_a_name_and_can_be_reached_by_keyboard(show):
     page = show(play(straight(10)))
     names = []
@@ -184,6 +190,7 @@ def test_every_control_has_a_name_and_can_be_reached_by_keyboard(show):
     assert names[1:] == ["Play", "Step", "Speed", "rays", "trails", "cells"]
 
 
+@pytest.mark.slow
 def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
     trial = straight(10)
     widget = play(trial)
@@ -224,6 +231,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
     assert page.locator("button[aria-label=Play]").is_enabled()
 
 
+@pytest.mark.slow
 def test_a_view_that_is_closed_listens_no_longer(show):
     page = show(play(straight(10)))
     page.click("button[aria-label=Play]")

@@ -11,6 +11,8 @@ from realitygap.robots.twin import TwinCamera, TwinModel, sample_twin
 from realitygap.robots.twin import _camera as camera_module
 from realitygap.world import Pose, paper_arena
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("mujoco")
 
 WIDTH = 240

@@ -75,6 +75,12 @@ def test_columns_in_another_order_are_fit():
             ),
             "'genome.weight' holds nulls",
         ),
+        (lambda rows: rows.with_columns(coverage_line=float("nan")), "'coverage_line' holds a value"),
+        (lambda rows: rows.with_columns(coverage_ends=1.5), "'coverage_ends' holds a value"),
+        (
+            lambda rows: rows.with_columns(parents=pl.lit([40_000], pl.List(pl.UInt32))),
+            "'parents' holds individual 40000, expected at most",
+        ),
         (lambda rows: rows.with_columns(condition=pl.lit("novelty")), "must be 'coverage', found"),
         (lambda rows: rows.tail(-1), "expected .0, 0, 0."),
         (lambda rows: rows.filter(pl.col("replicate") != 1), "no gap"),

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 WAITS = {
     "lock": "import threading; lock = threading.Lock(); lock.acquire(); lock.acquire()",
     "input": "input()",

@@ -112,6 +112,7 @@ def _kill(child: subprocess.Popen[bytes]) -> None:
     child.stdout.close()
 
 
+@pytest.mark.slow
 def test_writers_killed_at_any_time_leave_whole_chunks_and_a_free_lock(tmp_path):
     folder = make_folder(tmp_path / "r", 0)
     done = 0
@@ -143,6 +144,7 @@ def test_a_writer_killed_between_writing_and_renaming_leaves_a_file_that_the_nex
     assert folder.read().equals(make_rows(n=5))
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_loses_nothing(tmp_path):
     """A file system of 1 MB where one can be mounted, else a limit on the size of files in its place."""
     disk = tmp_path / "disk"
@@ -159,6 +161,7 @@ def test_a_full_disk_is_told_and_loses_nothing(tmp_path):
     _check([*inside, *_child(_FILL, str(disk), "0")])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limits on file sizes")
 def test_a_limit_on_the_size_of_files_is_told_and_loses_nothing(tmp_path):
     _limited(tmp_path)

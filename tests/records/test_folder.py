@@ -247,6 +247,7 @@ def test_a_reader_sees_what_a_writer_adds_meanwhile(tmp_path):
 _PARTITIONS = st.lists(st.integers(1, 5), min_size=1, max_size=8).filter(lambda sizes: sum(sizes) >= 8)
 
 
+@pytest.mark.slow
 @given(one=_PARTITIONS, other=_PARTITIONS, swap=st.booleans(), seed=st.integers(0, 99))
 @settings(max_examples=20, deadline=None)
 def test_any_partition_into_chunks_gives_the_same_digest_and_the_same_rows(one, other, swap, seed):

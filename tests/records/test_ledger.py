@@ -21,8 +21,10 @@ from realitygap.records import (
     Score,
     Step,
     Turn,
+    _ledger_file,
     complete_runs,
     ledger_frame,
+    ledger_tables,
 )
 
 GENOME = {
@@ -62,6 +64,27 @@ def ledger(tmp_path):
 
 def states(ledger):
     return [(trial.individual, trial.attempt, trial.state) for trial in ledger.trials()]
+
+
+@pytest.mark.parametrize("verdict", ["void", "driven"])
+def test_an_interrupted_trial_keeps_its_steps_and_is_settled(ledger, verdict):
+    ledger.start(1, sit(ledger))
+    ledger.interrupt(1, "aborted", [STEP], stalls=1, problem="no answer")
+    trial = ledger.trial(1)
+    assert (trial.state, trial.end, trial.n_steps) == ("running", "aborted", 1)
+    assert ledger.steps(1) == [STEP]
+    assert ledger.events()[-1]["what"] == "interrupted"
+    assert ledger.events()[-1]["details"] == {"end": "aborted", "problem": "no answer"}
+    ledger.settle(1, verdict, "it stood at the wall")
+    assert ledger.trial(1).state == verdict
+    assert ((0, 1, "planned") in states(ledger)) == (verdict == "void")
+    assert "it stood at the wall" in str(ledger.events())
+
+
+def test_undoing_a_score_is_an_event(ledger):
+    drive(ledger, 1)
+    ledger.undo(1)
+    assert (ledger.trial(1).state, ledger.events()[-1]["what"]) == ("driven", "undone")
 
 
 def test_a_trial_goes_from_planned_to_scored(ledger):
@@ -126,6 +149,51 @@ def test_closing_freezes_the_scores(ledger):
     assert frame["fitness"].to_list() == [0.5, 0.25]
     assert frame["key"].to_list() == [2**64 - 1] * 2
     assert frame["connections"].to_list() == [1, 1]
+    assert frame["coverage_line"].to_list() == [3 / 72, 2 / 72]
+    assert frame["coverage_ends"].to_list() == [1 / 72, 1 / 72], "a correction is of cells on the line"
+
+
+def test_rows_have_no_coverage_of_ends_that_nobody_saw(ledger):
+    for number in (1, 2):
+        ledger.start(number, sit(ledger))
+        ledger.finish(number, "step limit", [STEP], stalls=1, score=Score((13, 14), "anna"))
+    ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+    assert ledger_frame(ledger, "a")["coverage_ends"].to_list() == [None, None]
+
+
+def test_rows_of_a_damaged_individual_are_refused(ledger):
+    for number in (1, 2):
+        drive(ledger, number)
+    ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+    with sqlite3.connect(ledger.path) as other:
+        other.execute("DROP TRIGGER closed_individuals_stay")
+        other.execute("UPDATE individuals SET genome = '{}'")
+    other.close()
+    with pytest.raises(
+        LedgerError, match="is damaged: an individual of condition 'a' is not as it was written"
+    ):
+        ledger_frame(ledger, "a")
+
+
+def test_tables_are_listed_by_name_with_what_makes_them(ledger):
+    tables = ledger_tables()
+    base = sqlite3.connect(ledger.path)
+    assert set(tables) == {
+        name for (name,) in base.execute("SELECT name FROM sqlite_schema WHERE type = 'table'")
+    }
+    base.close()
+    empty = sqlite3.connect(":memory:")
+    for sql in tables.values():
+        empty.execute(sql)
+    assert len(empty.execute("SELECT name FROM sqlite_schema WHERE type = 'table'").fetchall()) == len(tables)
+    empty.close()
+
+
+def test_a_ledger_that_cannot_be_made_leaves_no_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(_ledger_file, "TABLES", "no SQL")
+    with pytest.raises(LedgerError, match="syntax error"):
+        Ledger.create(tmp_path / "ledger.sqlite")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_closing_refuses_fitness_of_other_cells(ledger):

@@ -18,6 +18,8 @@ from realitygap.report import NARROW, audit_distance, distance_notes, draw_dista
 from realitygap.report._distance_audit import changed_walk, random_walk, spearman, weight_bias
 from realitygap.study import run_study
 
+pytestmark = pytest.mark.slow
+
 STUDY = """
 [study]
 name = "small"

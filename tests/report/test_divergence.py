@@ -56,6 +56,7 @@ def test_its_caption_has_the_numbers_of_the_last_step(tiny_study):
     assert drawing.svg == draw_divergence(*sides).svg
 
 
+@pytest.mark.slow
 def test_a_twin_can_stand_beside_two_simulators(tiny_study, tmp_path):
     file = tmp_path / "same.toml"
     file.write_text(sample_twin("same", 3).to_toml())

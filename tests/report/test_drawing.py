@@ -83,6 +83,7 @@ def test_too_many_lines_are_thinned_and_the_caption_says_how(out):
     assert len(drawing.svg) < 300_000
 
 
+@pytest.mark.slow
 def test_a_thousand_runs_draw_as_small_as_they_are_distinct(out):
     folder = write_results(out, [describe("c")], {"c": random_runs(1000, 5, 8)})
     drawing = draw_coverage(folder)

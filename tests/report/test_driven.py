@@ -98,6 +98,7 @@ def test_the_report_shows_the_robots_arm_beside_the_simulated_ones(folder, tmp_p
         )
 
 
+@pytest.mark.slow
 def test_figures_of_a_robots_arm(folder):
     assert "EMULATED and SIM" in draw_coverage(folder).caption
     drawing = draw_individuals(folder, "robot")
@@ -114,6 +115,7 @@ def test_what_no_program_can_do_again_is_said(folder):
     assert not problems["simulated"]
 
 
+@pytest.mark.slow
 def test_a_correction_shows_in_reports(folder, tmp_path):
     before = ResultsFolder.open(folder).digest()
     with Ledger.open(folder / LEDGER_NAME) as ledger:
@@ -132,6 +134,7 @@ class Person(WitnessOperator):
         return Score(super().drawn(card, driven).cells, "anna")
 
 
+@pytest.mark.slow
 def test_counts_of_a_person_have_no_ends_and_no_paths(tmp_path):
     drive(small_study(), tmp_path / "small", operator=Person())
     summary = summarize(tmp_path / "small")

@@ -241,6 +241,7 @@ def test_notebooks_show_arena_robot_genome_and_trajectory(tiny_study):
         assert all("".join(each.itertext()) for each in list(root)[:2])
 
 
+@pytest.mark.slow
 def test_rows_without_networks_have_a_page(out, no_replay):
     folder = write_results(out, [describe("c")], {"c": random_runs(6)})
     page = write_report(folder).read_text("utf-8")
@@ -277,10 +278,12 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     assert rows[0]["The paper: run 0"] == "0.154"
 
 
+@pytest.mark.slow
 def test_a_page_without_export_names_no_files(tiny_study, tmp_path):
     assert "figures.txt" not in write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_export_spares_the_rows_and_says_what_is_wrong(tiny_study, tmp_path):
     with pytest.raises(RecordError, match="holds the rows"):
         write_report(tiny_study, tmp_path / "page.html", figures=tiny_study.path / "trials")
@@ -412,6 +415,7 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
     assert f"generation 1: node h{grown['genome']['hidden'][0]}" in shown.alt
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_lineage_below_the_species(tiny_study, tmp_path):
     page = write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
     assert page.index('id="figure-11"') < page.index('id="figure-12"')

@@ -16,6 +16,8 @@ from realitygap.report import (
 )
 from realitygap.study import GapBetween, gap_between
 
+pytestmark = pytest.mark.slow
+
 WHY = Why(
     ("body", "motor"), (Estimate(0.0, 0.0, 0.0, 8), Estimate(0.1, 0.05, 0.2, 8)), (0, 2),
     Estimate(0.2, 0.1, 0.3, 8), Estimate(0.1, 0.0, 0.2, 8), Estimate(-0.1, -0.2, -0.05, 8),

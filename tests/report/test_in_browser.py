@@ -139,6 +139,7 @@ def check_numbers(shown: list[float | str], trajectory: Trajectory, step: int) -
 # time
 
 
+@pytest.mark.slow
 def test_nothing_moves_by_itself_and_the_first_picture_is_a_whole_trial(show):
     page = show()
     before = robot_at(page)
@@ -160,6 +161,7 @@ def test_play_moves_the_robot_and_pause_stops_it(show, trials):
     assert (step_of(page), robot_at(page)) == (step, pose)
 
 
+@pytest.mark.slow
 def test_play_ends_at_the_end_and_begins_anew(show):
     page = show()
     page.locator("#replay-speed").select_option("8")
@@ -169,6 +171,7 @@ def test_play_ends_at_the_end_and_begins_anew(show):
     assert page.locator("#replay-play").text_content().strip() == "Play"
 
 
+@pytest.mark.slow
 def test_scrub_jumps_and_buttons_step(show):
     page = show()
     page.locator("#replay-scrub").fill("12")
@@ -188,6 +191,7 @@ def test_scrub_jumps_and_buttons_step(show):
     assert page.locator("#replay-scrub").get_attribute("aria-valuetext") == "0.0 seconds, step 0 of 30"
 
 
+@pytest.mark.slow
 def test_dragging_over_the_curve_goes_through_time(show):
     page = show()
     page.locator("#replay-chart").scroll_into_view_if_needed()
@@ -215,6 +219,7 @@ def test_numbers_shown_are_those_recomputed(show, trials, name):
             check_numbers(row, trajectory, step)
 
 
+@pytest.mark.slow
 def test_robot_stands_where_its_numbers_say(show, trials):
     name, trajectory = trials("turn", 1, 3)
     page = show(f"#replay={name}@9")
@@ -231,6 +236,7 @@ def test_robot_stands_where_its_numbers_say(show, trials):
     assert ends == pytest.approx(90 + 1000 * trajectory.readings[9], abs=0.11)
 
 
+@pytest.mark.slow
 def test_a_blocked_step_is_marked_and_not_by_color_alone(show, trials):
     for individual in range(8):
         name, trajectory = trials("turn", 0, individual)
@@ -244,6 +250,7 @@ def test_a_blocked_step_is_marked_and_not_by_color_alone(show, trials):
     assert page.locator(".blocked").get_attribute("d").startswith("M")
 
 
+@pytest.mark.slow
 def test_visited_cells_fill_up_to_those_of_the_trial(show, trials):
     name, trajectory = trials("coverage", 2, 1)
     page = show(f"#replay={name}@30")
@@ -255,6 +262,7 @@ def test_visited_cells_fill_up_to_those_of_the_trial(show, trials):
 # several trials
 
 
+@pytest.mark.slow
 def test_several_at_once_differ_without_color(show):
     page = show()
     page.get_by_role("button", name="All of generation 1").click()
@@ -269,6 +277,7 @@ def test_several_at_once_differ_without_color(show):
     assert [button.text_content()[0] for button in pressed.all()] == list("ABCDEFGH")
 
 
+@pytest.mark.slow
 def test_trials_come_and_go_one_by_one(show):
     page = show()
     page.locator("#replay-clear").click()
@@ -284,6 +293,7 @@ def test_trials_come_and_go_one_by_one(show):
     assert "A removed" in page.locator("#replay-status").text_content()
 
 
+@pytest.mark.slow
 def test_a_ninth_trial_is_refused_with_a_word(show):
     page = show()
     page.get_by_role("button", name="All of generation 0").click()
@@ -292,6 +302,7 @@ def test_a_ninth_trial_is_refused_with_a_word(show):
     assert page.locator("#replay-rows tr").count() == 8
 
 
+@pytest.mark.slow
 def test_conditions_can_be_compared(show):
     page = show()
     page.locator("#replay-across").click()
@@ -308,6 +319,7 @@ def test_conditions_can_be_compared(show):
 # links
 
 
+@pytest.mark.slow
 def test_a_link_leads_to_what_was_seen(show, trials):
     links = [trials("novelty", 1, 2)[0], trials("ends", 2, 7)[0]]
     page = show(f"#replay={','.join(links)}@17")
@@ -320,6 +332,7 @@ def test_a_link_leads_to_what_was_seen(show, trials):
     assert step_of(page) == 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fragment", ["#replay=nothing/0/0/0", "#replay=%", "#replay=", "#replay=a@b@c,,", "#x"]
 )
@@ -334,6 +347,7 @@ def test_a_link_that_leads_nowhere_leaves_the_page_as_it_is(show, fragment):
 # keyboard and accessibility
 
 
+@pytest.mark.slow
 def test_everything_works_by_keyboard(show):
     page = show()
     page.locator("#replay-stage").focus()
@@ -363,6 +377,7 @@ def test_everything_works_by_keyboard(show):
     assert step_of(page) == 1
 
 
+@pytest.mark.slow
 def test_tab_passes_through_and_focus_shows(show):
     page = show()
     page.locator("#replay-stage").focus()
@@ -387,6 +402,7 @@ def test_tab_passes_through_and_focus_shows(show):
     assert all(outline != "none" for _, outline, _ in inside)
 
 
+@pytest.mark.slow
 def test_arrows_lead_through_the_trials(show):
     page = show()
     page.locator("#replay-clear").click()
@@ -401,6 +417,7 @@ def test_arrows_lead_through_the_trials(show):
     assert page.locator("#replay-play").text_content().strip() == "Play"
 
 
+@pytest.mark.slow
 def test_every_control_and_picture_has_a_name(show):
     page = show()
     page.locator("#replay-across").click()
@@ -423,6 +440,7 @@ def luminance(color: str) -> float:
     return float(np.dot(linear, [0.2126, 0.7152, 0.0722]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_contrast(show, scheme):
     page = show(color_scheme=scheme)
@@ -449,6 +467,7 @@ def test_contrast(show, scheme):
 # sizes, schemes, print, motion, names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [DESKTOP, PHONE, (320, 640)])
 def test_the_page_is_not_wider_than_the_window(show, size):
     page = show(size=size)
@@ -459,6 +478,7 @@ def test_the_page_is_not_wider_than_the_window(show, size):
         assert all(box["width"] >= 24 and box["height"] >= 24 for box in boxes), "large enough for a finger"
 
 
+@pytest.mark.slow
 def test_touch_plays(show):
     page = show(size=PHONE, has_touch=True, is_mobile=True)
     page.locator("#replay-first").tap()
@@ -468,6 +488,7 @@ def test_touch_plays(show):
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE[0]
 
 
+@pytest.mark.slow
 def test_dark_mode_is_dark(show):
     colors = []
     for scheme in ("light", "dark"):
@@ -481,6 +502,7 @@ def test_dark_mode_is_dark(show):
     assert all(light != dark for light, dark in zip(*colors, strict=True))
 
 
+@pytest.mark.slow
 def test_print_is_a_still(show):
     page = show(color_scheme="dark")
     page.emulate_media(media="print")
@@ -492,6 +514,7 @@ def test_print_is_a_still(show):
     assert page.pdf()[:5] == b"%PDF-"
 
 
+@pytest.mark.slow
 def test_reduced_motion_goes_from_step_to_step(show, trials):
     name, trajectory = trials("coverage", 2, 0)
     page = show(f"#replay={name}@0", reduced_motion="reduce")
@@ -514,6 +537,7 @@ def test_reduced_motion_goes_from_step_to_step(show, trials):
         assert any(abs(x - at) <= 0.7 and abs(turn - angle) <= 0.7 for at, angle in steps)
 
 
+@pytest.mark.slow
 def test_without_a_script_the_page_says_so(show):
     page = show(java_script_enabled=False)
     assert page.get_by_text("needs JavaScript, which does not run here").is_visible()

@@ -150,6 +150,7 @@ def test_settings_that_differ_are_marked(tiny_page):
     assert "<code>neat.add_link</code>" in html
 
 
+@pytest.mark.slow
 def test_a_study_that_comes_along_is_rerun_by_name(out):
     from realitygap.study import load_study, run_study
 
@@ -159,6 +160,7 @@ def test_a_study_that_comes_along_is_rerun_by_name(out):
     assert "realitygap run paper --seed 1 --replicates 1 --out DIR" in page.words
 
 
+@pytest.mark.slow
 def test_hostile_text_stays_text(out, no_replay):
     evil = "<script>alert(1)</script>\"'&${x}$ \x07 url(http://x) #1c1f24"
     conditions = [
@@ -227,6 +229,7 @@ def test_no_rows_is_a_clear_error_and_leaves_nothing(out):
     assert not list(out.glob("*report*"))
 
 
+@pytest.mark.slow
 def test_page_goes_where_it_is_told_and_replaces_what_is_there(tiny_study, tmp_path):
     path = tmp_path / "page.html"
     path.write_text("old")
@@ -235,6 +238,7 @@ def test_page_goes_where_it_is_told_and_replaces_what_is_there(tiny_study, tmp_p
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_not_there_is_a_clear_error(tiny_study, tmp_path):
     with pytest.raises(RecordError, match="Could not write"):
         write_report(tiny_study, tmp_path / "nowhere" / "page.html")
@@ -256,11 +260,13 @@ def test_a_page_never_takes_the_place_of_results(tiny_study, name):
     assert ResultsFolder.open(tiny_study.path).digest() == digest
 
 
+@pytest.mark.slow
 def test_the_same_results_give_the_same_page(tiny_study, tmp_path):
     first, second = write_report(tiny_study, tmp_path / "a"), write_report(tiny_study, tmp_path / "b")
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.slow
 def test_writing_a_page_uses_no_network(tiny_study, tmp_path, monkeypatch):
     def refuse(*_: object) -> None:
         raise AssertionError("a socket was opened")
@@ -269,10 +275,12 @@ def test_writing_a_page_uses_no_network(tiny_study, tmp_path, monkeypatch):
     write_report(tiny_study, tmp_path / "page.html")
 
 
+@pytest.mark.slow
 def test_page_is_small(tiny_study):
     assert Path(write_report(tiny_study)).stat().st_size < 1_000_000
 
 
+@pytest.mark.slow
 def test_the_study_s_remark_stands_under_its_summary(tmp_path):
     page = write_report(run_study("paper", tmp_path / "r", replicates=1).folder).read_text("utf-8")
     assert page.count("which does not say which search it reports") == 1

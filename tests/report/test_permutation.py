@@ -12,6 +12,8 @@ from scipy import stats
 from realitygap.report import holm, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
 from realitygap.report._permutation import lattice
 
+pytestmark = pytest.mark.slow
+
 # Darwin's 15 pairs of maize, crossed less self-fertilized [eighths of an inch]
 DARWIN = np.array([49, -67, 8, 16, 6, 23, 28, 41, 14, 29, 56, 24, 75, 60, -48], dtype=float)
 

@@ -12,6 +12,8 @@ from realitygap.study import load_study, run_study
 from tests.report.results import describe, random_runs, settings, write_results
 from tests.report.test_page import Page
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory):

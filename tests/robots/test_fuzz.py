@@ -170,6 +170,7 @@ def check_all(n: int) -> None:
     assert grown < 200_000
 
 
+@pytest.mark.slow
 def test_ten_thousand_random_and_mutated_strings_do_no_harm():
     check_all(N)
 

@@ -22,7 +22,10 @@ from realitygap.robots.scribbler import Scribbler
 from realitygap.robots.scribbler._guardian_process import STOP, n_stops
 from realitygap.robots.scribbler._holder import LOCKS
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a process cannot inherit a port there")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="a process cannot inherit a port there"),
+]
 
 SERVE = {"pty": serve_pty, "tcp": serve_tcp}
 SETUPS = [("s1", "none"), ("s1", "1"), ("s2", "none"), ("s2", "1"), ("s2", "2")]

@@ -5,9 +5,13 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
+import pytest
+
 from realitygap.robots.scribbler import Scribbler
 
 from .peers import BLOCK
+
+pytestmark = pytest.mark.slow
 
 ANSWERS = {85: bytes(2), 86: bytes(2), 87: bytes(2)}
 

@@ -15,6 +15,8 @@ from realitygap.emulator import Emulator, Server, serve_pty
 from realitygap.errors import RobotError
 from realitygap.robots.scribbler import Scribbler, label_of
 
+pytestmark = pytest.mark.slow
+
 DRIVE = """
 import sys, time
 from realitygap.robots.scribbler import Scribbler

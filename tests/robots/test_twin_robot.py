@@ -13,6 +13,8 @@ from realitygap.testing import check_robot
 from realitygap.trials import SimTwin, open_twin
 from realitygap.world import Arena, Grid, Obstacle, Pose, load_arena, paper_arena
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("mujoco")
 
 HEALTHY = {

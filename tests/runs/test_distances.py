@@ -8,6 +8,8 @@ import pytest
 from realitygap.evolution import DISTANCES, NoveltyArchive
 from realitygap.runs import Condition, Evolution, replay, run_replicates
 
+pytestmark = pytest.mark.slow
+
 START = {"paper": 20.0, "ordered": 20.0, "jaccard": 0.5, "hamming": 8.0, "edit": 8.0, "alignment": 0.5}
 
 

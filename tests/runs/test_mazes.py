@@ -20,6 +20,8 @@ from tests.reference import maze as reference
 from tests.reference.effort import COMPILED, cases
 from tests.reference.novelty import NearestArchive
 
+pytestmark = pytest.mark.slow
+
 FAR_EXIT = (1000.0, 0.0)
 BIAS = 10  # number of the constant input
 

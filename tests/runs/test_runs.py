@@ -154,6 +154,7 @@ def test_random_networks_are_unrelated():
     assert len(set(weights)) == len(weights) == 120
 
 
+@pytest.mark.slow
 def test_evolution_beats_as_many_random_networks():
     """Over 60 paired runs, chance alone would fail this with probability below 1e-6 (sign test, observed 55 of 60)."""
     best = {}

@@ -8,6 +8,8 @@ import pytest
 
 from realitygap.runs import Condition, frame_of, run_rows
 
+pytestmark = pytest.mark.slow
+
 VARIANTS: list[dict[str, Any]] = [
     {"selection": "coverage", "noise": 0.5},
     {"selection": "random"},

@@ -16,6 +16,8 @@ from realitygap.study._calibrate_all import all_plans
 from realitygap.trials import SimEnsemble, SimTarget
 from realitygap.world import paper_arena
 
+pytestmark = pytest.mark.slow
+
 ARENA = paper_arena()
 
 

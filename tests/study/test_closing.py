@@ -19,6 +19,8 @@ from realitygap.study._closing_twin import ClosingTwin, held_out
 from realitygap.trials import SimTarget, TrialPlan
 from realitygap.world import Calibration, paper_arena
 
+pytestmark = pytest.mark.slow
+
 # Each "twin" is `sim` with other numbers, so that a calibration can be exactly right, or exactly useless.
 FAMILIES = {
     "slow": {"drive.gain_left": 0.7, "drive.gain_right": 0.8, "drive.delay": 0.3},

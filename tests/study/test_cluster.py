@@ -22,6 +22,8 @@ from tests.interrupted import INTERRUPTED
 
 from .dask_processes import DaskProcesses, free_port, kill, wait_until
 
+pytestmark = pytest.mark.slow
+
 SOURCES = Path(__file__).parents[2] / "src"
 STUDY = """
 [study]

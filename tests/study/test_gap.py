@@ -26,6 +26,8 @@ from realitygap.study import _gap_between as study_gap_between
 from realitygap.trials import EndReason, SimTarget
 from realitygap.world import Calibration, paper_arena
 
+pytestmark = pytest.mark.slow
+
 ARENA = paper_arena()
 
 

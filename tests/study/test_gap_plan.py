@@ -16,6 +16,8 @@ from realitygap.study import (
 from realitygap.study._gap_plan import Spreads
 from realitygap.world import paper_arena
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_pilot_tells_how_trials_and_controllers_vary():
     found = pilot_spreads(1)

@@ -7,7 +7,10 @@ import pytest
 
 from realitygap.study._interrupts import held_interrupts
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="a process cannot press Ctrl-C there")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform == "win32", reason="a process cannot press Ctrl-C there"),
+]
 
 
 @pytest.fixture(autouse=True)

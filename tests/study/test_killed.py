@@ -20,7 +20,7 @@ from tests.trials.fake_robot import FakeRobot
 
 from .physical import drive, scored, small_study
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills processes")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="kills processes")]
 
 Point = Callable[[str], None]
 

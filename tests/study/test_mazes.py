@@ -18,6 +18,8 @@ from realitygap.study._mazes import summarize_maze_runs
 from realitygap.tasks import MAZE_TASKS
 from tests.reference.effort import COMPILED, cases
 
+pytestmark = pytest.mark.slow
+
 
 def test_figures_of_both_rewards_have_their_keys_and_do_not_depend_on_threads() -> None:
     told: list[Progress] = []

@@ -22,6 +22,8 @@ from realitygap.trials import TrialInterrupted, WitnessOperator
 from .physical import scored, small_study
 from .test_killed import no_waiting_for_the_disk  # noqa: F401 - a fixture
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 PORT = "emulator://s2?fluke=1&speed=off"
 LONGER = {"steps": "12"}

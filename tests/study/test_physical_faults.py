@@ -22,6 +22,8 @@ from tests.trials.fake_robot import FakeRobot
 
 from .physical import drive, scored, small_study
 
+pytestmark = pytest.mark.slow
+
 LOCK = """
 import sqlite3, sys
 connection = sqlite3.connect(sys.argv[1], isolation_level=None)

@@ -78,6 +78,7 @@ def run_command(study_file: Path, out: Path, *more: str, **options) -> subproces
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
+@pytest.mark.slow
 def test_a_study_killed_at_any_moment_goes_on(study, undisturbed, tmp_path):
     path = tmp_path / "small.toml"
     path.write_text(SMALL)

@@ -92,6 +92,7 @@ def test_what_was_drawn_is_in_the_records_under_names_of_the_description(folder)
     assert folder.read("novel")["behavior"].list.len().unique().to_list() == [2]
 
 
+@pytest.mark.slow
 def test_every_trial_comes_out_again_from_its_row(folder):
     for condition in study().conditions:
         rows = folder.read(condition.name, [3])
@@ -125,6 +126,7 @@ def test_conditions_of_before_keep_their_hash():
     assert Condition(name="a").hash().startswith("88619d669239056a")
 
 
+@pytest.mark.slow
 def test_the_page_says_what_was_assumed_and_draws_trials(folder, tmp_path):
     page = Path(write_report(folder, tmp_path / "page.html")).read_text("utf-8")
     assert "Assumed of objective" in page
@@ -193,6 +195,7 @@ def test_a_function_of_ones_own_decides_who_has_children(tmp_path):
     assert not novel["task_fitness"].equals(novel["fitness"].alias("task_fitness"))
 
 
+@pytest.mark.slow
 def test_a_compiled_function_reads_the_kernels_arrays_and_says_the_same(tmp_path):
     plain = run_replicates(with_task(tmp_path, PYTHON_TASK), 0, 2)
     compiled = run_replicates(with_task(tmp_path, COMPILED_TASK), 0, 2)
@@ -202,6 +205,7 @@ def test_a_compiled_function_reads_the_kernels_arrays_and_says_the_same(tmp_path
     )
 
 
+@pytest.mark.slow
 def test_portions_of_trials_of_which_every_step_is_kept_change_nothing(tmp_path, monkeypatch):
     condition = with_task(tmp_path, PYTHON_TASK)
     whole = frame_of(condition, 0, run_rows(condition, 0, 9))

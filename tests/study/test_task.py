@@ -31,6 +31,7 @@ SMALL = {"population": 4, "generations": 2}
 compiled_only = pytest.mark.skipif(not COMPILED, reason="takes minutes as plain Python")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", CLASSICAL_TASKS)
 def test_figures_have_their_keys_and_the_published_ones_beside(task: str) -> None:
     told: list[Progress] = []
@@ -65,6 +66,7 @@ def test_figures_are_over_the_runs_that_solved_the_task() -> None:
     assert summarize_runs(task, "default", runs[:1])["sd_evaluations"] is None
 
 
+@pytest.mark.slow
 def test_runs_do_not_depend_on_threads_and_differ_by_seed() -> None:
     changes = {"population": 20 if COMPILED else 8, "generations": 60 if COMPILED else 3}
     one = measure_task("xor", seeds=5, seed=3, changes=changes, threads=1)
@@ -126,6 +128,7 @@ def test_counts_and_seeds_that_cannot_be_are_refused(
         measure_task("xor", **{name: number})  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @compiled_only
 @pytest.mark.parametrize(
     ("task", "settings", "seeds", "lost", "low", "high"),

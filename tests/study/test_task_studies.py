@@ -16,6 +16,8 @@ from realitygap.study import load_study, run_study
 from realitygap.tasks import PythonTask
 from tests.reference.effort import COMPILED
 
+pytestmark = pytest.mark.slow
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_task.toml"
 SMALL = {"population": 40, "generations": 8}
 

@@ -16,6 +16,8 @@ from realitygap.study._transferability import distances, nsga2_order
 from realitygap.trials import SimTarget
 from realitygap.world import Calibration, load_calibration, load_robot, paper_arena
 
+pytestmark = pytest.mark.slow
+
 # Far from `sim` as it is: wheels that are slow and hear late, and eyes that see less far.
 OTHER = {"drive.gain_left": 0.8, "drive.gain_right": 0.9, "drive.delay": 0.25, "drive.lag": 0.2}
 OTHER |= {f"range.{k}.decay": 0.1 for k in range(3)}
@@ -140,14 +142,9 @@ def test_a_known_target_may_have_another_name_and_not_another_identity(result, c
         transfer("sim-paper", again, ["plain"], [0], out=tmp_path, calibration=calibration, **SMALL)
 
 
-@pytest.mark.parametrize(
-    ("target", "step_s"),
-    [
-        (SimTarget(SimPlatform(step_s=0.8), paper_arena(), name="other"), 0.8),
-        (SimTarget(JyroPlatform(), paper_arena(), name="jyro"), 0.5),
-    ],
-)
-def test_what_evolves_has_commands_as_long_as_a_robots(target, step_s, tmp_path):
+@pytest.mark.parametrize(("platform", "step_s"), [(SimPlatform(step_s=0.8), 0.8), (JyroPlatform(), 0.5)])
+def test_what_evolves_has_commands_as_long_as_a_robots(platform, step_s, tmp_path):
+    target = SimTarget(platform, paper_arena(), name="other")
     transfer("sim-paper", target, ["plain"], [0], out=tmp_path, **SMALL)
     evolved = json.loads((tmp_path / "transfer.json").read_text())["settings"]["sim"]
     assert (evolved["step_s"] or evolved["robot"]["step_s"]) == step_s

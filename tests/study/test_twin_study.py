@@ -25,6 +25,8 @@ from tests.interrupted import INTERRUPTED
 
 from ..conftest import twin_processes
 
+pytestmark = pytest.mark.slow
+
 STEPS = 15
 
 

@@ -7,6 +7,8 @@ from realitygap.trials import NoiseKey, Play, SimEnsemble, trace_genome
 from realitygap.trials import _ensemble as module
 from realitygap.world import paper_arena
 
+pytestmark = pytest.mark.slow
+
 START = [0.1905, 0.1905, 0.0]
 ROBOT = SimPlatform().robot
 

@@ -12,6 +12,8 @@ from realitygap.study import load_study, run_study
 from realitygap.trials import NoiseKey, SimRobot
 from realitygap.world import Calibration
 
+pytestmark = pytest.mark.slow
+
 ROWS = 7
 TRACK = tuple(0.150 + 0.001 * k for k in range(ROWS))
 GAIN = tuple(1.0 + 0.01 * k for k in range(ROWS))

@@ -23,6 +23,8 @@ from realitygap.world import Arena, Obstacle, RobotModel, load_robot, paper_aren
 from tests.reference import contact as reference
 from tests.reference.effort import cases
 
+pytestmark = pytest.mark.slow
+
 Pose = tuple[float, float, float]
 MODELS = ["freeze", "stop", "slide"]
 NEAT = NeatSettings.named("rosenzweig-remy").rules(3, 2, bias_input=-1)

@@ -15,6 +15,8 @@ from realitygap.trials import SimRobot
 from realitygap.world import Arena, Floor, Light, Obstacle, Pose, RobotModel, load_robot, paper_arena
 from tests.reference import senses as reference
 
+pytestmark = pytest.mark.slow
+
 MIDDLE = Pose(0.5, 0.3, 0.3)
 
 

@@ -16,6 +16,8 @@ from realitygap.trials import NoiseKey, SimWorld, trace_genomes
 from realitygap.trials._sim_overlap import overlaps
 from realitygap.world import Distribution, Obstacle, Pose, paper_arena
 
+pytestmark = pytest.mark.slow
+
 SCRIBBLER = "scribbler-s2-fluke2"
 WALL = 1e-6  # how far a body may come into another by rounding, in single precision [m]
 

@@ -99,6 +99,7 @@ def test_what_is_not_observed_does_not_come_out(observe: Any) -> None:
     assert list(trial.cells) == sorted(trial.cells)
 
 
+@pytest.mark.slow
 def test_over_tcp_it_is_what_it_is_in_this_process() -> None:
     plans = [FORWARD, controller()]
     with emulated() as target:
@@ -112,6 +113,7 @@ def test_over_tcp_it_is_what_it_is_in_this_process() -> None:
         np.testing.assert_allclose(trial.readings, other.readings, atol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "is_the_same"),
     [("seed=3", True), ("id=b", True), ("speed=5", True), ("faults=sag=0.1", False), ("timing=off", False)],
@@ -122,6 +124,7 @@ def test_an_emulator_is_known_by_what_it_is_whatever_it_is_called(options: str, 
     assert (one == other) is is_the_same
 
 
+@pytest.mark.slow
 def test_twins_behind_the_emulator_are_known_apart(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
     known = []
@@ -299,6 +302,7 @@ def test_one_late_command_does_not_make_all_of_them_longer(late_at: int, n: int)
     assert robot.lasted_s == 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", ["20", "1000"])
 def test_commands_last_as_long_however_fast_the_emulator_is(speed: str) -> None:
     with emulated() as target:
@@ -312,6 +316,7 @@ def test_commands_last_as_long_however_fast_the_emulator_is(speed: str) -> None:
     np.testing.assert_allclose(trial.poses, expected.poses, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_robot_that_was_left_driving_too_fast_for_the_machine_answers_all_the_same(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="twins need the extra 'twin'")
     file = tmp_path / "close.toml"

@@ -22,6 +22,8 @@ from realitygap.trials import (
 )
 from realitygap.world import Pose, paper_arena
 
+pytestmark = pytest.mark.slow
+
 KEY = 7
 STEPS = 30
 ARENA = paper_arena()

@@ -22,6 +22,8 @@ from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.trials import RobotOnlooker, TrialPlan, TwinTarget, carry_out_on_robot, open_twin
 from realitygap.world import Pose, paper_arena
 
+pytestmark = pytest.mark.slow
+
 ARENA = paper_arena()
 
 

@@ -88,6 +88,7 @@ def test_a_file_of_too_many_bytes_is_not_read(tmp_path):
         read_photo(bytes(65 << 20))
 
 
+@pytest.mark.slow
 def test_a_photo_cut_off_is_refused():
     with pytest.raises(SheetError, match="Is the file whole"):
         read_photo(photo(1, SCAN).jpeg[:50_000])
@@ -166,6 +167,7 @@ def test_a_very_large_photo_is_halved():
         assert np.abs(seen[10, 10].astype(int) - (200, 100, 50)).max() <= 3
 
 
+@pytest.mark.slow
 def test_of_a_gray_photo_several_pens_are_refused_and_one_is_read():
     gray = _file(Image.open(io.BytesIO(photo(1, SCAN, n=1).jpeg)).convert("L"), "JPEG", quality=92)
     with pytest.raises(SheetError, match="The picture is gray, and its 8 pens are told apart by color"):

@@ -133,6 +133,7 @@ def test_a_view_is_the_same_after_being_told_in_numbers():
     assert again(points) == pytest.approx(view(points), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_drawn_line_lies_where_it_was_drawn(seed):
     """Perspective, lens and waves of the paper are taken out to within a millimeter."""

@@ -22,6 +22,7 @@ def _ious(score):
     return [len(a & b) / len(a | b) for a, b in found]
 
 
+@pytest.mark.slow
 def test_eight_pens_on_a_clean_scan_are_read_without_a_mistake_of_more_than_a_cell():
     score = score_sheet(read_photo(photo(1, SCAN).jpeg), LAYOUT)
     assert np.mean(_ious(score)) > 0.97
@@ -30,23 +31,27 @@ def test_eight_pens_on_a_clean_scan_are_read_without_a_mistake_of_more_than_a_ce
         assert abs(len(trace.cells) - len(truth(curve(trace.pen)))) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 5])
 def test_an_ordinary_photo_is_read_nearly_as_well(seed):
     """Of 20 such photographs the worst had a mean of .93."""
     assert np.mean(_ious(score_sheet(read_photo(photo(seed, ORDINARY).jpeg), LAYOUT))) > 0.9
 
 
+@pytest.mark.slow
 def test_only_pens_that_drew_are_looked_for():
     score = score_sheet(read_photo(photo(2, ORDINARY, n=2).jpeg), LAYOUT, [0, 1])
     assert [trace.pen for trace in score.traces] == [0, 1]
     assert min(_ious(score)) > 0.9
 
 
+@pytest.mark.slow
 def test_a_pen_that_did_not_draw_has_next_to_no_cells():
     score = score_sheet(read_photo(photo(2, ORDINARY, n=2).jpeg), LAYOUT)
     assert all(len(trace.cells) <= 2 for trace in score.traces[2:])
 
 
+@pytest.mark.slow
 def test_without_tried_pens_colors_come_from_names_and_that_is_said():
     score = score_sheet(read_photo(photo(4, SCAN, n=3, has_key=False).jpeg), LAYOUT, [0, 1, 2])
     assert not any(trace.is_tried for trace in score.traces)
@@ -60,6 +65,7 @@ def test_a_pen_whose_name_is_no_color_must_be_tried():
         score_sheet(image, layout)
 
 
+@pytest.mark.slow
 def test_the_path_goes_through_the_whole_trace_from_the_start():
     (trace,) = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0]).traces
     start = np.array([ARENA.start.x, ARENA.start.y])
@@ -69,6 +75,7 @@ def test_the_path_goes_through_the_whole_trace_from_the_start():
     assert np.percentile(away, 95) < 0.004
 
 
+@pytest.mark.slow
 def test_probabilities_say_cells_and_doubt():
     (trace,) = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0]).traces
     assert trace.probability.shape == (72,)
@@ -78,6 +85,7 @@ def test_probabilities_say_cells_and_doubt():
     assert all(trace.confidence[cell] < 0.9 for cell in trace.doubtful)
 
 
+@pytest.mark.slow
 def test_the_overlay_is_a_picture():
     score = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0])
     data = overlay_png(score, {0: "black, trial 1"})

@@ -89,6 +89,7 @@ def test_a_height_that_is_left_out_moves_the_robot_by_its_parallax(film, picture
     assert "larger than its size and height say" in flat.warnings[0]
 
 
+@pytest.mark.slow
 def test_a_tag_of_another_family_off_the_middle_and_turned_is_found_by_looking():
     tag = RobotTag(7, 0.06, 0.12, "aruco4x4", ahead=0.02, left=-0.01, turned=math.radians(90))
     film = Film(path_through(TIMES, POSES), 0.8, rate=15.0, filmed=SMALL, tag=tag)
@@ -99,6 +100,7 @@ def test_a_tag_of_another_family_off_the_middle_and_turned_is_found_by_looking()
     assert np.abs(deg).max() < 1
 
 
+@pytest.mark.slow
 def test_a_video_file_tells_the_same_as_its_pictures(film, pictures, tmp_path):
     path = tmp_path / "film.mp4"
     save_film(replace(film, lost=0.0, duration_s=1.0), str(path))

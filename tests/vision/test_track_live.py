@@ -44,6 +44,7 @@ def film():
     return Film(path_through(np.arange(3) * 0.4, poses), 0.8, rate=15.0, filmed=camera)
 
 
+@pytest.mark.slow
 def test_pictures_are_followed_as_they_come_and_forgotten_when_a_trial_begins(film):
     source = _Played(list(film))
     with LiveTrack(source, Marks(ARENA, lens=film.camera.lens), lambda: source.time) as live:

@@ -20,14 +20,21 @@ def try_genome(
         str,
         typer.Option("--on", metavar="PLATFORM", help="jyro, sim, sim:FILE, twin:FILE or scribbler:PORT."),
     ],
-    trials: Annotated[int, typer.Option(min=1, max=9999, help="How many.")] = 1,
+    trials: Annotated[int, typer.Option(min=1, max=9999, help="Number of trials.")] = 1,
     steps: Annotated[int, typer.Option(min=1, help="Commands in each.")] = 100,
-    observe: Annotated[str, typer.Option(help="What is seen of them: cells, encoders or track.")] = "cells",
+    observe: Annotated[str, typer.Option(help="Observe cells, encoders or track.")] = "cells",
+    inputs: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Names of the controller's inputs, such as range.0,range.1,bias, if its file has none.",
+        ),
+    ] = None,
     arena: Annotated[str, typer.Option(metavar="NAME", help="Name or file of an arena.")] = "paper",
     witness: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulator in another program.")
+        str | None, typer.Option(metavar="HOST:PORT", help="The witness of an emulator in another program.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of a simulator's noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulator's noise.")] = 0,
     out: Annotated[
         Path | None,
         typer.Option("-o", "--out", metavar="FILE", help="Keep the trials, one a line, as they come."),
@@ -38,7 +45,8 @@ def try_genome(
 
     The command prints how much of the arena the controller covers.
 
-    What evolved anywhere drives anywhere: in simulation, on a twin, and over the wire on a robot or an emulated one.
+    A controller drives in simulation, on a twin, and over the wire on a robot or an emulated one, if they have its
+    inputs.
     With -o, trials that are in the file already are not driven again.
 
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
@@ -48,7 +56,7 @@ def try_genome(
     In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
     """
     from realitygap.errors import did_you_mean
-    from realitygap.evolution import Genome
+    from realitygap.evolution import ControllerInterface, Genome
     from realitygap.records import OBSERVATIONS
     from realitygap.study import try_on
     from realitygap.world import load_arena
@@ -58,6 +66,9 @@ def try_genome(
     if observe not in OBSERVATIONS:
         raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
     controller = Genome.load(genome)
+    if inputs is not None:
+        names = ControllerInterface(tuple(name.strip() for name in inputs.split(",")))
+        controller = controller.with_interface(names)
     with opened_target(on, load_arena(arena), witness=witness, seed=seed) as target:
         tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
         n_cells = target.arena.grid.n_cells

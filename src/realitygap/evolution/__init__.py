@@ -5,6 +5,7 @@ from ._archive_members import Member, archive_members
 from ._distances import DISTANCES, BehaviorDistance, behavior_distance, distance_kind
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
+from ._interface import PAPER_INPUTS, ControllerInterface, Sense, inputs_of_ranges, paper_interface
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -22,8 +23,10 @@ from ._settings import NAMED_SETTINGS, NeatSettings
 __all__ = [
     "DISTANCES",
     "NAMED_SETTINGS",
+    "PAPER_INPUTS",
     "BehaviorDistance",
     "ConnectionGene",
+    "ControllerInterface",
     "Genome",
     "Member",
     "NearestArchive",
@@ -34,6 +37,7 @@ __all__ = [
     "NoveltySettings",
     "PaperArchive",
     "Population",
+    "Sense",
     "archive_members",
     "behavior_distance",
     "decode_all",
@@ -41,8 +45,10 @@ __all__ = [
     "euclidean",
     "genome_from_record",
     "genome_record",
+    "inputs_of_ranges",
     "largest_cell_distance",
     "network_picture",
+    "paper_interface",
     "random_key",
     "sorted_cells_distance",
     "to_networkx",

@@ -11,12 +11,13 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import RecordError
+from realitygap.errors import ControllerError, RecordError
 from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels._network import Networks, activate, decode_rows, make_networks
 from realitygap.records import write_whole
 
 from . import _json
+from ._interface import CONSTANT, ControllerInterface, paper_interface
 
 T = TypeVar("T", Genomes, Networks)
 
@@ -180,12 +181,57 @@ class Genome:
     def __init__(self, genomes: Genomes, row: int, rules: NeatRules, bias_value: float = 1.0) -> None:
         self._genomes = genomes
         self._row = row
+        self._interface: ControllerInterface | None = None  # where it is not the paper's
         self.rules = rules
         self.bias_value = bias_value
 
     def __getstate__(self) -> dict[str, Any]:
         """Of the arrays, which hold a whole population, only the genome's own row."""
         return self.__dict__ | {"_genomes": _row_of(self._genomes, self._row), "_row": 0}
+
+    @property
+    def interface(self) -> ControllerInterface:
+        """The names of its inputs and outputs; the paper's unless others were given.
+
+        Raises:
+            ControllerError: It has other numbers of them than the paper's networks, and no names.
+        """
+        if self._interface is not None:
+            return self._interface
+        paper, (n_inputs, n_outputs) = self._paper, self._sizes
+        if (n_inputs, n_outputs) != (len(paper.inputs), len(paper.outputs)):
+            raise ControllerError(
+                f"The controller has {n_inputs} inputs and {n_outputs} outputs, and does not say what they are. "
+                f"Expected {', '.join(paper.inputs)} and {', '.join(paper.outputs)}, or names for them (--inputs)."
+            )
+        return paper
+
+    def with_interface(self, interface: ControllerInterface) -> Self:
+        """The same genome whose inputs and outputs have these names.
+
+        Raises:
+            ControllerError: The numbers of names do not fit, or the constant input has another place.
+        """
+        rules, inputs = self.rules, interface.inputs
+        constant = inputs.index(CONSTANT) if CONSTANT in inputs else -1
+        if (len(inputs), len(interface.outputs), constant) != (*self._sizes, rules.bias_input):
+            n, m = self._sizes
+            at = f"input {rules.bias_input} is {CONSTANT}" if rules.bias_input >= 0 else f"none is {CONSTANT}"
+            raise ControllerError(
+                f"The names are {', '.join(inputs)} and {', '.join(interface.outputs)}, and the controller has {n} "
+                f"inputs, of which {at}, and {m} outputs. Name each of them."
+            )
+        named = type(self)(self._genomes, self._row, rules, self.bias_value)
+        named._interface = None if interface == self._paper else interface
+        return named
+
+    @property
+    def _paper(self) -> ControllerInterface:
+        return paper_interface(constant=self.rules.bias_input >= 0)
+
+    @property
+    def _sizes(self) -> tuple[int, int]:
+        return self.rules.n_inputs, self.rules.n_outputs
 
     @property
     def nodes(self) -> tuple[NodeGene, ...]:
@@ -233,9 +279,13 @@ class Genome:
         return Network(decode_all([self]), 0, self.rules, self.bias_value)
 
     def to_dict(self) -> dict[str, Any]:
-        """The genes, `nodes` and `connections`, and what decoding needs, as plain values with a version."""
+        """The genes, `nodes` and `connections`, and what decoding needs, as plain values with a version.
+
+        Names of inputs and outputs are among them where they are not the paper's.
+        """
         return {
             **_json.head("genome", self.rules, self.bias_value),
+            **({} if self._interface is None else _json.interface_to_dict(self._interface)),
             "node_bias": bool(self.rules.node_bias),
             "nodes": [asdict(node) for node in self.nodes],
             "connections": [asdict(connection) for connection in self.connections],
@@ -301,7 +351,12 @@ class Genome:
         }
         rules = form.rules(n_inputs, n_outputs, constant="bias" in kinds, node_bias=form.node_bias)
         made = genome_from_record(record, rules, form.bias_value)
-        return cls(made._genomes, 0, rules, form.bias_value)
+        genome = cls(made._genomes, 0, rules, form.bias_value)
+        try:
+            named = _json.interface_of(form)
+            return genome if named is None else genome.with_interface(named)
+        except ControllerError as error:
+            raise RecordError(f"{where} is not a whole genome: {error}") from error
 
     def _repr_svg_(self) -> str:
         from ._picture import network_picture
@@ -311,7 +366,8 @@ class Genome:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Genome):
             return NotImplemented
-        return self.nodes == other.nodes and self.connections == other.connections
+        same = self.nodes == other.nodes and self.connections == other.connections
+        return same and self._interface == other._interface
 
     __hash__ = None  # type: ignore[assignment]  # arrays behind it may be large; compare, do not index
 

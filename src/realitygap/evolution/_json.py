@@ -13,9 +13,13 @@ from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.kernels._genome import NeatRules
 
+from ._interface import ControllerInterface
 from ._settings import ACTIVATIONS, NeatSettings
 
 FORMAT_VERSION = 1
+"""Of networks, and of genomes that do not name their inputs and outputs."""
+NAMED_VERSION = 2
+"""Of genomes that do."""
 Kind = Literal["genome", "network"]
 
 
@@ -63,10 +67,22 @@ class ConnectionForm(BaseModel):
     enabled: bool
 
 
+class InterfaceForm(BaseModel):
+    """Names of inputs and outputs as written."""
+
+    model_config = ConfigDict(extra="ignore", strict=True)
+
+    inputs: list[str] = Field(max_length=1024)
+    outputs: list[str] = Field(max_length=1024)
+
+
 class GenomeForm(_Form):
-    """A genome as written."""
+    """A genome as written; exports of earlier versions have its names apart."""
 
     node_bias: bool
+    interface: InterfaceForm | None = None
+    input_names: list[str] | None = None
+    output_names: list[str] | None = None
     nodes: list[NodeForm]
     connections: list[ConnectionForm]
 
@@ -105,6 +121,25 @@ def head(kind: Kind, rules: NeatRules, bias_value: float) -> dict[str, Any]:
         "recurrent": bool(rules.recurrent),
         "bias_value": float(bias_value),
     }
+
+
+def interface_to_dict(interface: ControllerInterface) -> dict[str, Any]:
+    """Return the names of a genome's inputs and outputs as they are written."""
+    names = {"inputs": list(interface.inputs), "outputs": list(interface.outputs)}
+    return {"version": NAMED_VERSION, "interface": names}
+
+
+def interface_of(form: GenomeForm) -> ControllerInterface | None:
+    """The names that a document has; None where it has none.
+
+    Raises:
+        ControllerError: They are no names of a controller's inputs and outputs.
+    """
+    if form.interface is not None:
+        return ControllerInterface(tuple(form.interface.inputs), tuple(form.interface.outputs))
+    if form.input_names is not None and form.output_names is not None:
+        return ControllerInterface(tuple(form.input_names), tuple(form.output_names))
+    return None
 
 
 def to_text(values: dict[str, Any]) -> str:
@@ -148,10 +183,11 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
     found = values.get("format") if isinstance(values, Mapping) else None
     if found != expected:
         raise RecordError(f"{where} has the format {found!r}, expected {expected!r}.")
-    if values.get("version") != FORMAT_VERSION:
+    known = (FORMAT_VERSION, NAMED_VERSION) if kind == "genome" else (FORMAT_VERSION,)
+    if values.get("version") not in known:
         raise RecordVersionError(
             f"{where} is a {kind} of version {values.get('version')}, this realitygap reads version "
-            f"{FORMAT_VERSION}. Use the realitygap that wrote it."
+            f"{' and '.join(map(str, known))}. Use the realitygap that wrote it."
         )
     try:
         return form.model_validate(dict(values))

@@ -77,7 +77,7 @@ class _OneRobot(gymnasium.Env[Array, Array]):
         return None if self.render_mode is None else self._robots.picture(0)
 
     def close(self) -> None:
-        """Let go of the robot; safe to call twice."""
+        """Let go of the robot; safe to call twice, and `reset` takes it again."""
         self._robots.close()
 
     def _info(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import did_you_mean, real_number, whole_number
+from realitygap.evolution import PAPER_INPUTS, ControllerInterface
 from realitygap.kernels._philox import MAX_INDIVIDUALS
 from realitygap.robots import JyroPlatform, SimPlatform, TwinPlatform
 from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, CoverageTask
@@ -32,7 +33,6 @@ T = TypeVar("T")
 PAPERS_NOISE = 0.1
 """The paper's a on `jyro`, whose sensors are without noise otherwise."""
 
-PAPERS_INPUTS = ("obstacle", "stall", "time")
 PLATFORMS = ("jyro", "sim", "sim:FILE", "twin:FILE")
 
 _KHEPERA_RANGES = tuple(f"range.{k}" for k in range(8))
@@ -209,14 +209,16 @@ def task_robots(
     if arena is None and kind != "coverage":
         arena = {"preset": preset}
     place = _made("arena", ArenaSettings, arena).arena()
-    inputs = PAPERS_INPUTS
+    inputs = PAPER_INPUTS
     if isinstance(made, SimPlatform) and kind != "coverage":
         default = INPUTS[kind] if platform is None else own.inputs
-        inputs = tuple(name for name in settings.get("inputs", default) if name != "bias")
+        inputs = ControllerInterface(tuple(settings.get("inputs", default))).sensed
+    elif isinstance(made, TwinPlatform) and kind != "coverage":
+        inputs = ControllerInterface(tuple(settings.get("inputs", inputs))).sensed
     elif tuple(settings.get("inputs", inputs)) != inputs:
         raise ValueError(
             f"task.inputs is {', '.join(settings['inputs'])}, expected {', '.join(inputs)} on platform "
-            f"{_name_of(made)!r}. Choose platform 'sim', or leave the inputs out."
+            f"{_name_of(made)!r}. Choose another platform, or leave the inputs out."
         )
     fleet = _fleet(made, place, inputs, noise, n)
     try:
@@ -266,7 +268,7 @@ def _fleet(
         raise ValueError(
             f"noise is {noise:g}, expected none on platform 'twin': its readings are noisy already."
         )
-    return TwinFleet(platform, arena, n)
+    return TwinFleet(platform, arena, inputs, n)
 
 
 def _platform(given: Platform, kind: str) -> JyroPlatform | SimPlatform | TwinPlatform:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import ControllerError
+from realitygap.evolution import ControllerInterface, inputs_of_ranges
 from realitygap.robots import TwinPlatform
 from realitygap.trials import NoiseKey, TwinRobots, cell_at
 from realitygap.world import Arena, check_start
@@ -15,20 +17,31 @@ from ._fleet import Array, Outline, limited
 
 
 class TwinFleet:
-    """A `Fleet` of a twin, which sees obstacle, stall and time; it lives in a separate process.
+    """A `Fleet` of a twin, which sees obstacle, stall, time and single range sensors; it lives in a separate process.
 
     Raises:
+        ControllerError: The twin does not have such inputs.
         ValueError: The robot does not fit at the start.
         RealityGapError: The twin cannot be opened.
     """
 
-    def __init__(self, platform: TwinPlatform, arena: Arena, n: int) -> None:
+    def __init__(self, platform: TwinPlatform, arena: Arena, inputs: tuple[str, ...], n: int) -> None:
         check_start(arena, platform.body)
+        interface = ControllerInterface(inputs)
+        self._sense = interface.bind(platform.steps)
+        self._n_inputs = len(inputs)
         self.arena, self.n_steps = arena, platform.steps
         self.outline = Outline.of_body(platform.body, platform.sensors)
         self._reach = platform.sensors.max_range
         self._n = n
         self._robots = TwinRobots(platform, arena, n)
+        try:
+            interface.check(
+                inputs_of_ranges(self._robots.n_sensors), "The environment", f"twin {platform.file}"
+            )
+        except ControllerError:
+            self._robots.close()
+            raise
         self.step_s = self._robots.step_s
         self.cells = np.zeros((n, arena.grid.n_cells), np.uint8)
         self.counts = np.zeros((n, 2), np.int32)
@@ -49,7 +62,7 @@ class TwinFleet:
 
     def bounds(self) -> NDArray[Any]:
         """As `Fleet.bounds`."""
-        return np.array([[0.0] * 3, [1.0] * 3])
+        return np.array([[0.0] * self._n_inputs, [1.0] * self._n_inputs])
 
     def start(self, key: NoiseKey) -> None:
         """As `Fleet.start`."""
@@ -73,8 +86,8 @@ class TwinFleet:
 
     def observe(self) -> Array:
         """As `Fleet.observe`."""
-        time = np.full(self._n, self._step / self.n_steps)
-        return np.stack([self.ranges.max(axis=1), self.stalled, time], axis=1).astype(np.float64)
+        seen = zip(self.ranges.tolist(), self.stalled.tolist(), strict=True)
+        return np.array([self._sense(readings, stalled, self._step) for readings, stalled in seen])
 
     def facts(self) -> dict[str, Array]:
         """As `Fleet.facts`; distances are what readings tell of them."""

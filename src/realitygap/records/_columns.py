@@ -166,7 +166,7 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
 
     Raises:
         TypeError: it is not a polars frame.
-        ValueError: columns, types, nulls, names or the order and completeness of the rows are wrong.
+        ValueError: columns, types, nulls, ranges, names or the order and completeness of the rows are wrong.
     """
     if not isinstance(frame, pl.DataFrame):
         raise TypeError(f"The rows are a {type(frame).__name__}, expected a polars DataFrame.")
@@ -174,6 +174,7 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
     if frame.is_empty():
         raise ValueError("The frame has no rows, expected at least one replicate.")
     _check_nulls(frame, columns_in(frame))
+    _check_ranges(frame)
     if (frame["condition"] != condition).any():
         raise ValueError(
             f"Every row's condition must be {condition!r}, found {frame['condition'].unique().to_list()}."
@@ -182,16 +183,17 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
 
 
 def check_part(frame: pl.DataFrame, first: int) -> None:
-    """Check some columns of a chunk that is read: nulls, and the order of the rows if their keys are among them.
+    """Check some columns of a chunk that is read: nulls, ranges, and the order of the rows if their keys are there.
 
     Args:
         frame: Columns of a published chunk.
         first: The first row's replicate.
 
     Raises:
-        ValueError: A value is missing, or rows are not in order.
+        ValueError: A value is missing or out of its range, or rows are not in order.
     """
     _check_nulls(frame, [column for column in (*COLUMNS, *EXTRA) if column.name in frame.columns])
+    _check_ranges(frame)
     if set(KEYS) <= set(frame.columns) and not frame.is_empty():
         _check_order(frame, first)
 
@@ -224,6 +226,18 @@ def _check_nulls(frame: pl.DataFrame, columns: Iterable[Column]) -> None:
             if (values.null_count() and not part.nullable) or inner:
                 name = part.name if part is column else f"{column.name}.{part.name}"
                 raise ValueError(f"Column {name!r} holds nulls, expected a value in every row.")
+
+
+def _check_ranges(frame: pl.DataFrame) -> None:
+    """Shares must be shares, and parents must be individuals: reports count and index by them."""
+    for name in ("coverage_line", "coverage_ends"):
+        if name in frame.columns and not frame[name].drop_nulls().is_between(0.0, 1.0).all():
+            raise ValueError(f"Column {name!r} holds a value that is not from 0 to 1.")
+    if {"parents", "individual"} <= set(frame.columns) and not frame.is_empty():
+        n = len(frame["individual"].unique())
+        last = frame["parents"].explode().drop_nulls().to_numpy().max(initial=0)
+        if last >= n:
+            raise ValueError(f"Column 'parents' holds individual {last}, expected at most {n - 1}.")
 
 
 def _check_order(frame: pl.DataFrame, first: int) -> int:

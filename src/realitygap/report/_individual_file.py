@@ -11,7 +11,7 @@ from typing import Any, Literal
 from realitygap._version import __version__
 from realitygap.errors import did_you_mean, from_extra
 from realitygap.evolution import Genome, to_networkx, to_onnx
-from realitygap.evolution._json import to_text
+from realitygap.evolution._json import interface_to_dict, to_text
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results, write_whole
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
@@ -95,8 +95,7 @@ def _names(chosen: ChosenTrial) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _json(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
-    inputs, outputs = _names(chosen)
-    values = genome.to_dict() | {"input_names": inputs, "output_names": outputs, "origin": origin}
+    values = genome.to_dict() | interface_to_dict(genome.interface) | {"origin": origin}
     return to_text(values).encode("utf-8")
 
 

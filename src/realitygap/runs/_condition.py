@@ -11,7 +11,14 @@ from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, mo
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
-from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
+from realitygap.evolution import (
+    DISTANCES,
+    ControllerInterface,
+    NeatSettings,
+    NoveltySettings,
+    inputs_of_ranges,
+    random_key,
+)
 from realitygap.kernels._genome import NeatRules
 from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, hash_elsewhere
 from realitygap.settings import Settings, mistakes
@@ -164,6 +171,9 @@ class Condition(Settings):
     def _robot_and_arena_have_what_networks_see(self) -> Self:
         if self.platform == "sim":
             sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise)
+        elif self.platform == "twin":
+            there = inputs_of_ranges(len(self.twin.sensors.mounts))
+            ControllerInterface(self.network_inputs).check(there, "A network", "platform 'twin'")
         elif self.coverage is None and self.network_inputs != paper_inputs(self.neat_rules):
             raise ValueError(
                 f"the networks of task {self.fitness_task.name!r} see {', '.join(self.network_inputs)}, expected "

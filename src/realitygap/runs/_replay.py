@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from realitygap.errors import RecordError
-from realitygap.evolution import Genome, genome_from_record
+from realitygap.evolution import ControllerInterface, Genome, genome_from_record
 from realitygap.trials import NoiseKey, Trajectory, trace_genome
 
 from ._condition import Condition
@@ -19,8 +19,9 @@ _COLUMNS = (
 
 
 def genome_of(condition: Condition, row: Mapping[str, Any]) -> Genome:
-    """The genome of a row of results."""
-    return genome_from_record(row["genome"], condition.neat_rules, condition.neat.bias_value)
+    """The genome of a row of results, whose inputs and outputs have the condition's names."""
+    genome = genome_from_record(row["genome"], condition.neat_rules, condition.neat.bias_value)
+    return genome.with_interface(ControllerInterface(condition.network_inputs, condition.output_names))
 
 
 def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> Trajectory:

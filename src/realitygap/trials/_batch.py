@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import whole_number
-from realitygap.evolution import Genome
+from realitygap.evolution import Genome, paper_interface
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import Networks
 from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
@@ -23,7 +23,7 @@ REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
 def paper_inputs(rules: NeatRules) -> tuple[str, ...]:
     """What the paper's networks see, with the constant input where they have one."""
-    return ("obstacle", "stall", "time", *(("bias",) if rules.bias_input >= 0 else ()))
+    return paper_interface(constant=rules.bias_input >= 0).inputs
 
 
 def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:

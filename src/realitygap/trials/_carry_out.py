@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.evolution import Network
+from realitygap.evolution import Network, Sense
 from realitygap.records import Observe, ObservedTrial
 from realitygap.robots import Command, Observation, Robot, check_command
 from realitygap.world import Pose
 
-from ._physical import EndReason, check_network, limited, warm_up
+from ._physical import EndReason, limited, warm_up
 from ._target import TrialPlan
 
 Answer = Callable[[int, Observation], Command]
@@ -80,8 +80,8 @@ def carry_out_on_robot(
 ) -> tuple[ObservedTrial, str]:
     """Carry out one trial on a robot, and keep what is to be observed and nothing more.
 
-    A controller sees the largest reading, whether the robot is blocked, and step / steps; its outputs, limited to
-    -1..1, are move and turn. The motors are stopped on every way out.
+    A controller sees what its interface names; its outputs, limited to -1..1, are move and turn. The motors are stopped
+    on every way out.
 
     Args:
         robot: Connected. A simulated one is put at the start, a physical one has been put there.
@@ -95,7 +95,8 @@ def carry_out_on_robot(
         was seen whole.
 
     Raises:
-        ValueError: A controller with other inputs or outputs, or commands that no robot takes.
+        ControllerError: A controller that sees other things than range readings, stall and time.
+        ValueError: Commands that no robot takes.
         TrialStopped: In place of a KeyboardInterrupt or SystemExit, which is its cause.
 
     Source: Rosenzweig & Remy, sections 2.1 to 2.3.
@@ -133,14 +134,13 @@ def _answers(plan: TrialPlan) -> tuple[Answer, int]:
         given = [check_command(Command(*map(float, row))) for row in plan.commands]
         return lambda step, seen: given[step], len(given)
     network = plan.genome.network()
-    check_network(network)
     warm_up(network)
-    return _controller(network, plan.steps), plan.steps
+    return _controller(network, plan.genome.interface.bind(plan.steps)), plan.steps
 
 
-def _controller(network: Network, n_steps: int) -> Answer:
+def _controller(network: Network, sense: Sense) -> Answer:
     def answer(step: int, seen: Observation) -> Command:
-        outputs = network.activate([max(seen.readings), float(seen.stalled), step / n_steps])
+        outputs = network.activate(sense(seen.readings, seen.stalled, step))
         return Command(limited(float(outputs[0])), limited(float(outputs[1])))
 
     return answer

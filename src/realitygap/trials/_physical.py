@@ -169,7 +169,7 @@ def check_network(network: Network) -> None:
 
 def warm_up(network: Network) -> None:
     """Compile or load what a network needs before the robot moves: a watchdog would take that for silence."""
-    network.activate([0.0, 0.0, 0.0])
+    network.activate([0.0] * network.n_inputs)
     network.reset()
 
 

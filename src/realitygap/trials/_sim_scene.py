@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.evolution import ControllerInterface
 from realitygap.kernels._sim_shape import (
-    INPUT_KINDS,
     SimShape,
     encloses,
     half_width,
@@ -119,7 +119,7 @@ def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise:
         **_body_and_drive(robot, numbers, platform.command_s),
         **_sensors(robot),
         **_surroundings(arena, numbers),
-        inputs=[_input(name, robot, arena) for name in inputs],
+        inputs=_inputs(inputs, robot, arena),
     )
     rows = sim_rows(shape)
     return SimScene(
@@ -322,35 +322,24 @@ def _floor_image(image: FloorImage | None) -> tuple[NDArray[np.float32] | None, 
     return upwards[rows.astype(int)][:, columns.astype(int)], (image.x, image.y, per_m)
 
 
-_COUNTS = {"range": "range", "light": "light", "line": "line", "bump": "bump"}
-_ALONE = ("obstacle", "stall", "time", "bias", "goal_distance", "last_move", "last_turn")
+def sim_inputs(robot: RobotModel, arena: Arena) -> tuple[str, ...]:
+    """Names of all that networks can see of a robot in an arena, the constant input included."""
+    counts = {kind: len(getattr(robot, kind)) for kind in ("range", "light", "line", "bump")}
+    counts["encoder"] = 0 if robot.encoder is None else 2
+    counts["goal_sector"] = 0 if arena.goal is None else N_SECTORS
+    names = ["stall", "time", "bias", "last_move", "last_turn"]
+    names += ["obstacle"] if robot.range else []
+    names += [] if arena.goal is None else ["goal_distance"]
+    return (*names, *(f"{kind}.{k}" for kind, n in counts.items() for k in range(n)))
 
 
-def _input(name: str, robot: RobotModel, arena: Arena) -> tuple[str, int]:
-    """Kind and index of an input.
+def _inputs(names: Sequence[str], robot: RobotModel, arena: Arena) -> list[tuple[str, int]]:
+    """Kind and index of each input.
 
     Raises:
-        ValueError: There is none of this name, or this robot or arena does not have it.
+        ControllerError: This robot in this arena does not have one of them.
     """
-    kind, _, index = name.partition(".")
-    known = kind in INPUT_KINDS and (index == "" if kind in _ALONE else index.isdecimal())
-    if not known:
-        raise ValueError(
-            f"A network cannot see {name!r}, expected {', '.join(_ALONE)}, or range.K, light.K, line.K, bump.K, "
-            "encoder.K, goal_sector.K with K from 0 on."
-        )
-    if kind in _COUNTS:
-        n = len(getattr(robot, _COUNTS[kind]))
-        if int(index) >= n:
-            raise ValueError(f"A network is to see {name}, and robot {robot.name!r} has {n} {kind} sensors.")
-    if kind == "encoder" and (robot.encoder is None or int(index) > 1):
-        raise ValueError(
-            f"A network is to see {name}, and robot {robot.name!r} has encoder.0 and .1 or none."
-        )
-    if kind == "goal_sector" and int(index) >= N_SECTORS:
-        raise ValueError(f"A network is to see {name}, and there are goal_sector.0 to .{N_SECTORS - 1}.")
-    if kind.startswith("goal") and arena.goal is None:
-        raise ValueError(f"A network is to see {name}, and arena {arena.name!r} has no goal.")
-    if kind == "obstacle" and not robot.range:
-        raise ValueError(f"A network is to see obstacle, and robot {robot.name!r} has no range sensor.")
-    return kind, int(index or 0)
+    where = f"robot {robot.name!r} in arena {arena.name!r}"
+    ControllerInterface(tuple(names)).check(sim_inputs(robot, arena), "A network", where)
+    parts = [name.partition(".") for name in names]
+    return [(kind, int(index or 0)) for kind, _, index in parts]

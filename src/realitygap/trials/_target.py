@@ -94,7 +94,13 @@ class Target(Protocol):
     ) -> None: ...
 
 
-def check_plans(plans: Sequence[TrialPlan], observe: Observe, target: Target, most_number: int) -> None:
+def check_plans(
+    plans: Sequence[TrialPlan],
+    observe: Observe,
+    target: Target,
+    most_number: int,
+    inputs: Sequence[str] | None = None,
+) -> None:
     """Refuse plans that a target cannot carry out.
 
     Args:
@@ -102,8 +108,10 @@ def check_plans(plans: Sequence[TrialPlan], observe: Observe, target: Target, mo
         observe: How much of them is to be seen.
         target: By whom.
         most_number: The greatest number of a trial.
+        inputs: What networks can see there; anything where trials are only looked up.
 
     Raises:
+        ControllerError: A controller sees what is not there.
         ValueError: One of them cannot be, or so much of it cannot be seen.
     """
     if observe not in OBSERVATIONS:
@@ -123,5 +131,7 @@ def check_plans(plans: Sequence[TrialPlan], observe: Observe, target: Target, mo
             np.abs(plan.commands) <= 1
         ):  # so that no number is refused, too
             raise ValueError(f"The commands of plan {k} are not all numbers from -1 to 1.")
+        if plan.genome is not None and inputs is not None:
+            plan.genome.interface.check(inputs, "The controller", target.name)
         whole_number(f"number of plan {k}", plan.number, 0, most_number)
         whole_number(f"steps of plan {k}", plan.steps, 1, 100_000)

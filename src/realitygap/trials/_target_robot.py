@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from realitygap.errors import RobotError
+from realitygap.evolution import inputs_of_ranges
 from realitygap.records import Observe, ObservedTrial
 from realitygap.robots import Clock, Command, Label, Observation, Robot
 from realitygap.world import Arena, Pose
@@ -152,7 +153,7 @@ class RobotTarget:
         tell: Callable[[int, ObservedTrial], None] | None = None,
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
-        check_plans(plans, observe, self, MOST_NUMBER)
+        check_plans(plans, observe, self, MOST_NUMBER, inputs_of_ranges(self.n_sensors))
         trials = []
         try:
             for k, plan in enumerate(plans):

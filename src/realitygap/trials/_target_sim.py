@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.evolution import PAPER_INPUTS, ControllerInterface
 from realitygap.kernels._fleet import make_fleet, read_robots, start_robots
 from realitygap.kernels._lanes import LANES
 from realitygap.kernels._philox import MAX_INDIVIDUALS
@@ -27,6 +28,7 @@ from ._jyro_robot import JyroRobot
 from ._onlooker import RobotOnlooker
 from ._physical import EndReason
 from ._sim_robot import SimRobot, placed
+from ._sim_scene import sim_inputs
 from ._target import TrialPlan, check_plans
 from ._try import try_all
 
@@ -84,7 +86,7 @@ class SimTarget:
         tell: Callable[[int, ObservedTrial], None] | None = None,
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`."""
-        check_plans(plans, observe, self, MAX_INDIVIDUALS - 1)
+        check_plans(plans, observe, self, MAX_INDIVIDUALS - 1, self._inputs)
         trials: list[ObservedTrial] = []
         for first in range(0, len(plans), TOGETHER):
             for trial in self._carry_out_some(plans[first : first + TOGETHER], observe):
@@ -123,9 +125,9 @@ class SimTarget:
                 trials[k] = self._command(plan, observe)
             else:
                 kind = tuple(kind_of(plan.genome).values())
-                alike.setdefault((plan.start, plan.steps, kind), []).append(k)
-        for group in alike.values():
-            tried = self._try([plans[k] for k in group], observe)
+                alike.setdefault((plan.start, plan.steps, plan.genome.interface, kind), []).append(k)
+        for (*_, interface, _), group in alike.items():
+            tried = self._try([plans[k] for k in group], interface, observe)
             trials |= dict(zip(group, tried, strict=True))
         return [trials[k] for k in range(len(plans))]
 
@@ -142,7 +144,16 @@ class SimTarget:
         self._robot.reset()
         return self._robot.pose
 
-    def _try(self, plans: Sequence[TrialPlan], observe: Observe) -> list[ObservedTrial]:
+    @cached_property
+    def _inputs(self) -> tuple[str, ...]:
+        """Names of all inputs that networks can have."""
+        if isinstance(self.platform, SimPlatform):
+            return sim_inputs(self.platform.model, self.arena)
+        return PAPER_INPUTS
+
+    def _try(
+        self, plans: Sequence[TrialPlan], interface: ControllerInterface, observe: Observe
+    ) -> list[ObservedTrial]:
         """Trials of controllers of one kind from one start."""
         start, steps = plans[0].start, plans[0].steps
         platform, arena = self.platform.model_copy(update={"steps": steps}), self.arena
@@ -154,7 +165,7 @@ class SimTarget:
         counters = counters_of_individuals(NoiseKey(self.key), [plan.number for plan in plans])
         trials, tried = try_all(
             platform, arena, list(genomes.values()), which, self.key, counters,
-            inputs=None, noise=self.noise, trace=True,
+            inputs=interface.inputs, noise=self.noise, trace=True,
         )  # fmt: skip
         readings = tried.trace.readings
         if isinstance(platform, JyroPlatform):  # its trace has them without noise

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Self
 
 from realitygap.errors import RobotError
+from realitygap.evolution import inputs_of_ranges
 from realitygap.records import Observe, ObservedTrial, trial_from_dict
 from realitygap.robots import Label
 from realitygap.world import Arena
@@ -63,7 +64,7 @@ class TwinTarget:
         tell: Callable[[int, ObservedTrial], None] | None = None,
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`; on Ctrl-C its processes end."""
-        check_plans(plans, observe, self, MOST_NUMBER)
+        check_plans(plans, observe, self, MOST_NUMBER, inputs_of_ranges(self.n_sensors))
         requests = [{"do": "carry_out", "plan": plan_to_dict(plan), "observe": observe} for plan in plans]
         trials: list[ObservedTrial] = []
         try:

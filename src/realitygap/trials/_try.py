@@ -58,17 +58,17 @@ def open_trials(
     names = paper_inputs(rules) if inputs is None else tuple(inputs)
     if isinstance(platform, SimPlatform):
         return SimTrials(platform, arena, rules, inputs=names, noise=noise, bias_value=bias_value)
-    if names != paper_inputs(rules):
-        raise ValueError(
-            f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform "
-            f"{'twin' if isinstance(platform, TwinPlatform) else 'jyro'!r}. Choose platform 'sim'."
-        )
     if isinstance(platform, TwinPlatform):
         if noise:
             raise ValueError(
                 f"noise is {noise:g}, expected none on platform 'twin': its readings are noisy already."
             )
-        return TwinTrials(platform, arena, rules, bias_value=bias_value)
+        return TwinTrials(platform, arena, rules, inputs=names, bias_value=bias_value)
+    if names != paper_inputs(rules):
+        raise ValueError(
+            f"The networks see {', '.join(names)}, expected {', '.join(paper_inputs(rules))} on platform 'jyro'. "
+            "Choose platform 'sim'."
+        )
     return JyroTrials(platform, arena, rules, noise=noise, bias_value=bias_value)
 
 

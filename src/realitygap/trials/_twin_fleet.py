@@ -41,11 +41,16 @@ class TwinRobots:
 
     def __init__(self, platform: TwinPlatform, arena: Arena, n: int) -> None:
         self._pool = TwinPool(platform.file, arena, 1)
-        self._n = n
+        self._arena, self._n = arena, n
         self.step_s, self.n_sensors = self._pool.step_s, self._pool.n_sensors
 
     def begin(self, key: NoiseKey) -> None:
-        """Put all robots at the start; robot k draws the numbers of individual `key.individual` + k."""
+        """Put all robots at the start; robot k draws the numbers of individual `key.individual` + k.
+
+        A twin that was closed is opened again: some checkers of environments close one and go on with it.
+        """
+        if self._pool.is_closed:
+            self._pool = TwinPool(self._pool.file, self._arena, 1)
         numbers = [twin_number(key.key, counter) for counter in counters_of(key, self._n)]
         self._take(self._ask({"do": "begin", "numbers": numbers}))
 

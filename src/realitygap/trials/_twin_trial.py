@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from realitygap.evolution import Network
+from realitygap.evolution import Network, Sense
 from realitygap.robots import Command, Robot
 from realitygap.world import Arena, Pose
 
 from ._operator import cell_at
-from ._physical import check_network, limited
+from ._physical import limited
 
 
 class SeenRobot(Robot, Protocol):
@@ -33,20 +33,23 @@ class SeenRobot(Robot, Protocol):
         ...
 
 
-def trial_of(robot: SeenRobot, network: Network, n_steps: int, *, trace: bool) -> dict[str, Any]:
+def trial_of(
+    robot: SeenRobot, network: Network, sense: Sense, n_steps: int, *, trace: bool
+) -> dict[str, Any]:
     """What came of a trial, as JSON knows it: `cells` in order of first visit, `ends`, `stalls` and the last `pose`.
+
+    `sense` computes what the network sees.
 
     With `trace` each step, too: `poses`, `readings`, `stalled` and `wheels` of t + 1 rows, `inputs` and `commands`
     of t.
     """
-    check_network(network)
     steps: dict[str, list[Any]] = {
         name: [] for name in ("poses", "readings", "stalled", "wheels", "inputs", "commands")
     }
     robot.reset()
     for step in range(n_steps):
         _look(robot, steps)
-        inputs = [max(steps["readings"][-1]), float(steps["stalled"][-1]), step / n_steps]
+        inputs = sense(steps["readings"][-1], steps["stalled"][-1], step)
         move, turn = (limited(float(output)) for output in network.activate(inputs))
         steps["inputs"].append(inputs)
         steps["commands"].append((move, turn))

@@ -6,13 +6,14 @@ import hashlib
 import math
 import threading
 import weakref
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import StudyError
-from realitygap.evolution import Network
+from realitygap.evolution import ControllerInterface, Network, inputs_of_ranges
 from realitygap.kernels._genome import NeatRules
 from realitygap.kernels._network import Networks
 from realitygap.robots import TwinPlatform
@@ -37,9 +38,11 @@ class TwinTrials:
         platform: The twin, by its file and the hash of that.
         arena: Where.
         rules: NEAT's, of which only the network's kind counts.
+        inputs: Names of what the networks see, in order.
         bias_value: Of the constant input.
 
     Raises:
+        ControllerError: The twin does not have such inputs.
         StudyError: The file is another than that of the hash.
         DescriptionError: There is no such file, or it cannot be used.
         MissingExtraError: MuJoCo is not installed.
@@ -48,7 +51,15 @@ class TwinTrials:
     distance_unit = 1.0
     drawn_names: tuple[str, ...] = ()
 
-    def __init__(self, platform: TwinPlatform, arena: Arena, rules: NeatRules, *, bias_value: float) -> None:
+    def __init__(
+        self,
+        platform: TwinPlatform,
+        arena: Arena,
+        rules: NeatRules,
+        *,
+        inputs: Sequence[str],
+        bias_value: float,
+    ) -> None:
         self._pool = _shared_pool(platform, arena)
         self.arena = arena
         self.step_s = self._pool.step_s
@@ -56,6 +67,8 @@ class TwinTrials:
         self._reach = platform.sensors.max_range
         self.sensors = tuple(f"range.{k}" for k in range(self._pool.n_sensors))
         self._rules, self._bias_value = rules, bias_value
+        self._interface = ControllerInterface(tuple(inputs))
+        self._interface.check(inputs_of_ranges(self._pool.n_sensors), "A network", f"twin {platform.file}")
 
     def carry_out(
         self,
@@ -76,6 +89,7 @@ class TwinTrials:
             {
                 "do": "evolve",
                 "network": rows[int(row)],
+                "inputs": self._interface.inputs,
                 "steps": self.n_steps,
                 "number": twin_number(int(key), counter),
                 "trace": trace,
@@ -104,7 +118,7 @@ class TwinTrials:
         start = self.arena.start
         poses[:, :2] -= np.array([start.x, start.y])[:, None]
         poses[:, 2] /= math.tau
-        inputs = stacked("inputs", 3)
+        inputs = stacked("inputs", len(self._interface.sensed))
         if self._rules.bias_input >= 0:
             constant = np.full((len(inputs), 1, inputs.shape[2]), self._bias_value)
             inputs = np.insert(inputs, [self._rules.bias_input], constant, axis=1)

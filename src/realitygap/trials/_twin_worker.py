@@ -66,14 +66,17 @@ class _Twin:
         )
         return {"trial": trial_to_dict(trial), "problem": problem}
 
-    def evolve(self, network: dict[str, Any], steps: int, number: int, trace: bool) -> dict[str, Any]:
+    def evolve(
+        self, network: dict[str, Any], inputs: list[str], steps: int, number: int, trace: bool
+    ) -> dict[str, Any]:
         """A trial of a network as an evolution scores it."""
-        from realitygap.evolution import Network
+        from realitygap.evolution import ControllerInterface, Network
 
         from ._twin_trial import trial_of
 
         self._robot.number = number
-        return trial_of(self._robot, Network.from_dict(network), steps, trace=trace)
+        sense = ControllerInterface(tuple(inputs)).bind(steps)
+        return trial_of(self._robot, Network.from_dict(network), sense, steps, trace=trace)
 
     def begin(self, numbers: list[int]) -> list[dict[str, Any]]:
         """Begin a trial of each number, each with a separate robot; return what every robot sees."""

@@ -1,0 +1,52 @@
+"""`realitygap try`: controllers with other inputs than the paper's, on platforms that have them or not."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.evolution import ControllerInterface, NeatSettings, Population
+from realitygap.robots.twin import sample_twin
+
+RANGES = ("range.0", "range.1", "range.2", "bias")
+LIGHTS = ("light.0", "light.1", "light.2", "bias")
+
+
+def tried(*arguments: object) -> str:
+    """Return the words of the command, whether it succeeds or refuses."""
+    result = CliRunner().invoke(app, ["try", *map(str, arguments)])
+    assert result.exception is None or result.exit_code == 1, result.output
+    return str(result.exception) if result.exception else result.output
+
+
+@pytest.fixture
+def files(tmp_path):
+    settings = NeatSettings.named("rosenzweig-remy", population=2)
+    genome = Population(3, 2, settings, seed=5).ask()[0]
+    for name, inputs in (("ranges", RANGES), ("lights", LIGHTS)):
+        genome.with_interface(ControllerInterface(inputs)).save(tmp_path / f"{name}.json")
+    genome.save(tmp_path / "paper.json")
+    (tmp_path / "same.toml").write_text(sample_twin("same", 1).to_toml())
+    return tmp_path
+
+
+@pytest.mark.parametrize("on", ["sim", "twin", "scribbler:emulator://s2?fluke=2&speed=off"])
+def test_controller_of_single_sensors_drives_wherever_they_are(files, on):
+    on = f"twin:{files / 'same.toml'}" if on == "twin" else on
+    out = tried(files / "ranges.json", "--on", on, "--steps", 5, "--json")
+    assert len(json.loads(out)["coverage"]) == 1
+
+
+def test_controller_that_sees_light_drives_on_sim_and_is_refused_elsewhere(files):
+    assert "mean coverage" in tried(files / "lights.json", "--on", "sim", "--arena", "light", "--steps", 5)
+    for on in ("jyro", f"twin:{files / 'same.toml'}"):
+        assert "light.0 to light.2 are missing" in tried(files / "lights.json", "--on", on, "--steps", 5)
+
+
+def test_inputs_of_a_file_can_be_named(files):
+    by_names = tried(files / "paper.json", "--on", "sim", "--steps", 5, "--inputs", ",".join(RANGES))
+    assert by_names == tried(files / "ranges.json", "--on", "sim", "--steps", 5)
+    assert "Name each of them" in tried(files / "paper.json", "--on", "sim", "--inputs", "range.0,bias")

@@ -235,6 +235,7 @@ if __name__ == "__main__":
             "steps_all": _steps_on_all_cores,
             "realism_avoiding": lambda: time_realism("avoiding"),
             "realism_pressed": lambda: time_realism("pressed"),
+            "realism_boxes": lambda: time_realism("boxes"),
             "run_us": time_runs,
             "xor_ms": time_xor,
             "large_ms": time_large,

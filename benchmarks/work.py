@@ -21,6 +21,7 @@ FIGURES = {
         "outline, contact, noisy IR and motors: avoiding walls, robot-steps a second, one core", "/s", True
     ),
     "realism_pressed": Figure("the same, pressed into walls", "/s", True),
+    "realism_boxes": Figure("the same, avoiding walls and two boxes", "/s", True),
     "run_us": Figure("NEAT run: population 8, 5 generations, trivial fitness", "µs", False),
     "xor_ms": Figure("XOR: population 150, one generation with evaluation", "ms", False),
     "large_ms": Figure("reproduction and speciation, population 10,000", "ms", False, seconds=120.0),

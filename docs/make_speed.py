@@ -35,7 +35,14 @@ FIGURES = {
         "robot-steps a second with outline, contact and noise: avoiding walls, one core",
         "/s",
     ),
-    "realism_pressed": ("the same, pressed into walls", "/s"),
+    "realism_pressed": (
+        "robot-steps a second with outline, contact and noise: pressed into walls, one core",
+        "/s",
+    ),
+    "realism_boxes": (
+        "robot-steps a second with outline, contact and noise: avoiding walls and two boxes, one core",
+        "/s",
+    ),
     "run_us": ("a NEAT run: 8 individuals, 5 generations, trivial fitness", "µs"),
     "xor_ms": ("XOR: a generation of 150, with evaluation", "ms"),
     "large_ms": ("reproduction and speciation of 10,000", "ms"),
@@ -49,12 +56,37 @@ def page_parts() -> dict[str, str]:
     """The generated parts of the page, by file."""
     measured = json.loads(DATA.read_text("utf-8"))
     return {
+        "parts/speed-ahead.md": ahead_text(measured["figures"]),
         "parts/speed-peers.md": peers_table(measured),
         "parts/speed-machine.md": machine_text(measured),
+        "parts/speed-realism.md": realism_table(measured["figures"]),
         "parts/speed-run.md": run_table(measured["engine"]),
         "parts/speed-step.md": step_table(measured),
         "parts/speed-variants.md": variants_table(measured["engine"]["variants"]),
     }
+
+
+def ahead_text(figures: Mapping[str, Any]) -> str:
+    """The figures in which a peer is faster, as a list, or one sentence if there is none."""
+    lines = [
+        f"* {TITLES[peer]} is {digits(1 / answer['ratio'])} times as fast as realitygap: {title}."
+        for name, (title, _) in FIGURES.items()
+        for peer, answer in figures[name].items()
+        if answer.get("ratio", 1.0) < 1.0
+    ]
+    if not lines:
+        return "No peer is faster than realitygap in any figure that both were measured in.\n"
+    return "Some peers are faster than realitygap:\n\n" + "\n".join(lines) + "\n"
+
+
+def realism_table(figures: Mapping[str, Any]) -> str:
+    """Our robot-steps with contact and noise, one core."""
+    rows = [
+        (title, _measured(figures[name]["ours"], unit))
+        for name, (title, unit) in FIGURES.items()
+        if name.startswith("realism_")
+    ]
+    return _table(["figure", "realitygap"], rows)
 
 
 def peers_table(measured: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 import environments  # noqa: E402
+import memory_and_start  # noqa: E402
 import ours  # noqa: E402
 import peers  # noqa: E402
 import work  # noqa: E402
@@ -74,6 +75,17 @@ def test_a_peer_that_cannot_be_built_is_said_to_be_not_measured(monkeypatch):
     result = peers.compare([peers.PEERS[0]])
     assert list(result["figures"]) == ["steps_core"]
     assert result["figures"]["steps_core"]["jyro"] == {"not_measured": "no connection"}
+
+
+def test_peak_memory_counts_the_processes_that_a_command_starts():
+    room = "room = bytes(b'x') * 200_000_000; import time; time.sleep(1)"
+    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {room!r}], check=True)"
+    assert 190 < memory_and_start.run([sys.executable, "-c", code]).peak_mb < 400
+
+
+def test_a_measured_command_that_fails_is_an_error():
+    with pytest.raises(SystemExit, match="status 3"):
+        memory_and_start.run([sys.executable, "-c", "raise SystemExit(3)"])
 
 
 @pytest.mark.slow

@@ -426,6 +426,12 @@ def test_tables_on_the_page_of_speed_follow_from_its_figures():
     table = make_speed.peers_table({"figures": figures})
     assert "| **1,234** | robot-steps a second, one core | Jyro | 5,000/s (1 to 3) | 2/s (1 to 3) |" in table
     assert "| – | robot-steps a second, one core | MultiNEAT | not measured: not done after 120 s |" in table
+    assert make_speed.ahead_text(figures).startswith("No peer is faster")
+    figures["realism_boxes"]["jyro"]["ratio"] = 0.5
+    ahead = make_speed.ahead_text(figures).splitlines()
+    title = make_speed.FIGURES["realism_boxes"][0]
+    assert ahead[2:] == [f"* Jyro is 2 times as fast as realitygap: {title}."]
+    assert f"| {title} | 2/s (1 to 3) |" in make_speed.realism_table(figures)
     engine = {
         "robot_steps_per_second": {"per_core": 34.8e6},
         "paper_runs_per_second": {"per_core": 8000.0},

@@ -76,29 +76,45 @@ class Evidence:
 
 @dataclass
 class _Columns:
-    """Entries of vectors, a group after the other."""
+    """Entries of vectors, a group after the other: of each group its kind, its values, and the steps of a row."""
 
-    parts: list[Vectors] = field(default_factory=list)
-    kinds: list[NDArray[np.str_]] = field(default_factory=list)
-    trial: list[NDArray[np.int64]] = field(default_factory=list)
-    step: list[NDArray[np.int64]] = field(default_factory=list)
+    groups: list[tuple[str, NDArray[np.floating] | NDArray[np.bool_], int]] = field(default_factory=list)
 
     def add(self, kind: str, values: NDArray[np.floating] | NDArray[np.bool_], per_step: int = 1) -> None:
         """Values (m, k, t, ...), or (m, k, c) of the whole trial where `per_step` is 0."""
-        m, k = values.shape[:2]
-        flat = values.reshape(m, -1).astype(np.float32)
-        each = flat.shape[1] // k
-        self.parts.append(flat)
-        self.kinds.append(np.full(flat.shape[1], kind))
-        self.trial.append(np.repeat(np.arange(k), each))
-        steps = np.full(values.shape[1:], -1)
-        if per_step:
-            steps[:] = (np.arange(values.shape[2]) * per_step).reshape(1, -1, *[1] * (values.ndim - 3))
-        self.step.append(steps.reshape(-1))
+        self.groups.append((kind, values, per_step))
 
     @property
     def vectors(self) -> Vectors:
-        return np.concatenate(self.parts, axis=1)
+        """(m, d) all entries."""
+        return np.concatenate(
+            [values.reshape(len(values), -1).astype(np.float32, copy=False) for _, values, _ in self.groups],
+            axis=1,
+        )
+
+    @property
+    def kinds(self) -> NDArray[np.str_]:
+        """(d,) the kind of each entry."""
+        return np.concatenate([np.full(values[0].size, kind) for kind, values, _ in self.groups])
+
+    @property
+    def trial(self) -> NDArray[np.int64]:
+        """(d,) the trial of each entry."""
+        return np.concatenate(
+            [np.repeat(np.arange(values.shape[1]), values[0, 0].size) for _, values, _ in self.groups]
+        )
+
+    @property
+    def step(self) -> NDArray[np.int64]:
+        """(d,) the step of each entry; -1 for the whole trial."""
+        return np.concatenate([_steps_of(values.shape[1:], per_step) for _, values, per_step in self.groups])
+
+
+def _steps_of(shape: tuple[int, ...], per_step: int) -> NDArray[np.int64]:
+    steps = np.full(shape, -1)
+    if per_step:
+        steps[:] = (np.arange(shape[1]) * per_step).reshape(1, -1, *[1] * (len(shape) - 2))
+    return steps.reshape(-1)
 
 
 def evidence_of(
@@ -165,9 +181,9 @@ def _evidence(
         keep,
         lambda rehearsal: columns_of(rehearsal).vectors,
         columns.vectors[0],
-        np.concatenate(columns.kinds),
-        number[np.concatenate(columns.trial)],
-        np.concatenate(columns.step),
+        columns.kinds,
+        number[columns.trial],
+        columns.step,
     )
 
 
@@ -234,7 +250,7 @@ def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
     )
     for lag in (0, 1, 2, 4):
         a, b = seen[:, :, : t - lag], seen[:, :, lag:]
-        columns.add("readings", np.einsum("mkti,mktj->mkij", a, b, optimize=True) / (t - lag), 0)
+        columns.add("readings", np.swapaxes(a, -1, -2) @ b / (t - lag), 0)
     return columns
 
 

@@ -13,6 +13,9 @@ from ._ir_scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale
 STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
 
+ROWS = 16
+"""Sets of parameters whose probabilities are computed together: their arrays fit into a processor's cache."""
+
 
 class PulseReadings:
     """Counts of pulses at placements.
@@ -51,25 +54,50 @@ class PulseReadings:
         return self._at(self.places, values)
 
     def _at(self, places: Places, values: Array, stray: float = STRAY) -> Array:
-        amplitude, decay, most, at, width, burst = values[:, :6].T
+        sent_back, missed = self._pulses(places, values)
+        counts = np.arange(self.pulses + 1)
+        burst = values[:, 5, None, None]
+        return self._chances(sent_back[..., None], missed[..., None], counts, burst, stray)
+
+    def _pulses(self, places: Places, values: Array) -> tuple[NDArray[np.int64], Array]:
+        """(m, p) each: pulses that come back if none is missed, and the probability that one is missed."""
+        amplitude, decay, most, at, width = values[:, :5].T
         per_volt, incidence = (column(self.scales, values, scale) for scale in (BATTERY, INCIDENCE))
         back, dim = places.response(amplitude, decay, per_volt, incidence)
         back = np.clip(back, 0.0, 1.0)
-        promised = np.floor(back * self.pulses + 0.5).astype(np.int64)
         missed = np.clip(logistic(dim, most, at, width), 1e-12, 1.0 - 1e-12)
-        k = np.arange(self.pulses + 1)
-        left = promised[..., None] - k
-        logs = np.log(missed)[..., None] * np.maximum(left, 0) + np.log1p(-missed)[..., None] * k
-        apart = np.where(left >= 0, _ways(self.pulses)[promised] * np.exp(logs), 0.0)
-        shared = np.where(k == promised[..., None], (1.0 - missed)[..., None], 0.0)
-        shared = shared + np.where(k == 0, missed[..., None], 0.0)
-        mixed = burst[:, None, None] * shared + (1.0 - burst)[:, None, None] * apart
+        return np.floor(back * self.pulses + 0.5).astype(np.int64), missed
+
+    def _chances(
+        self,
+        sent_back: NDArray[np.int64],
+        missed: Array,
+        counts: NDArray[np.int64],
+        burst: Array,
+        stray: float,
+    ) -> Array:
+        """Probability of each count; the arrays are broadcast against each other."""
+        left = sent_back - counts
+        logs = np.log(missed) * np.maximum(left, 0) + np.log1p(-missed) * counts
+        apart = np.where(left >= 0, _ways(self.pulses)[sent_back, counts] * np.exp(logs), 0.0)
+        shared = np.where(left == 0, 1.0 - missed, 0.0)
+        shared = shared + np.where(counts == 0, missed, 0.0)
+        mixed = burst * shared + (1.0 - burst) * apart
         return np.asarray((1.0 - stray) * mixed + stray / (self.pulses + 1))
 
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
         """(m,) of (m, d) parameters, with a probability of any reading at all."""
-        logs = np.log(self._at(self.places, values, stray))
-        return np.asarray(self.weight * np.einsum("mpb,pb->m", logs, self.counts))
+        which, counts = np.nonzero(
+            self.counts
+        )  # most placements have one reading: few counts of all were read
+        logs = np.empty(len(values))
+        for first in range(0, len(values), ROWS):
+            part = slice(first, first + ROWS)
+            sent_back, missed = self._pulses(self.places, values[part])
+            burst = values[part, 5, None]
+            chances = self._chances(sent_back[:, which], missed[:, which], counts, burst, stray)
+            logs[part] = np.einsum("mr,r->m", np.log(chances), self.counts[which, counts])
+        return np.asarray(self.weight * logs)
 
     def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
         """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""

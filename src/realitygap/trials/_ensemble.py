@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -179,7 +180,7 @@ class SimEnsemble:
             given,
             anchors=np.empty((0, 0, 3)) if anchors is None else np.asarray(anchors, np.float64),
         )
-        return _joined(*self._parts(play, values, key, keep, same_noise, _as_it_is))
+        return _gathered(list(self._parts(play, values, key, keep, same_noise, _as_it_is)))
 
     def drive(
         self,
@@ -201,7 +202,7 @@ class SimEnsemble:
             whole_number("n_steps", n_steps, 1),
             genomes=tuple(genomes),
         )
-        return _joined(*self._parts(play, values, key, keep, same_noise, _as_it_is))
+        return _gathered(list(self._parts(play, values, key, keep, same_noise, _as_it_is)))
 
     def summarize(
         self,
@@ -219,8 +220,7 @@ class SimEnsemble:
             play: The trials.
             of: Called from several threads with some of the robots; must answer a row for each of them.
         """
-        place, parts = self._parts(play, values, key, keep, same_noise, of)
-        return np.concatenate(parts)[place]
+        return _in_order(self._parts(play, values, key, keep, same_noise, of), _n_robots(values))
 
     def _parts(
         self,
@@ -230,20 +230,29 @@ class SimEnsemble:
         keep: Sequence[str],
         same_noise: bool,
         of: Callable[[Rehearsal], T],
-    ) -> tuple[NDArray[np.int64], list[T]]:
-        """What `of` makes of some robots after the other, and where among all of those each robot is."""
+    ) -> Iterator[tuple[NDArray[np.int64], T]]:
+        """Yield the indices of some robots and what `of` makes of them, until all robots are done."""
         if unknown := sorted(set(keep) - set(KEPT)):
             raise ValueError(f"Cannot keep {', '.join(unknown)}, expected some of {', '.join(KEPT)}.")
         if play.genomes:
             check_genomes(play.genomes, None)
         given = _in_columns(values, len(play.starts))
-        m = len(next(iter(given.values()), np.empty(1)))
         first = (play.genomes or (self._no_genome,))[0]
         scene = self._scene(paper_inputs(first.rules), given)
         networks = decode_all(play.genomes or (first,))
         work = _Work(
-            scene, self._own, play, first.rules, first.bias_value, networks, key, tuple(keep), same_noise
+            scene,
+            self._own,
+            play,
+            given,
+            first.rules,
+            first.bias_value,
+            networks,
+            key,
+            tuple(keep),
+            same_noise,
         )
+        m = _n_robots(given)
         size = max(1, CHUNK_BYTES // (work.bytes_of_trial * len(play.starts)))
         size = max(1, min(size, -(-m // self.threads)))
         chunks = [
@@ -251,17 +260,16 @@ class SimEnsemble:
             for finely, robots in self._cut_alike(given, m)
             for at in range(0, len(robots), size)
         ]
-        place = np.argsort(np.concatenate([robots for _, robots in chunks]))
 
-        def compute(chunk: tuple[Finely, NDArray[np.int64]]) -> T:
+        def compute(chunk: tuple[Finely, NDArray[np.int64]]) -> tuple[NDArray[np.int64], T]:
             finely, robots = chunk
-            part = {name: value[robots] for name, value in given.items()}
-            return of(work.carry_out(part, robots, finely))
+            return robots, of(work.carry_out(robots, finely))
 
         if self.threads == 1 or len(chunks) == 1:
-            return place, [compute(chunk) for chunk in chunks]
+            yield from map(compute, chunks)
+            return
         with ThreadPoolExecutor(self.threads, thread_name_prefix="ensemble") as pool:
-            return place, list(pool.map(compute, chunks))
+            yield from pool.map(compute, chunks)
 
     def _cut_alike(
         self, given: Mapping[str, NDArray[np.float64]], m: int
@@ -319,6 +327,7 @@ class _Work:
     scene: SimScene
     own: SimScene  # with the numbers as the platform has them, where no set says otherwise
     play: Play
+    given: Mapping[str, NDArray[np.float64]]  # (m, k) or (m, 1) of each number
     neat: NeatRules
     bias_value: float
     networks: Networks
@@ -336,10 +345,8 @@ class _Work:
     def _n_sensors(self) -> int:
         return int(self.scene.shape.row_range.size)
 
-    def carry_out(
-        self, given: Mapping[str, NDArray[np.float64]], robots: NDArray[np.int64], finely: Finely
-    ) -> Rehearsal:
-        """The trials of some of the robots; `given` has (m, k) or (m, 1) of each number."""
+    def carry_out(self, robots: NDArray[np.int64], finely: Finely) -> Rehearsal:
+        """Run the trials of some of the robots."""
         scene, play = self.scene, self.play
         shape = scene.shape._replace(substeps=finely[0], late_substeps=finely[1])
         m, k = len(robots), len(play.starts)
@@ -347,14 +354,14 @@ class _Work:
         kept = self._room_for(m * k)
         rehearse(
             shape,
-            self._table(given, m, k, counters),
+            self._table(robots, counters),
             sim_rules(scene, self.bias_value)._replace(n_steps=play.n_steps),
             self.neat,
             self.networks,
             np.tile(np.arange(k if play.genomes else 1, dtype=np.int32), m if play.genomes else m * k),
-            np.ascontiguousarray(play.commands.transpose(1, 2, 0), np.float32),
+            self._commands,
             np.tile(np.arange(k, dtype=np.int32), m),
-            self._anchors(),
+            self._anchors,
             np.uint64(self.key),
             counters,
             make_sim_room(shape, self.neat, self.networks.place.shape[1], np.float32),
@@ -369,22 +376,51 @@ class _Work:
         counters[:, 2] = 0 if self.same_noise else np.repeat(robots, k)
         return counters
 
-    def _table(
-        self, given: Mapping[str, NDArray[np.float64]], m: int, k: int, counters: NDArray[np.uint32]
-    ) -> NDArray[np.float32]:
-        scene = self.scene
-        own = {name: value for name, value in self.own.numbers.items() if name in scene.rows}
-        draws = Draws({name: value for name, value in own.items() if name not in given})
-        values = dict(zip(draws.names, draws.draw(self.key, counters).T, strict=True))
-        for name, start in zip(START, self.play.starts.T, strict=True):
-            values[name] = np.tile(start, m)
-        for name, value in given.items():
-            values[name] = np.broadcast_to(value, (m, k)).reshape(-1)
-        fixed = {name: value for name, value in self.own.fixed.items() if name in scene.rows}
-        table = np.repeat(scene.table({**scene.fixed, **fixed}), m * k, axis=1)
-        table[[scene.rows[name] for name in values]] = scene.rows_of(values)
-        return table.astype(np.float32, copy=False)
+    def _table(self, robots: NDArray[np.int64], counters: NDArray[np.uint32]) -> NDArray[np.float32]:
+        """(p, n) the numbers of the trials of some robots, a column for each trial."""
+        k, rows = len(self.play.starts), self.scene.rows
+        table = np.repeat(self._column, len(counters), axis=1)
+        drawn = dict(zip(self._draws.names, self._draws.draw(self.key, counters).T, strict=True))
+        starts = {
+            name: np.tile(start, len(robots)) for name, start in zip(START, self.play.starts.T, strict=True)
+        }
+        values = {**drawn, **starts}
+        table[[rows[name] for name in values]] = self.scene.rows_of(values)
+        for names, numbers in self._given_rows:
+            repeats = k // numbers.shape[2]
+            table[[rows[name] for name in names]] = np.repeat(numbers[:, robots], repeats, axis=2).reshape(
+                len(names), -1
+            )
+        return table
 
+    @cached_property
+    def _given_rows(self) -> list[tuple[tuple[str, ...], NDArray[np.float32]]]:
+        """Names and (d, m, 1) or (d, m, k) numbers, as the table has them."""
+        shapes = {value.shape for value in self.given.values()}
+        by_shape = [[name for name, value in self.given.items() if value.shape == shape] for shape in shapes]
+        return [
+            (tuple(names), self.scene.rows_of({name: self.given[name] for name in names}).astype(np.float32))
+            for names in by_shape
+        ]
+
+    @cached_property
+    def _draws(self) -> Draws:
+        """What the platform draws for each trial, where no set gives it."""
+        own = {name: value for name, value in self.own.numbers.items() if name in self.scene.rows}
+        return Draws({name: value for name, value in own.items() if name not in self.given})
+
+    @cached_property
+    def _column(self) -> NDArray[np.float32]:
+        """(p, 1) the numbers of a trial for which nothing is drawn or given."""
+        fixed = {name: value for name, value in self.own.fixed.items() if name in self.scene.rows}
+        column = self.scene.table({**self.scene.fixed, **fixed})
+        return column.astype(np.float32, copy=False)
+
+    @cached_property
+    def _commands(self) -> NDArray[np.float32]:
+        return np.ascontiguousarray(self.play.commands.transpose(1, 2, 0), np.float32)
+
+    @cached_property
     def _anchors(self) -> NDArray[np.float32]:
         anchors = (self.play.anchors - [*self.scene.origin, 0.0]) / [1.0, 1.0, 2 * np.pi]
         return np.ascontiguousarray(anchors.transpose(1, 2, 0), np.float32)
@@ -439,14 +475,32 @@ def _as_it_is(rehearsal: Rehearsal) -> Rehearsal:
     return rehearsal
 
 
-def _joined(place: NDArray[np.int64], parts: Sequence[Rehearsal]) -> Rehearsal:
+def _n_robots(values: Values) -> int:
+    """Number of sets of numbers; one robot as it is if there are none."""
+    return len(next(iter(values.values()), np.empty(1)))  # type: ignore[arg-type]
+
+
+def _in_order(parts: Iterable[tuple[NDArray[np.int64], NDArray[F]]], m: int) -> NDArray[F]:
+    """(m, ...) rows of some robots after the other, put where each robot belongs."""
+    rows: NDArray[F] | None = None
+    for robots, part in parts:
+        if rows is None:
+            rows = np.empty((m, *part.shape[1:]), part.dtype)
+        rows[robots] = part
+    if rows is None:
+        raise ValueError("Got no set of numbers, expected at least one.")
+    return rows
+
+
+def _gathered(parts: Sequence[tuple[NDArray[np.int64], Rehearsal]]) -> Rehearsal:
+    """All robots in order."""
     if len(parts) == 1:
-        return parts[0]
+        return parts[0][1]
+    m = sum(len(robots) for robots, _ in parts)
     names = ("poses", "readings", "stalled", "wheels", "commands", "cells")
-    found = Rehearsal(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-    if np.array_equal(place, np.arange(len(place))):
-        return found
-    return Rehearsal(*(getattr(found, name)[place] for name in names))
+    return Rehearsal(
+        *(_in_order(((robots, getattr(part, name)) for robots, part in parts), m) for name in names)
+    )
 
 
 def _processors() -> int:

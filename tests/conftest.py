@@ -60,7 +60,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if failed:
         raise pytest.UsageError(f"Kernels could not be compiled: run {' '.join(command)} {failed[0]}")
     if (seconds := time.monotonic() - began) > 10:
-        session.config.get_terminal_writer().line(f"compiled kernels in {seconds:.0f} s")
+        session.config.get_terminal_writer().line(f"kernels ready after {seconds:.0f} s")
 
 
 @pytest.fixture(autouse=True)

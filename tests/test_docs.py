@@ -42,8 +42,16 @@ reference_pages = _load("reference_pages")
 PAGES = [path for path in make_outputs.documents() if path.name != "README.md"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(DOCS)) for path in PAGES])
+LONG = {"tutorials/robot-lab.md", "how-to/score.md"}
+"""Pages whose examples take more than a minute."""
+
+
+def _page(path):
+    name = str(path.relative_to(DOCS))
+    return pytest.param(path, marks=pytest.mark.long if name in LONG else pytest.mark.slow, id=name)
+
+
+@pytest.mark.parametrize("path", [_page(path) for path in PAGES])
 def test_examples_of_a_page_run_and_print_what_it_shows(path):
     _, problems = make_outputs.rewrite(path.read_text("utf-8"), str(path.relative_to(ROOT)))
     assert problems == []
@@ -253,7 +261,7 @@ def test_the_table_on_the_page_of_sheets_is_what_its_benchmark_found():
     assert make_score.with_table(page) == page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_figures_on_the_page_of_a_billion_runs_are_those_that_its_command_measures(tmp_path):
     """Times differ from sitting to sitting; which figures there are and what a run takes on disk do not."""
     make_billion = _load("make_billion")

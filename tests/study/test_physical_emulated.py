@@ -217,6 +217,7 @@ def test_a_mixed_study_has_simulated_arms_beside_an_emulated_one(tmp_path):
     assert "EMULATED and SIM" in page
 
 
+@pytest.mark.long
 def test_the_papers_physical_study_runs_unattended(tmp_path):
     result = run_study("paper-robot", tmp_path / "paper", port=PORT)
     assert (result.physical.n_complete, result.physical.n_driven) == (6, 240)

@@ -341,7 +341,7 @@ def test_a_result_too_big_for_memory_is_refused() -> None:
 FILES = {
     "not there": (None, "cannot be read (No such file or directory)"),
     "empty": (b"", "The file is empty"),
-    "not JSON": (b'{"steps": 3,}', "not JSON, at line 1, column 13"),
+    "not JSON": (b'{"steps": 3 "dt": 1}', "not JSON, at line 1, column 13"),
     "not text": (b"\xff\xfe\x00", "not a text file"),
     "a list": (b"[1, 2]", "expected a JSON object with steps, world and robots, came [1, 2]"),
     "a double key": (b'{"steps": 3, "steps": 4}', 'the key "steps" is given twice'),

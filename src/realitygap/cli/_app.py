@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import sys
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated, Any
@@ -10,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from realitygap._version import __version__
+from realitygap.kernels._compiling import report_compiling
 
 from ._commands import COMMANDS, Command, root_help
 
@@ -59,4 +62,5 @@ def _root(
         bool, typer.Option("--version", help="Print the version.", callback=_version, is_eager=True)
     ] = False,
 ) -> None:
-    pass
+    if sys.stderr is not None and sys.stderr.isatty():
+        report_compiling(functools.partial(typer.echo, err=True))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import functools
 import hashlib
 import os
 import pickle
@@ -13,24 +15,55 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 import numba
 from numba.core import caching, serialize
 from numba.core.compiler import CompileResult
 
+from ._compiling import begin_compiling, end_compiling
+
+_FOLDER = Path(__file__).parent
+
+# They decide how everything is compiled, and what a file holds.
+_COMPILER = {"_cache", "_compile"}
+
 SEAL_SIZE = hashlib.sha256().digest_size
 
 
-def sources_hash() -> str:
-    """Return a hash of all kernel sources, of Numba's version, and of Python's version.
+def _imported(module: str) -> set[str]:
+    """Return the modules of this package that a module of it imports."""
+    tree = ast.parse((_FOLDER / f"{module}.py").read_bytes())
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 1]
+    return {
+        name
+        for node in imports
+        for name in ([node.module] if node.module else [alias.name for alias in node.names])
+        if (_FOLDER / f"{name}.py").exists()
+    }
 
-    An edit of a kernel changes the machine code of its callers in other files. So the hash covers all files.
+
+@functools.cache
+def sources_hash(module: str) -> str:
+    """Return a hash of the sources of a module of kernels, of Numba's version, and of Python's version.
+
+    An edit of a kernel changes the machine code of its callers in other files. So the hash covers all modules
+    that are imported, by one another too. Of a kernel elsewhere it covers all modules of this package.
+
+    Args:
+        module: Full name.
     """
     digest = hashlib.sha256(f"{numba.__version__} {sys.implementation.cache_tag}".encode())
-    folder = Path(__file__).parent
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.relative_to(folder).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    package, _, name = module.rpartition(".")
+    covered: set[str] = set()
+    missing = {name} if package == __package__ else {path.stem for path in _FOLDER.glob("*.py")}
+    missing |= _COMPILER
+    while missing:
+        covered |= missing
+        missing = set().union(*map(_imported, missing)) - covered
+    for name in sorted(covered):
+        digest.update(name.encode())
+        digest.update((_FOLDER / f"{name}.py").read_bytes())
+    return digest.hexdigest()
 
 
 def cache_root() -> Path:
@@ -49,7 +82,7 @@ def cache_root() -> Path:
 
 
 def private_folder(root: Path) -> Path:
-    """Return the cache folder of the present sources, after making it and checking who can write to it.
+    """Return the cache folder, after making it and checking who can write to it.
 
     Loading a compiled kernel runs machine code, so nobody else may put a file there. On Windows the
     profile folder of a user is private already.
@@ -57,7 +90,7 @@ def private_folder(root: Path) -> Path:
     Raises:
         OSError: The folder cannot be made or written, or another user could write to it.
     """
-    folder = root / f"kernels-{sources_hash()}"
+    folder = root / "kernels"
     root.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.mkdir(mode=0o700, exist_ok=True)
     if hasattr(os, "getuid"):
@@ -120,11 +153,28 @@ def write_sealed(path: Path, value: Any) -> None:
         raise
 
 
+def _without_bitcode(compiled: Any) -> Any:
+    """Return what Numba would store, less what callers would link: a kernel's callers compile it for themselves.
+
+    That was nine tenths of a file, and LLVM parsed it at each start. The names are what Numba looks for.
+    """
+    reduced = compiled._reduce()
+    (library, kind, data), *others = reduced
+    if kind != "object":
+        return reduced
+    names = (compiled.fndesc.llvm_func_name, compiled.fndesc.llvm_cpython_wrapper_name)
+    symbols = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
+    bitcode = llvmlite.binding.parse_assembly(symbols).as_bitcode()
+    return ((library, kind, (data[0], bitcode)), *others)
+
+
 class SealedCache(caching._Cache):  # type: ignore[misc]
     """Numba's cache of one function. A file that is missing, damaged or not writable means compiling again."""
 
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+    def __init__(self, function: Callable[..., Any], folder: Path, way: str = "") -> None:
+        self._module = function.__module__
+        self._name = f"{self._module.rpartition('.')[2]}.{function.__qualname__}"
+        self._way = way
         self._code = hashlib.sha256(function.__code__.co_code).hexdigest()
         self._folder = folder
 
@@ -133,8 +183,12 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
         """The folder of the files."""
         return str(self._folder)
 
+    @functools.cached_property
+    def _sources(self) -> str:
+        return sources_hash(self._module)
+
     def _key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        return (self._name, self._code, signature, codegen.magic_tuple())
+        return (self._name, self._sources, self._code, self._way, signature, codegen.magic_tuple())
 
     def _path(self, key: tuple[Any, ...]) -> Path:
         return self._folder / f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.kernel"
@@ -146,15 +200,17 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
         try:
             stored, reduced = read_sealed(self._path(key))
         except (OSError, ValueError):
+            begin_compiling(self._name)
             return None
         # Shortened hashes could agree by chance.
         return CompileResult._rebuild(target_context, *reduced) if stored == key else None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Save the compiled function, unless that fails: the function works without its file."""
+        end_compiling(self._name)
         key = self._key(signature, compiled.codegen)
         try:
-            write_sealed(self._path(key), (key, compiled._reduce()))
+            write_sealed(self._path(key), (key, _without_bitcode(compiled)))
         except OSError:
             pass
 

@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import functools
-import gc
+import os
+import warnings
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba.core.compiler import CompilerBase, Flags
-from numba.core.compiler_machinery import PassManager
-from numba.core.typed_passes import (
-    AnnotateTypes,
-    IRLegalization,
-    NoPythonBackend,
-    NopythonTypeInference,
-    PreLowerStripPhis,
-)
-from numba.core.untyped_passes import (
-    FixupArgs,
-    GenericRewrites,
-    IRProcessing,
-    ReconstructSSA,
-    TranslateByteCode,
-)
 
 from ._cache import SealedCache, usable_folder
-from ._lower import LowerForCallers, LowerKernel
+
+try:
+    from . import _pipeline
+except (ImportError, AttributeError):  # a Numba whose parts have other names
+    _pipeline = None  # type: ignore[assignment]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -36,81 +25,20 @@ MAKER = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 CACHE_FOLDER = usable_folder()
 
+# Set to 1, kernels are compiled by Numba's own pipeline alone: the same results, in twice the time.
+PLAIN = "REALITYGAP_PLAIN_NUMBA"
 
-def _mark_stage(state: Any) -> None:
-    """The array arguments of a stage never overlap: so loops over them can be taken side by side."""
-    state.flags.noalias = True
-
-
-# Of Numba's thirty steps those that kernels need: no closures, contexts, literals or formulas over whole arrays.
-BEFORE_LOWERING = (
-    TranslateByteCode,
-    FixupArgs,
-    IRProcessing,
-    GenericRewrites,
-    ReconstructSSA,
-    NopythonTypeInference,
-    PreLowerStripPhis,
-    IRLegalization,
-    AnnotateTypes,
-)
-
-
-class _Flags(Flags):
-    """Options that compare by those that were set; type inference compares them ten thousands of times."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Flags) and self._values == other._values
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._values))
-
-
-class _Entry(CompilerBase):
-    """For calls from Python."""
-
-    lowering = LowerKernel
-
-    def define_pipelines(self) -> Any:
-        self.state.flags = _Flags(self.state.flags)
-        manager = PassManager("kernel")
-        for step in (*BEFORE_LOWERING, self.lowering, NoPythonBackend):
-            manager.add_pass(step, step.__name__)
-        manager.finalize()
-        return [manager]
-
-    def compile_extra(self, function: Any) -> Any:
-        # Of the million objects that a compilation makes, nearly all live until it is done.
-        collecting = gc.isenabled()
-        gc.disable()
-        try:
-            return super().compile_extra(function)
-        finally:
-            if collecting:
-                gc.enable()
-
-
-class _Inner(_Entry):
-    """For calls from other kernels."""
-
-    lowering = LowerForCallers
-
-
-class _EntryStage(_Entry):
-    def define_pipelines(self) -> Any:
-        _mark_stage(self.state)
-        return super().define_pipelines()
-
-
-class _InnerStage(_Inner):
-    def define_pipelines(self) -> Any:
-        _mark_stage(self.state)
-        return super().define_pipelines()
+_is_plain = _pipeline is None or os.environ.get(PLAIN) == "1"
 
 
 # What makes no array needs no counting of who holds which, which costs more than the work of a small kernel.
 KERNEL = {**MAKER, "_nrt": False}
 INLINED = {**KERNEL, "forceinline": True}
+
+
+def _save_on_disk(dispatcher: Any, way: str) -> None:
+    if CACHE_FOLDER is not None:
+        dispatcher._cache = SealedCache(dispatcher.py_func, CACHE_FOLDER, way)
 
 
 class Kernel:
@@ -119,27 +47,66 @@ class Kernel:
     For other kernels it is compiled without the wrapper that Python needs, which costs a quarter of the time
     of compiling a whole run, and is not kept on disk by itself: it is part of what calls it. For Python it is
     compiled apart, at the first call, and kept.
+
+    A Numba that cannot take the faster way of `_pipeline` compiles in its own.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, stage: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._entry = numba.njit(**options, pipeline_class=_EntryStage if stage else _Entry)(function)
-        if CACHE_FOLDER is not None:
-            self._entry._cache = SealedCache(function, CACHE_FOLDER)
-        # Python must never call it: without a wrapper that ends the process. Numba's type holds it weakly.
-        self._inner = numba.njit(
-            **options, no_cpython_wrapper=True, pipeline_class=_InnerStage if stage else _Inner
-        )(function)
-        self._numba_type_ = numba.types.Dispatcher(self._inner)
+        self._options = options
+        if _pipeline is not None:
+            self._entry = numba.njit(**options)(function)
+            _pipeline.shorten(self._entry, inner=False, stage=stage)
+            # Python must never call it: without a wrapper that ends the process. Numba's type holds it weakly.
+            self._inner = numba.njit(**options, no_cpython_wrapper=True)(function)
+            _pipeline.shorten(self._inner, inner=True, stage=stage)
+            _save_on_disk(self._entry, "")
+
+    @functools.cached_property
+    def _plain_entry(self) -> Any:
+        entry = numba.njit(**self._options)(self.py_func)
+        _save_on_disk(entry, "plain")
+        return entry
+
+    @functools.cached_property
+    def _plain_inner(self) -> Any:
+        # Apart from the other one: what comes from disk cannot become part of another kernel.
+        return numba.njit(**self._options)(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return numba.types.Dispatcher(self._plain_inner if _is_plain else self._inner)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._entry(*arguments)
+        if _is_plain:
+            return self._plain_entry(*arguments)
+        try:
+            return self._entry(*arguments)
+        except Exception as error:  # kernels raise none: it came while compiling
+            return self._call_plainly(arguments, error)
+
+    def _call_plainly(self, arguments: Any, error: Exception) -> Any:
+        """Have Numba's own pipeline compile, here and from now on, unless it finds fault as well."""
+        global _is_plain
+        _is_plain = True
+        try:
+            result = self._plain_entry(*arguments)
+        except Exception:
+            _is_plain = False
+            raise
+        warnings.warn(
+            f"Numba {numba.__version__} compiles in another way than expected ({type(error).__name__}: {error}). "
+            "Kernels are compiled in its own way, which takes longer.",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+        return result
 
     @property
     def stats(self) -> Any:
         """Numba's counts of what was loaded from disk and what was compiled."""
-        return self._entry.stats
+        return (self._plain_entry if _is_plain else self._entry).stats
 
 
 def maker(function: F) -> F:

@@ -174,12 +174,13 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
     if frame.is_empty():
         raise ValueError("The frame has no rows, expected at least one replicate.")
     _check_nulls(frame, columns_in(frame))
-    _check_ranges(frame)
     if (frame["condition"] != condition).any():
         raise ValueError(
             f"Every row's condition must be {condition!r}, found {frame['condition'].unique().to_list()}."
         )
-    return _check_order(frame, first)
+    last = _check_order(frame, first)
+    _check_ranges(frame)
+    return last
 
 
 def check_part(frame: pl.DataFrame, first: int) -> None:

@@ -1,4 +1,4 @@
-"""Who is told when a kernel is compiled; free of imports that take long."""
+"""Lines on the kernels that take long to compile; free of imports that take long."""
 
 from __future__ import annotations
 

@@ -61,9 +61,9 @@ def measure(names: list[str], source: Path | None) -> dict[str, dict[str, float]
         }
         if source is not None:
             environment["PYTHONPATH"] = str(source)
-        for name in COMMANDS:  # compiles Python's own sources, which installers do
+        for name in COMMANDS.values():  # compiles Python's own sources, which installers do
             command = [sys.executable, "-m", "realitygap", name.split()[0], "--help"]
-            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=False)
+            subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=True)
         for name in names:
             loops = [loop_seconds()]
             first = _processor_seconds(

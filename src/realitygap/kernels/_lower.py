@@ -120,7 +120,7 @@ class LowerForCallers(LowerKernel):
             lowered.fndesc.lookup_module(), name, "", 0, lowered.env, (library,)
         )
         state.targetctx.insert_user_function(function, lowered.fndesc, [library])
-        state.reload_init.extend(library._reload_init)
+        state.reload_init.extend(getattr(library, "_reload_init", ()))  # Numba 0.62 has none
         state["cr"] = lowered._replace(cfunc=function)
         return True
 

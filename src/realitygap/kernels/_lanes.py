@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ._bits import unmasked
 from ._compile import inlined, kernel, stage
 
 # Wide enough to pay for the start of each loop, small enough for all arrays to stay in the nearest cache.
@@ -154,7 +155,7 @@ def keep_where_low(low, old, new):
     """The new numbers, but the old ones where `low` is not above zero."""
     real = low.dtype.type
     for lane in range(LANES):
-        before = old[lane]
+        before = unmasked(old[lane])
         after = new[lane]
         bar = low[lane]
         old[lane] = before if bar <= real(0.0) else after

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ._bits import unmasked
 from ._compile import inlined, kernel, stage
 from ._lanes import LANES, Row, Rows, fill
 from ._math import sin_cos_of_turns
@@ -150,7 +151,7 @@ def _nearest_along(cosine, sine, from_x, from_y, over_x, over_y, inverse, nearne
         one = cosine[lane] * from_y[lane] - sine[lane] * from_x[lane]
         other = cosine[lane] * over_y[lane] - sine[lane] * over_x[lane]
         nearer = (other - one) * inverse[lane]
-        nearest = nearness[lane]
+        nearest = unmasked(nearness[lane])
         hit = (one * other <= real(0.0)) & (nearer > nearest)
         nearness[lane] = nearer if hit else nearest
 
@@ -284,7 +285,7 @@ def _nearest_wall(walls, to_x, to_y, low):
             dx = dx - along * wall_x
             dy = dy - along * wall_y
             square = dx * dx + dy * dy
-            nearest = low[lane]
+            nearest = unmasked(low[lane])
             low[lane] = square if square < nearest else nearest
 
 
@@ -292,7 +293,7 @@ def _nearest_wall(walls, to_x, to_y, low):
 def _settle(low, nearest, arrived, to_x, to_y, x, y):
     """Go where nothing nearer than the radius is in the way; who has reached the exit stays there."""
     for lane in range(LANES):
-        was_x = x[lane]
+        was_x = unmasked(x[lane])
         was_y = y[lane]
         new_x = to_x[lane]
         new_y = to_y[lane]
@@ -306,7 +307,7 @@ def _note_arrivals(step, exit_x, exit_y, nearest, x, y, arrived):
     for lane in range(LANES):
         dx = exit_x - x[lane]
         dy = exit_y - y[lane]
-        before = arrived[lane]
+        before = unmasked(arrived[lane])
         now = (dx * dx + dy * dy < nearest) & (before < 0)
         arrived[lane] = np.int32(step) if now else before
 

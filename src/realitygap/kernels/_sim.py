@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import kernel, stage
 from ._lanes import LANES, copy_row, fill
 from ._marks import count_cells, list_cells, list_fresh, mark_ends, mark_line, place_line
@@ -48,7 +49,7 @@ def sense(shape, rules, key, lanes, step):
 def _larger(reading, value):
     for lane in range(LANES):
         one = reading[lane]
-        largest = value[lane]
+        largest = unmasked(value[lane])
         value[lane] = one if one > largest else largest
 
 

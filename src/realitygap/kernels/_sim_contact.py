@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import kernel, stage
 from ._lanes import LANES, any_above_zero, fill, keep_where_low
 from ._math import TWO_PI
@@ -51,7 +52,7 @@ def _go_part(shape, length, turn, part, pose):
 @stage
 def _note_touch(gap, low):
     for k in range(LANES):
-        least = low[k]
+        least = unmasked(low[k])
         now = gap[k]
         low[k] = now if now < least else least
 
@@ -75,7 +76,7 @@ def _put_back_places(gap, before, pose):
     real = gap.dtype.type
     x, y, old_x, old_y = pose.x, pose.y, before.x, before.y
     for k in range(LANES):
-        now_x = x[k]
+        now_x = unmasked(x[k])
         now_y = y[k]
         was_x = old_x[k]
         was_y = old_y[k]
@@ -90,7 +91,7 @@ def _put_back_turns(gap, before, pose):
     heading, sine, cosine = pose.heading, pose.sine, pose.cosine
     old_heading, old_sine, old_cosine = before.heading, before.sine, before.cosine
     for k in range(LANES):
-        now = heading[k]
+        now = unmasked(heading[k])
         now_s = sine[k]
         now_c = cosine[k]
         was = old_heading[k]

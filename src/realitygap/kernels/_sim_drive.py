@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import inlined, stage
 from ._lanes import LANES, any_above_zero, copy_row
 from ._math import TWO_PI, exp, normal
@@ -128,7 +129,7 @@ def _wait(words, delay, jitter, seconds, steps, late, rest):
 def _pick(late, place, asked, picked):
     real = late.dtype.type
     for lane in range(LANES):
-        before = picked[lane]
+        before = unmasked(picked[lane])
         this = asked[lane]
         picked[lane] = this if late[lane] == real(place) else before
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES
 from ._math import normal
@@ -76,7 +77,7 @@ def _lay(x1, y1, x2, y2, half, tape_brightness, x, y, brightness):
         part = part if part > real(0.0) else real(0.0)
         off_x = dx - part * along_x
         off_y = dy - part * along_y
-        before = brightness[lane]
+        before = unmasked(brightness[lane])
         brightness[lane] = there if off_x * off_x + off_y * off_y <= reach else before
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._math import TWO_PI
@@ -45,7 +46,7 @@ def flag_near_disc(x, y, radius, from_x, from_y, far, flag):
         dx = from_x[lane] - x[lane]
         dy = from_y[lane] - y[lane]
         reach = far[lane] + radius[lane]
-        before = flag[lane]
+        before = unmasked(flag[lane])
         near = (before < real(IS_NEAR)) & (dx * dx + dy * dy <= reach * reach)
         flag[lane] = real(IS_NEAR) if near else before
 
@@ -55,7 +56,7 @@ def beyond_face(x, y, normal_x, normal_y, from_x, from_y, most):
     """Raise `most` to how far points are beyond the line through a face."""
     for lane in range(LANES):
         gap = normal_x[lane] * (from_x[lane] - x[lane]) + normal_y[lane] * (from_y[lane] - y[lane])
-        so_far = most[lane]
+        so_far = unmasked(most[lane])
         most[lane] = gap if gap > so_far else so_far
 
 
@@ -66,7 +67,7 @@ def beyond_ends(x, y, normal_x, normal_y, length, from_x, from_y, most):
         along = normal_x[lane] * (from_y[lane] - y[lane]) - normal_y[lane] * (from_x[lane] - x[lane])
         gap = along - length[lane]
         gap = gap if gap > -along else -along
-        so_far = most[lane]
+        so_far = unmasked(most[lane])
         most[lane] = gap if gap > so_far else so_far
 
 
@@ -75,7 +76,7 @@ def flag_near(most, apart, radius, far, flag):
     """Flag where `most` is below `far` and the boxes around both, of `swept`, are not apart."""
     real = flag.dtype.type
     for lane in range(LANES):
-        before = flag[lane]
+        before = unmasked(flag[lane])
         r = radius[lane]
         near = (before < real(IS_NEAR)) & (most[lane] - r <= far[lane]) & (apart[lane] <= r)
         flag[lane] = real(IS_NEAR) if near else before
@@ -144,7 +145,7 @@ def box_from_corner(x, y, normal_x, normal_y, from_x, from_y, pose, box, sides, 
         a = n_x * c + n_y * s
         b = n_y * c - n_x * s
         gap = -(a * u + b * v) - abs(a) * half_x[lane] - abs(b) * half_y[lane]
-        so_far = apart[lane]
+        so_far = unmasked(apart[lane])
         apart[lane] = gap if gap > so_far else so_far
         low = least_x[lane]
         high = most_x[lane]
@@ -169,7 +170,7 @@ def beyond_box(box, sides, apart):
         along = (ahead if ahead > behind else behind) - half_x[lane]
         across = (left if left > right else right) - half_y[lane]
         gap = along if along > across else across
-        so_far = apart[lane]
+        so_far = unmasked(apart[lane])
         apart[lane] = gap if gap > so_far else so_far
 
 

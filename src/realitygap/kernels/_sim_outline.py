@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._math import sin_cos_of_turns
@@ -86,7 +87,7 @@ def reach_of(x, y, radius, axle, reach):
         shifted = x[lane] - axle[lane]
         x[lane] = shifted
         far = np.sqrt(shifted * shifted + y[lane] * y[lane]) + radius[lane]
-        so_far = reach[lane]
+        so_far = unmasked(reach[lane])
         reach[lane] = far if far > so_far else so_far
 
 

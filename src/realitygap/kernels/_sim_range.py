@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import inlined, stage
 from ._lanes import LANES, fill
 from ._math import LOG2_E, exp2, log
@@ -48,7 +49,7 @@ def nearest_ray(distances, near):
     for ray in range(1, distances.shape[0]):
         for lane in range(LANES):
             one = distances[ray, lane]
-            least = near[lane]
+            least = unmasked(near[lane])
             near[lane] = one if one < least else least
 
 
@@ -78,7 +79,7 @@ def _add_return(distance, reach, rate, weight, reading):
     for lane in range(LANES):
         d = distance[lane]
         back = real(weight) * exp2(-d * rate[lane])
-        so_far = reading[lane]
+        so_far = unmasked(reading[lane])
         reading[lane] = so_far + back if d < reach[lane] else so_far
 
 

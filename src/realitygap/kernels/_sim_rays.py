@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._sim_outline import PER_CORNER
@@ -43,7 +44,7 @@ def _meet_plane(center, along, across, forward, left, cosine, sine, distance, ra
         gap = center[lane] + facing * forward[lane] + beside * left[lane]
         gap = gap if gap > real(0.0) else real(0.0)
         approach = -(facing * cosine[lane] + beside * sine[lane])
-        nearest = distance[lane]
+        nearest = unmasked(distance[lane])
         nearest_rate = rate[lane]
         # gap / approach < nearest / nearest_rate; from a wall behind the approach is below zero
         nearer = gap * nearest_rate < nearest * approach
@@ -87,7 +88,7 @@ def _clip(x, y, ahead, aside, forward, left, cosine, sine, enter, enter_rate, le
         b = aside[lane]
         gap = a * (forward[lane] - x[lane]) + b * (left[lane] - y[lane])
         rate = -(a * cosine[lane] + b * sine[lane])
-        n = enter[lane]
+        n = unmasked(enter[lane])
         n_rate = enter_rate[lane]
         m = leave[lane]
         m_rate = leave_rate[lane]
@@ -106,7 +107,7 @@ def _take_clipped(enter, enter_rate, leave, leave_rate, distance, rate):
     for lane in range(LANES):
         n = enter[lane]
         n_rate = enter_rate[lane]
-        nearest = distance[lane]
+        nearest = unmasked(distance[lane])
         nearest_rate = rate[lane]
         hit = (n * leave_rate[lane] <= leave[lane] * n_rate) & (n * nearest_rate < nearest * n_rate)
         distance[lane] = n if hit else nearest
@@ -125,7 +126,7 @@ def _meet_edge(x, y, ahead, aside, length, radius, forward, left, cosine, sine, 
         gap = a * off_x + b * off_y - radius[lane]
         approach = -(a * cosine[lane] + b * sine[lane])
         along = (a * off_y - b * off_x) * approach + (a * sine[lane] - b * cosine[lane]) * gap
-        nearest = distance[lane]
+        nearest = unmasked(distance[lane])
         nearest_rate = rate[lane]
         hit = (
             (approach > real(0.0))
@@ -152,7 +153,7 @@ def _meet_disc(x, y, radius, forward, left, cosine, sine, distance, rate):
         r = radius[lane]
         cosine_there = half / (r if r > real(0.0) else real(1.0))
         cosine_there = cosine_there if cosine_there > real(GRAZING) else real(GRAZING)
-        nearest = distance[lane]
+        nearest = unmasked(distance[lane])
         nearest_rate = rate[lane]
         hit = (under >= real(0.0)) & (gap >= real(0.0)) & (gap * nearest_rate < nearest)
         distance[lane] = gap * cosine_there if hit else nearest

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 
@@ -21,7 +22,7 @@ def _behind(normal_x, normal_y, offset, x, y, shade, lit):
     real = lit.dtype.type
     for lane in range(LANES):
         outside = normal_x[lane] * x[lane] + normal_y[lane] * y[lane] < offset[lane]
-        before = lit[lane]
+        before = unmasked(lit[lane])
         lit[lane] = real(shade) if outside else before
 
 
@@ -41,7 +42,7 @@ def _pass_corner(from_x, from_y, to_x, to_y, x, y, radius, shade, lit):
         off_x = off_x - part * along_x
         off_y = off_y - part * along_y
         r = radius[lane]
-        before = lit[lane]
+        before = unmasked(lit[lane])
         lit[lane] = real(shade) if off_x * off_x + off_y * off_y < r * r else before
 
 
@@ -63,7 +64,7 @@ def _cross_edge(from_x, from_y, to_x, to_y, x1, y1, x2, y2, shade, lit):
         way = way * side
         edge = edge * side
         hit = (turn > real(0.0)) & (way >= real(0.0)) & (way <= turn) & (edge >= real(0.0)) & (edge <= turn)
-        before = lit[lane]
+        before = unmasked(lit[lane])
         lit[lane] = real(shade) if hit else before
 
 
@@ -103,7 +104,7 @@ def shade_light(shape, p, from_x, from_y, to_x, to_y, shade, lit):
 def _from_plane(normal_x, normal_y, offset, x, y, gap):
     for lane in range(LANES):
         one = normal_x[lane] * x[lane] + normal_y[lane] * y[lane] - offset[lane]
-        least = gap[lane]
+        least = unmasked(gap[lane])
         gap[lane] = one if one < least else least
 
 
@@ -124,7 +125,7 @@ def _from_edge(x1, y1, normal_x, normal_y, length, x, y, outside, distance):
         off_x = off_x + part * normal_y[lane]
         off_y = off_y - part * normal_x[lane]
         one = np.sqrt(off_x * off_x + off_y * off_y)
-        least = distance[lane]
+        least = unmasked(distance[lane])
         distance[lane] = one if one < least else least
         most = outside[lane]
         outside[lane] = across if across > most else most
@@ -138,7 +139,7 @@ def _grow(outside, distance, radius, solid, gap):
         one = distance[lane]
         one = -one if inside & solid else one
         one = one - radius[lane]
-        least = gap[lane]
+        least = unmasked(gap[lane])
         gap[lane] = one if one < least else least
 
 

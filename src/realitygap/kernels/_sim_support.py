@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._sim_outline import PER_CORNER
@@ -13,7 +14,7 @@ FAR = 1e9  # farther than anything [m]
 def _height(along, across, x, y, low):
     for lane in range(LANES):
         height = along[lane] * x[lane] + across[lane] * y[lane]
-        least = low[lane]
+        least = unmasked(low[lane])
         low[lane] = height if height < least else least
 
 
@@ -26,7 +27,7 @@ def _height_of_four(along, across, x, y, x_1, y_1, x_2, y_2, x_3, y_3, low):
         two = a * x_1[lane] + b * y_1[lane]
         three = a * x_2[lane] + b * y_2[lane]
         four = a * x_3[lane] + b * y_3[lane]
-        least = low[lane]
+        least = unmasked(low[lane])
         height = two if two < one else one
         other = four if four < three else three
         height = other if other < height else height
@@ -62,7 +63,7 @@ def _lower(along, across, x, y, low, point_x, point_y):
         c_x = x[lane]
         c_y = y[lane]
         height = along[lane] * c_x + across[lane] * c_y
-        least = low[lane]
+        least = unmasked(low[lane])
         p_x = point_x[lane]
         p_y = point_y[lane]
         lower = height < least
@@ -80,7 +81,7 @@ def _lower_of_two(along, across, x, y, other_x, other_y, low, point_x, point_y):
         d_y = other_y[lane]
         one = along[lane] * c_x + across[lane] * c_y
         two = along[lane] * d_x + across[lane] * d_y
-        least = low[lane]
+        least = unmasked(low[lane])
         p_x = point_x[lane]
         p_y = point_y[lane]
         second = two < one
@@ -131,7 +132,7 @@ def _lower_pair(along, across, x, y, other_x, other_y, low, point_x, point_y, ne
         lower_y = d_y if swapped else c_y
         d_x = c_x if swapped else d_x
         d_y = c_y if swapped else d_y
-        least = low[lane]
+        least = unmasked(low[lane])
         p_x = point_x[lane]
         p_y = point_y[lane]
         then = next_low[lane]
@@ -160,7 +161,7 @@ def _lower_one(along, across, x, y, low, point_x, point_y, next_low, next_x, nex
         c_x = x[lane]
         c_y = y[lane]
         c = along[lane] * c_x + across[lane] * c_y
-        least = low[lane]
+        least = unmasked(low[lane])
         p_x = point_x[lane]
         p_y = point_y[lane]
         then = next_low[lane]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._bits import unmasked
 from ._compile import kernel, stage
 from ._lanes import LANES, copy_row, fill
 from ._sim_outline import PER_CORNER
@@ -57,7 +58,7 @@ def _keep_face(low, x, y, normal_x, normal_y, length, best_x, best_y, best_a, be
         b = normal_y[k]
         size = length[k]
         gap = low[k] - (a * from_x + b * from_y)
-        most = best[k]
+        most = unmasked(best[k])
         o_x = best_x[k]
         o_y = best_y[k]
         o_a = best_a[k]
@@ -120,7 +121,7 @@ def _consider_face(
         d_y = d_y if sign > 0 else -d_y
         a = a if sign > 0 else -a
         b = b if sign > 0 else -b
-        most = score[k]
+        most = unmasked(score[k])
         o_apart = apart[k]
         o_end = at_end[k]
         o_nx = n_x[k]
@@ -181,7 +182,7 @@ def _deeper_in_shape(
         u = on_x[k]
         v = on_y[k]
         left = v + (real(1.0) - r) * b
-        f = gap[k]
+        f = unmasked(gap[k])
         f_a = facing[k]
         f_b = beside[k]
         f_x = corner_x[k]
@@ -231,7 +232,7 @@ def _apart_by_corner(x, y, normal_x, normal_y, bounds, sides, apart):
         y_0 = least_y[k]
         y_1 = most_y[k]
         gap = a * ((x_0 if a > real(0.0) else x_1) - u) + b * ((y_0 if b > real(0.0) else y_1) - v)
-        so_far = apart[k]
+        so_far = unmasked(apart[k])
         apart[k] = gap if gap > so_far else so_far
         behind = low_x[k]
         ahead = high_x[k]
@@ -256,7 +257,7 @@ def _apart_by_sides(bounds, sides, radius, apart):
         along = ahead if ahead > behind else behind
         across = left if left > right else right
         gap = along if along > across else across
-        so_far = apart[k]
+        so_far = unmasked(apart[k])
         apart[k] = (gap if gap > so_far else so_far) - (radius[k] + real(SURELY))
 
 

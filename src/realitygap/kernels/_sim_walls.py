@@ -6,6 +6,7 @@ it would be nearest to at the end of the step.
 
 from __future__ import annotations
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES, fill
 from ._sim_rays import see_plane
@@ -19,7 +20,7 @@ PER_WALL = 4  # rows of a wall that is near: normal x, y, offset, gap
 def _keep_nearer(low, center, radius, gap):
     for lane in range(LANES):
         now = low[lane] + center[lane] - radius[lane]
-        least = gap[lane]
+        least = unmasked(gap[lane])
         gap[lane] = now if now < least else least
 
 
@@ -27,7 +28,7 @@ def _keep_nearer(low, center, radius, gap):
 def _keep_least(gap, low):
     for lane in range(LANES):
         now = gap[lane]
-        least = low[lane]
+        least = unmasked(low[lane])
         low[lane] = now if now < least else least
 
 
@@ -65,7 +66,7 @@ def _keep_two(
         x = normal_x[lane]
         y = normal_y[lane]
         o = offset[lane]
-        a = one_gap[lane]
+        a = unmasked(one_gap[lane])
         a_x = one_x[lane]
         a_y = one_y[lane]
         a_o = one_offset[lane]
@@ -118,7 +119,7 @@ def _deeper_in_wall(low, next_low, center, radius, along, across, x, y, next_x, 
         v = y[lane]
         next_u = next_x[lane]
         next_v = next_y[lane]
-        f = gap[lane]
+        f = unmasked(gap[lane])
         f_a = facing[lane]
         f_b = beside[lane]
         f_x = corner_x[lane]

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ._bits import unmasked
 from ._compile import inlined, kernel, stage
 from ._lanes import LANES, fill, keep_where_low, make_lanes
 from ._marks import count_cells, list_cells, list_fresh, mark_ends, mark_line, place_line
@@ -93,7 +94,7 @@ def _larger_noisy(fraction, words, noise, clip, value):
         if clip:
             one = one if one > real(0.0) else real(0.0)
             one = one if one < real(1.0) else real(1.0)
-        largest = value[lane]
+        largest = unmasked(value[lane])
         value[lane] = one if one > largest else largest
 
 

@@ -8,6 +8,7 @@ segment, and edges of the body and rays cross it or not.
 
 from __future__ import annotations
 
+from ._bits import unmasked
 from ._compile import stage
 from ._lanes import LANES
 
@@ -46,7 +47,7 @@ def gap_to_planes(normals, body, pose, seen, low):
             left = body[b, 1]
             for lane in range(LANES):
                 gap = center[lane] + along[lane] * forward + across[lane] * left
-                nearest = low[lane]
+                nearest = unmasked(low[lane])
                 low[lane] = gap if gap < nearest else nearest
 
 
@@ -79,7 +80,7 @@ def sense_planes(normals, sensors, sensor_range, pose, seen, fractions, rates):
                 beside = across[lane]
                 gap = center[lane] + facing * forward + beside * left
                 rate = -(facing * ahead + beside * aside)
-                nearest = fractions[s, lane]
+                nearest = unmasked(fractions[s, lane])
                 nearest_rate = rates[s, lane]
                 # gap / rate < nearest / nearest_rate; a wall behind has a rate below zero
                 nearer = gap * nearest_rate < nearest * rate
@@ -143,7 +144,7 @@ def touch_segments(walls, body, pose, seen, low):
                 turn = turn * side
                 along_edge = along_edge * side
                 along_wall = along_wall * side
-                before = low[lane]
+                before = unmasked(low[lane])
                 hit = (
                     (turn > real(0.0))
                     & (along_edge >= real(0.0))
@@ -182,7 +183,7 @@ def sense_segments(walls, sensors, sensor_range, pose, seen, fractions, rates):
                 turn = turn * side
                 along_ray = along_ray * side
                 along_wall = along_wall * side
-                nearest = fractions[s, lane]
+                nearest = unmasked(fractions[s, lane])
                 nearest_rate = rates[s, lane]
                 nearer = (
                     (turn > real(0.0))

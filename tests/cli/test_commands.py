@@ -357,6 +357,8 @@ def test_bench_measures_what_it_names():
         "paper_runs_novelty_per_second",
         "paper_runs_recorded_per_second",
         "neat_share",
+        "peak_gflops",
+        "robot_steps_per_gflop",
         "machine",
         "versions",
     }

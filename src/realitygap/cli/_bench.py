@@ -11,6 +11,7 @@ from realitygap._limits import parse_toml
 from realitygap.errors import StudyError, did_you_mean
 
 DEFAULT_SEEDS = 100
+_PEAK = "Peak of one core, measured: {:.0f} GFlop/s of multiply-adds in single precision"
 
 
 def bench(
@@ -48,7 +49,8 @@ def bench(
     With a TASK, it counts how many evaluations NEAT needs for that task instead.
 
     Speed: robot-steps and whole paper runs a second, on one core and on all. A robot-step holds its noise and
-    its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted.
+    its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted. The
+    robot-steps per GFlop of the core's peak compare machines of different speed.
 
     Realism: robot-steps a second of one core on the platform sim with a real outline, sliding contact, infrared sensors
     with their noise and a noisy drive, all numbers different in each trial.
@@ -222,9 +224,11 @@ def _bench_realism(seconds: float, *, as_json: bool) -> None:
         "pressed": "pressed into walls",
         "boxes": "avoiding, two boxes",
     }
-    typer.echo(f"{'robot-steps/s, one core':28} {'':>12} {'stalled':>8}")
+    typer.echo(f"{'one core':28} {'robot-steps/s':>14} {'per GFlop':>12} {'stalled':>8}")
     for key, name in names.items():
-        typer.echo(f"{name:28} {figures[key]:>12,.0f} {figures['stalled'][key]:>8.1%}")
+        stalled, per_gflop = figures["stalled"][key], figures["per_gflop"][key]
+        typer.echo(f"{name:28} {figures[key]:>14,.0f} {per_gflop:>12,.0f} {stalled:>8.1%}")
+    typer.echo(_PEAK.format(figures["peak_gflops"]))
 
 
 def _bench_speed(seconds: float, *, as_json: bool) -> None:
@@ -246,6 +250,8 @@ def _bench_speed(seconds: float, *, as_json: bool) -> None:
         typer.echo(
             f"{name:38} {one:14,.0f} a core {all_cores:14,.0f} on all {figures['machine']['processors']}"
         )
+    typer.echo(f"{'robot-steps per GFlop of peak':38} {figures['robot_steps_per_gflop']:14,.0f} a core")
+    typer.echo(_PEAK.format(figures["peak_gflops"]))
     typer.echo(f"{figures['neat_share']:.0%} of a paper run is NEAT and records, the rest its trials")
     typer.echo(
         f"{figures['machine']['processor']}; " + ", ".join(f"{k} {v}" for k, v in figures["versions"].items())

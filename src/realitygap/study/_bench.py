@@ -17,6 +17,7 @@ import polars
 
 from realitygap._version import __version__
 from realitygap.evolution import Population, decode_all
+from realitygap.kernels._peak import peak_flops
 from realitygap.kernels._trial import make_block, make_trace, run_trials
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
@@ -43,8 +44,10 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
         `robot_steps_two_hidden_per_second` of networks with two (noise and both counts of cells are part of a
         step); `paper_runs_per_second` (coverage at 50 % noise, NEAT included),
         `paper_runs_novelty_per_second`, and `paper_runs_recorded_per_second` (of coverage, their rows written as
-        well). `neat_share`: the part of the time of a paper run, one core, that its trials do not take. `machine`
-        and `versions`.
+        well). `neat_share`: the part of the time of a paper run, one core, that its trials do not take.
+        `peak_gflops`: fused multiply-adds of one core in single precision, each two operations, in 10^9 a second.
+        `robot_steps_per_gflop`: robot-steps of one core for 10^9 operations of that peak, both in time of the thread:
+        machines of different speed can be compared by it. `machine` and `versions`.
 
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
@@ -59,6 +62,7 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
         folder = ResultsFolder.create(Path(temporary) / "bench", study.description())
         with folder.locked():
             runs = _rates(_run_work(coverage), seconds)
+            peak_gflops = peak_flops() / 1e9
             return {
                 "robot_steps_per_second": _rates(_trial_work(coverage, 0), seconds),
                 "robot_steps_two_hidden_per_second": _rates(_trial_work(coverage, 2), seconds),
@@ -66,6 +70,8 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
                 "paper_runs_novelty_per_second": _rates(_run_work(novelty), seconds),
                 "paper_runs_recorded_per_second": _rates(_recorded_work(coverage, folder), seconds),
                 "neat_share": _share_without_trials(coverage, runs["per_core"], seconds),
+                "peak_gflops": peak_gflops,
+                "robot_steps_per_gflop": _fastest_rate(_trial_work(coverage, 0), seconds) / peak_gflops,
                 "machine": machine_facts(),
                 "versions": {
                     "realitygap": __version__,
@@ -110,6 +116,18 @@ def _rate(work: Callable[[int], int], threads: int, seconds: float) -> float:
     with ThreadPoolExecutor(threads) as pool:
         done = sum(pool.map(go_on, range(threads)))
     return done / (time.perf_counter() - since)
+
+
+def _fastest_rate(work: Callable[[int], int], seconds: float) -> float:
+    """Work a second of the fastest call, in time of the thread, which other programs hardly change."""
+    work(0)
+    until, fastest, call = time.perf_counter() + seconds, 0.0, 1
+    while time.perf_counter() < until or not fastest:
+        since = time.thread_time()
+        done = work(call)
+        fastest = max(fastest, done / (time.thread_time() - since))
+        call += 1
+    return fastest
 
 
 def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from realitygap._version import __version__
 from realitygap.evolution import NeatSettings
 from realitygap.kernels._network import Networks, make_networks
+from realitygap.kernels._peak import peak_flops
 from realitygap.kernels._sim import run_sim_trials
 from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
 from realitygap.kernels._sim_shape import half_width, make_sim_shape, sim_table, substeps_for
@@ -71,7 +72,8 @@ def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
     Returns:
         `avoiding`: of networks that turn away from walls; `pressed`: of such as push into them; `boxes`: that
         avoid, among the two boxes of the arena `paper-boxes`. `stalled`: the share of their steps in which they
-        stall, and `visited`: how many cells they visit. `machine` and `versions`.
+        stall, and `visited`: how many cells they visit. `peak_gflops`: as of `measure_speed`; `per_gflop`: the three
+        rates for 10^9 operations of that peak. `machine` and `versions`.
 
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
@@ -91,7 +93,16 @@ def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
         "numpy": np.__version__,
         "numba": numba.__version__,
     }
-    return {**rates, "stalled": stalled, "visited": visited, "machine": machine_facts(), "versions": versions}
+    peak_gflops = peak_flops() / 1e9
+    return {
+        **rates,
+        "stalled": stalled,
+        "visited": visited,
+        "peak_gflops": peak_gflops,
+        "per_gflop": {name: rate / peak_gflops for name, rate in rates.items()},
+        "machine": machine_facts(),
+        "versions": versions,
+    }
 
 
 class RealisticTrials:

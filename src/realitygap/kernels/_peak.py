@@ -1,4 +1,4 @@
-"""The most arithmetic that a core does: fused multiply-adds in single precision, measured."""
+"""Measures the peak of a core: fused multiply-adds in single precision."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from numba import types
 from numba.extending import intrinsic
 
 BITS = (128, 256, 512)
-"""Widths of the vectors that are tried: a core that lacks one splits it."""
+"""Widths of the vectors that are tried [bits]: a core that lacks one splits it."""
 CHAINS = 12
 """Sums side by side, so many that no unit waits for the result before."""
 ROUNDS = 300_000
@@ -42,7 +42,7 @@ def _rate(lanes: int, seconds: float) -> float:
 
 
 def multiply_adds(lanes: int) -> Callable[[int], float]:
-    """Compile a loop of multiply-adds over vectors of so many lanes.
+    """Compile a loop of multiply-adds over vectors of `lanes` numbers.
 
     It sets x to a x + b, n times over, with a = n / (n + 1) and b = 1 - a, in each lane of `CHAINS` vectors. Chain k
     begins with n + k. The sum of all is returned.

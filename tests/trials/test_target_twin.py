@@ -144,7 +144,7 @@ SPY = """
     from realitygap.world import paper_arena
     with open_target("twin:" + sys.argv[1], paper_arena(), processes=1) as target:
         target.carry_out([TrialPlan(commands=[[1.0, 0.0]] * 3)], "track")
-        assert any(path.endswith(".py") for path in opened), "the spy is blind"
+        assert any(path.endswith((".py", ".pyc")) for path in opened), "the spy is blind"
         print([path for path in opened if "same.toml" in path], *target.pids, flush=True)
         target.carry_out([TrialPlan(commands=[[1.0, 0.2]] * 100_000)], "cells")
 """

@@ -43,11 +43,11 @@ from realitygap.calibration import (
     scribbler_prior,
     values_of,
 )
-from realitygap.calibration._ir_scales import AMPLITUDE, BURST, DECAY, DROP
-from realitygap.robots import SimPlatform
+from realitygap.calibration.infrared._scales import AMPLITUDE, BURST, DECAY, DROP
+from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget, TwinTarget
 from realitygap.robots.twin import sample_twin
 from realitygap.study import calibrate, calibrate_all, gap_between
-from realitygap.trials import SimEnsemble, SimTarget, TrialPlan, TwinTarget
+from realitygap.trials import TrialPlan
 from realitygap.world import Calibration, Distribution, Fitted, paper_arena
 
 ARENA = paper_arena()

@@ -1,7 +1,7 @@
 """Measure how many small faults in three kernels and in the ledger the tests detect (mutation testing).
 
     uv run python benchmarks/mutants.py                                   # about 10 processor minutes
-    uv run python benchmarks/mutants.py --most 200 kernels/_coverage.py
+    uv run python benchmarks/mutants.py --most 200 kernels/tasks/coverage.py
 
 A mutant is a copy of the package with one fault in one module: another operator, another number, an inverted
 condition, or a missing statement. A mutant is killed if a test of its module fails or does not end. Kernels run as
@@ -26,9 +26,9 @@ ROOT = Path(__file__).parent.parent
 
 LEDGER = ["tests/records/test_ledger.py"]
 MODULES = {
-    "kernels/_coverage.py": ["tests/kernels/test_coverage.py"],
-    "kernels/_species.py": ["tests/kernels/test_species.py"],
-    "kernels/_novelty.py": ["tests/kernels/test_novelty.py"],
+    "kernels/tasks/coverage.py": ["tests/kernels/test_coverage.py"],
+    "kernels/neat/species.py": ["tests/kernels/test_species.py"],
+    "kernels/neat/novelty.py": ["tests/kernels/test_novelty.py"],
     "records/_ledger.py": LEDGER,
     "records/_ledger_file.py": [*LEDGER, "tests/test_limits.py", "tests/records/test_inside.py"],
     "records/_ledger_rows.py": LEDGER,

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from realitygap.kernels._compile import kernel
-from realitygap.kernels._evolve import next_generation
-from realitygap.kernels._genome import first_genomes
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._mutation import clear_innovations
-from realitygap.kernels._network import activate, decode
-from realitygap.kernels._philox import FIRST
-from realitygap.kernels._species import clear_species, speciate
-from realitygap.kernels._trial import draw_lanes
-from realitygap.kernels._wiring import think
-from realitygap.kernels._xor import try_xor
+from realitygap.kernels.compile.decorators import kernel
+from realitygap.kernels.jyro.trial import draw_lanes
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.math.philox import FIRST
+from realitygap.kernels.neat.evolve import next_generation
+from realitygap.kernels.neat.genome import first_genomes
+from realitygap.kernels.neat.mutation import clear_innovations
+from realitygap.kernels.neat.network import activate, decode
+from realitygap.kernels.neat.species import clear_species, speciate
+from realitygap.kernels.neat.wiring import think
+from realitygap.kernels.tasks.xor import try_xor
 
 
 @kernel

@@ -33,7 +33,7 @@ HIDDEN_ROOM = 32
 
 
 def _room(population: int, rules: Any) -> Any:
-    from realitygap.kernels._task_run import XOR, TaskRules, make_task_room
+    from realitygap.kernels.tasks.run import XOR, TaskRules, make_task_room
 
     return make_task_room(TaskRules(XOR, population, 1, 1.0), rules, ROOM, HIDDEN_ROOM)
 
@@ -68,7 +68,7 @@ def time_draws() -> dict[str, Any]:
     import numpy as np
 
     from our_loops import KEY, draws
-    from realitygap.kernels._lanes import LANES
+    from realitygap.kernels.math.lanes import LANES
 
     counters = np.arange(3 * LANES, dtype=np.uint32).reshape(3, LANES)
     words = np.zeros((4, LANES), np.uint32)
@@ -86,13 +86,14 @@ def time_steps(threads: int = 1, precision: str = "single", start_hidden: int = 
     from concurrent.futures import ThreadPoolExecutor
 
     from realitygap.evolution import Population, random_key
+    from realitygap.platforms import try_genomes
     from realitygap.study import load_study
-    from realitygap.trials import NoiseKey, try_genomes
+    from realitygap.trials import NoiseKey
 
     condition = next(item for item in load_study("paper").conditions if item.name == "coverage-50")
     settings = condition.neat.model_copy(update={"population": TRIALS, "start_hidden": start_hidden})
     genomes = Population(3, 2, settings, seed=condition.seed, bias=False).ask()
-    platform = condition.jyro.model_copy(update={"precision": precision})
+    platform = condition.on.model_copy(update={"precision": precision})
     arena = condition.arena.arena()
 
     def one_thread(thread: int) -> None:
@@ -185,7 +186,7 @@ def time_large() -> dict[str, Any]:
 def _one_network(population: int) -> tuple[Any, Any]:
     """NEAT's rules, and room whose networks are those of a first generation."""
     from our_loops import KEY, begin_run
-    from realitygap.kernels._network import decode
+    from realitygap.kernels.neat.network import decode
 
     rules = _settings(population).rules(work.N_INPUTS, work.N_OUTPUTS)
     room = _room(population, rules)
@@ -199,8 +200,8 @@ def time_passes() -> dict[str, Any]:
     import numpy as np
 
     from our_loops import passes, passes_side_by_side
-    from realitygap.kernels._lanes import LANES
-    from realitygap.kernels._wiring import make_wiring, wire
+    from realitygap.kernels.math.lanes import LANES
+    from realitygap.kernels.neat.wiring import make_wiring, wire
 
     rules, room = _one_network(work.RUN_POPULATION)
     inputs = (0.1, 0.2, 1.0)

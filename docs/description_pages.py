@@ -39,6 +39,7 @@ SHOWN_ROBOTS = (
     "pioneer",
     "khepera",
     "e-puck",
+    "thymio",
 )
 ROBOT_AT = {"avoid": "khepera", "light": "khepera"}
 

@@ -4,7 +4,7 @@
     uv run python docs/make_closing.py              # without results: tables and sentences from the stored data
     uv run python docs/make_closing.py --earlier    # the table of earlier runs, from the history of this repository
 
-With results of `realitygap run closing-the-gap`, complete or not, it writes the data of the page: summary.json and
+With results of `realitygap closing-the-gap`, complete or not, it writes the data of the page: summary.json and
 means.csv, the mean coverage of each held-out controller on each twin. Tables and sentences follow from these two files;
 figures are drawn from the results. The study takes hours and is not run here.
 """
@@ -39,7 +39,7 @@ from realitygap.report import (
     why_table,
 )
 from realitygap.study import summarize_closing
-from realitygap.study._closing_summary import is_met, median_interval
+from realitygap.study._closing.summary import is_met, median_interval
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "closing"
@@ -440,7 +440,7 @@ def texts(summary: dict[str, Any]) -> dict[str, str]:
 def main() -> None:
     """Write the data, tables, sentences and figures of the page."""
     parser = argparse.ArgumentParser(description="Tables, figures and sentences of the study of many twins.")
-    parser.add_argument("folder", type=Path, nargs="?", help="results of `realitygap run closing-the-gap`")
+    parser.add_argument("folder", type=Path, nargs="?", help="results of `realitygap closing-the-gap`")
     parser.add_argument("--earlier", action="store_true", help="write the table of earlier runs instead")
     options = parser.parse_args()
     TABLES.mkdir(parents=True, exist_ok=True)

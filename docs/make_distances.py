@@ -27,7 +27,6 @@ from realitygap.report import (
     DistanceAudit,
     Estimate,
     Interval,
-    MedianInterval,
     audit_distance,
     bca_interval,
     compare_choices,
@@ -212,7 +211,7 @@ def _per_run(study: ResultsFolder, condition: str) -> pl.DataFrame:
 def times(n: int = 200, seconds: float = 0.3) -> str:
     """Nanoseconds that one distance takes, of n random walks to each other: the least of several sweeps."""
     from realitygap.evolution._distances import measure_of, pack_behaviors
-    from realitygap.kernels._distances import distances_between
+    from realitygap.kernels.neat.distances import distances_between
 
     rng = np.random.default_rng(1)
     walks = [random_walk(rng, 12, 6, 0.6) for _ in range(n)]
@@ -240,7 +239,7 @@ def _signed(value: float, form: str = "+.2f") -> str:
     return text.replace("-", "−")
 
 
-def _span(interval: Interval | MedianInterval | Estimate | None, form: str = "+.2f") -> str:
+def _span(interval: Interval | Estimate | None, form: str = "+.2f") -> str:
     if interval is None:
         return ""
     return " to ".join(f"{bound:{form}}".replace("-", "−") for bound in (interval.low, interval.high))

@@ -100,7 +100,7 @@ def _draw_arena(axes: Axes, arena) -> None:
 
 def _draw_robot(axes: Axes, pose: np.ndarray, condition: Condition) -> None:
     x, y, heading = pose
-    forward, left = np.array(condition.jyro.body.corners).T
+    forward, left = np.array(condition.on.body.corners).T
     corners = np.column_stack(
         [
             x + forward * np.cos(heading) - left * np.sin(heading),

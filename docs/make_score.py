@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from realitygap import run_study
+from realitygap import drive_study
 from realitygap.records import Ledger
 from realitygap.testing import photograph_sheet
 from realitygap.vision import SheetLayout, overlay_png, read_photo, score_sheet
@@ -41,7 +41,7 @@ def pictures() -> dict[str, bytes]:
     layout = SheetLayout.of(paper_arena())
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         Path("small.toml").write_text(study.group(1), "utf-8")
-        run_study("small.toml", "results", port="emulator://s2?fluke=1&speed=off")
+        drive_study("small.toml", "emulator://s2?fluke=1&speed=off", "results")
         with Ledger.open("results/ledger.sqlite", writable=False) as ledger:
             paths = [np.array(score["path"])[:, :2] for score in ledger.scores()]
     photo = photograph_sheet(layout, paths, SEED).jpeg

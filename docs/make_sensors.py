@@ -88,10 +88,10 @@ def read(robot: RobotModel, distances: np.ndarray, n: int) -> np.ndarray:
     distance k.
     """
     from realitygap.evolution import NeatSettings
-    from realitygap.kernels import _sim_senses
-    from realitygap.kernels._lanes import LANES
-    from realitygap.kernels._sim_lanes import SimRules, make_sim_room
-    from realitygap.kernels._sim_shape import make_sim_shape, sim_table
+    from realitygap.kernels.math.lanes import LANES
+    from realitygap.kernels.sim import senses
+    from realitygap.kernels.sim.lanes import SimRules, make_sim_room
+    from realitygap.kernels.sim.shape import make_sim_shape, sim_table
 
     sensor = robot.range[0]
     shape = make_sim_shape(
@@ -110,9 +110,9 @@ def read(robot: RobotModel, distances: np.ndarray, n: int) -> np.ndarray:
         lanes.p[: shape.n_rows] = sim_table(shape, numbers, np.float64)
         lanes.counters[0] = (first + np.arange(LANES)) * 256
         lanes.distances[:] = np.resize(np.minimum(block, sensor.reach), LANES)
-        _sim_senses.start_senses(shape, rules, lanes)
+        senses.start_senses(shape, rules, lanes)
         for step in range(n):
-            _sim_senses.answer(shape, rules, np.uint64(KEY), lanes, np.int64(step))
+            senses.answer(shape, rules, np.uint64(KEY), lanes, np.int64(step))
             readings[step, first : first + LANES] = lanes.readings[0, : block.size]
     return readings
 

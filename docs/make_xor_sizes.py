@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all
-from realitygap.kernels._xor import try_xor
+from realitygap.kernels.tasks.xor import try_xor
 from realitygap.runs import run_task
 from realitygap.study import task_settings
 from realitygap.tasks import CLASSICAL_TASKS

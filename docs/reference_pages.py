@@ -25,8 +25,8 @@ from realitygap import myro
 from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
+from realitygap.platforms import EnkiPlatform, JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.runs import Condition
 from realitygap.settings import is_hidden
 from realitygap.study import (
@@ -39,6 +39,7 @@ from realitygap.study import (
 )
 from realitygap.tasks import (
     AvoidTask,
+    ControllerSettings,
     CoverageTask,
     GoalTask,
     LightTask,
@@ -57,12 +58,14 @@ TABLES: dict[str, type[BaseModel]] = {
     '[task] with kind = "light"': LightTask,
     '[task] with kind = "wall"': WallTask,
     '[task] with kind = "goal"': GoalTask,
+    "[controller]": ControllerSettings,
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
     "[platform.jyro]": JyroPlatform,
     "[platform.sim]": SimPlatform,
     "[platform.twin]": TwinPlatform,
     "[platform.scribbler]": ScribblerPlatform,
+    "[platform.enki]": EnkiPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,
     "[[condition]]": Condition,

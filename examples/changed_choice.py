@@ -12,7 +12,7 @@ from pathlib import Path
 import polars as pl
 
 from realitygap import Condition, Study, run_study, summarize
-from realitygap.robots import JyroPlatform
+from realitygap.platforms import JyroPlatform
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 
 RUNS = 200

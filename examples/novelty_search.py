@@ -8,8 +8,9 @@ computed as a study does it, and must be equal in every trial.
 """
 
 from realitygap import Condition, PaperArchive, Population
+from realitygap.platforms import try_genomes
 from realitygap.runs import run_replicates
-from realitygap.trials import NoiseKey, try_genomes
+from realitygap.trials import NoiseKey
 
 REPLICATE = 0
 
@@ -31,7 +32,7 @@ def main() -> None:
     for generation in range(condition.neat.generations):
         genomes = population.ask()
         noise_key = NoiseKey(condition.key, REPLICATE, generation)
-        trials = try_genomes(condition.jyro, arena, genomes, noise=condition.noise, noise_key=noise_key)
+        trials = try_genomes(condition.on, arena, genomes, noise=condition.noise, noise_key=noise_key)
         novelty = archive.update([trials.behavior(k) for k in range(len(genomes))])
         by_hand += list(zip(novelty.tolist(), trials.coverage_line.tolist(), strict=True))
         print(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import multiprocessing
 import os
 import sys
 import tempfile
@@ -15,6 +14,7 @@ import numba  # noqa: F401  # imported once, for all that are forked
 import polars  # noqa: F401
 
 import realitygap.cli
+from tests.forks import fork_context
 
 PATIENCE_S = 300
 
@@ -29,12 +29,10 @@ class Done(NamedTuple):
 
 def run_command(*words: str, cwd: Path | None = None, env: Mapping[str, str] | None = None) -> Done:
     """Run `realitygap WORDS...` in a process of its own and wait for its end."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__])
     with tempfile.TemporaryDirectory() as folder:
         output, errors = Path(folder) / "output", Path(folder) / "errors"
         order = (words, cwd or Path.cwd(), dict(os.environ if env is None else env), output, errors)
-        process = context.Process(target=_command, args=order)
+        process = fork_context().Process(target=_command, args=order)
         process.start()
         process.join(PATIENCE_S)
         if process.is_alive():

@@ -82,7 +82,9 @@ def twin_processes() -> list[int]:
     """Processes in which a twin lives, children of this one; none are found where there is no /proc."""
     listed = Path("/proc/self/task").glob("*/children")
     children = [Path("/proc") / pid for each in listed for pid in each.read_text().split()]
-    return [int(each.name) for each in children if b"twin_worker" in (each / "cmdline").read_bytes()]
+    return [
+        int(each.name) for each in children if b"platforms.twin._worker" in (each / "cmdline").read_bytes()
+    ]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -90,7 +92,7 @@ def _no_twin_is_left_open() -> Iterator[None]:
     """Whoever opens a twin closes it; the one of the last trials by a genome is kept for the next, and closed here."""
     yield
     if twin_processes():
-        sys.modules["realitygap.trials"].close_twins()
+        sys.modules["realitygap.platforms"].close_twins()
         gc.collect()
         assert not twin_processes()
 

@@ -236,7 +236,7 @@ def _valid_memory() -> bytes:
 
 
 def _transfer(path: Path) -> Any:
-    from realitygap.study._transfer import TransferPlan, _adopt
+    from realitygap.study._transfer.strategies import TransferPlan, _adopt
 
     return _adopt(path.parent, TransferPlan(**json.loads(_TRANSFER)))
 
@@ -251,13 +251,13 @@ _TRANSFER = json.dumps(
 
 
 def _plan(path: Path) -> Any:
-    from realitygap.study._closing_plan import adopt_plan, read_plan
+    from realitygap.study._closing.plan import adopt_plan, read_plan
 
     adopt_plan(path.parent, read_plan(path.parent))
 
 
 def _valid_plan() -> bytes:
-    from realitygap.study._closing_plan import SMALL
+    from realitygap.study._closing.plan import SMALL
 
     return json.dumps(SMALL.to_dict()).encode()
 

@@ -36,16 +36,16 @@ ALLOWED = {
     "records/_chunk.py": {"pl.read_parquet"},  # after check_size
     "records/_ledger_file.py": {"sqlite3.connect"},
     "records/_observations_file.py": {"json.loads"},  # of what was just written
-    "study/_closing_plan.py": {"json.loads"},  # of what was just written
-    "study/_transfer.py": {"json.loads"},  # of what was just written
+    "study/_closing/plan.py": {"json.loads"},  # of what was just written
+    "study/_transfer/strategies.py": {"json.loads"},  # of what was just written
     "vision/_photo.py": {"Image.open"},  # with limits of its own
     "world/_svg.py": {"ElementTree.fromstring"},
     # between two processes of one program
     "lab/_channel.py": {"json.loads"},
     "lab/_check_work.py": {"json.loads"},  # of what was just written
     "lab/_child.py": {"json.loads"},
-    "trials/_twin_pool.py": {"json.loads"},
-    "trials/_twin_worker.py": {"json.loads"},
+    "platforms/twin/_pool.py": {"json.loads"},
+    "platforms/twin/_worker.py": {"json.loads"},
 }
 
 

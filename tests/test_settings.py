@@ -7,7 +7,7 @@ import pytest
 from realitygap import Condition, NeatSettings, Study
 from realitygap.errors import RealityGapError
 from realitygap.evolution import NoveltySettings
-from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.platforms import JyroPlatform, SimPlatform
 from realitygap.robots.twin import load_twin
 from realitygap.study import ConditionNotes, ReportSection, StudySection, load_study
 from realitygap.tasks import CoverageTask

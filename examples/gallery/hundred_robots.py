@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import realitygap
-from realitygap.robots import SimPlatform
-from realitygap.trials import NoiseKey, trace_genomes, try_genomes
+from realitygap.platforms import SimPlatform, trace_genomes, try_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import Distribution, paper_arena
 
 DRAWN = {

@@ -10,8 +10,9 @@ import sys
 from matplotlib.figure import Figure
 
 import realitygap
+from realitygap.platforms import trace_genomes
 from realitygap.runs import genome_of
-from realitygap.trials import NoiseKey, trace_genomes
+from realitygap.trials import NoiseKey
 
 study = realitygap.run_study("light", "results/light", replicates=1)
 described = next(each for each in study.folder.description["conditions"] if each["name"] == "light")
@@ -23,7 +24,7 @@ for k, generation in enumerate((0, int(rows["generation"].max()))):
     best = rows.filter(rows["generation"] == generation).sort("fitness", descending=True).row(0, named=True)
     genome = genome_of(condition, best)
     driven = trace_genomes(
-        condition.simulated_on,
+        condition.on,
         arena,
         [genome] * 30,
         noise=condition.noise,

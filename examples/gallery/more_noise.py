@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import realitygap
+from realitygap.platforms import retry_genomes
 from realitygap.runs import genome_of
-from realitygap.trials import NoiseKey, retry_genomes
+from realitygap.trials import NoiseKey
 
 LEVELS = np.linspace(0, 1.6, 9)
 COLORS = {"novelty-10": "#3d9bd6", "novelty-50": "#0a4f8f", "novelty-80": "#7a1f4d"}
@@ -34,7 +35,7 @@ for described in study.folder.description["conditions"]:
     arena, means = condition.arena.arena(), []
     for noise in LEVELS:
         again = retry_genomes(
-            condition.jyro, arena, genomes, noise=noise, noise_keys=keys, repeats=range(1, 51)
+            condition.on, arena, genomes, noise=noise, noise_keys=keys, repeats=range(1, 51)
         )
         means.append(again.coverage_line.reshape(len(genomes), -1).mean(axis=1))
     low, middle, high = np.percentile(means, [25, 50, 75], axis=1)

@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from realitygap import Condition, PaperArchive, Population
-from realitygap.trials import NoiseKey, try_genomes
+from realitygap.platforms import try_genomes
+from realitygap.trials import NoiseKey
 
 GENERATIONS = 50
 
@@ -23,7 +24,7 @@ def visits_of(selection: str) -> tuple[np.ndarray, int]:
     visits = np.zeros((arena.grid.rows, arena.grid.columns))
     for generation in range(GENERATIONS):
         genomes, key = population.ask(), NoiseKey(condition.key, 0, generation)
-        trials = try_genomes(condition.jyro, arena, genomes, noise=0.5, noise_key=key)
+        trials = try_genomes(condition.on, arena, genomes, noise=0.5, noise_key=key)
         behaviors = [trials.behavior(k) for k in range(len(genomes))]
         for cells in behaviors:
             visits.ravel()[cells] += 1

@@ -10,9 +10,9 @@ import sys
 import numpy as np
 
 import realitygap
+from realitygap.platforms import SimPlatform, trace_genome, try_genomes
 from realitygap.playback import in_motion
-from realitygap.robots import SimPlatform
-from realitygap.trials import NoiseKey, trace_genome, try_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import paper_arena
 
 arena, key = paper_arena(), NoiseKey(1)

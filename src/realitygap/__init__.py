@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .records import ResultsFolder
     from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
-    from .study import Study, load_study, run_study
+    from .study import Study, drive_study, load_study, run_study
     from .trials import simulate_case
     from .world import Case
 
@@ -34,6 +34,7 @@ _HOME = {
     "Population": "evolution",
     "ResultsFolder": "records",
     "Study": "study",
+    "drive_study": "study",
     "load_study": "study",
     "replay": "runs",
     "run_study": "study",
@@ -55,6 +56,7 @@ __all__ = [
     "ResultsFolder",
     "Study",
     "__version__",
+    "drive_study",
     "load_study",
     "replay",
     "run_study",
@@ -75,6 +77,7 @@ _PACKAGES = {
     "gap",
     "gym",
     "lab",
+    "platforms",
     "playback",
     "records",
     "report",

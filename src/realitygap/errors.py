@@ -62,6 +62,10 @@ class RobotTimeout(RobotError):  # noqa: N818  # the word that its users know
     """No answer came in time."""
 
 
+class RobotStopped(RobotError):  # noqa: N818  # the word that its users know
+    """The operator stopped the robot by a button on it."""
+
+
 class ProtocolError(RobotError):
     """What came is not what the protocol has there."""
 

@@ -11,6 +11,7 @@ from pydantic_core import CoreSchema, PydanticKnownError
 
 from .errors import did_you_mean
 
+MISSING = "missing, and it has no default."
 _EXPECTED = {
     "int_type": "a whole number",
     "int_parsing": "a whole number",
@@ -87,6 +88,11 @@ class Settings(BaseModel):
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
+    def table_of(cls, name: str) -> type[BaseModel] | None:
+        """Return the model of a table that is no field; None if there is no such table."""
+        return None
+
+    @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """As pydantic has it, except that true and false are no numbers."""
         strict: CoreSchema = _without_truth_in_numbers(handler(source))
@@ -150,7 +156,9 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
     while rest:
         name = str(rest.pop(0))
         names.append(name)
-        annotation = owner.model_fields[name].annotation if name in owner.model_fields else None
+        annotation: Any = owner.model_fields[name].annotation if name in owner.model_fields else None
+        if annotation is None and issubclass(owner, Settings):
+            annotation = owner.table_of(name)
         if get_origin(annotation) is dict and rest:
             names.append(str(rest.pop(0)))
         inner, is_list = table_in(annotation)
@@ -190,7 +198,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "extra_forbidden":
         return f"unknown setting. {did_you_mean(str(problem['loc'][-1]), model.model_fields)}"
     if kind == "missing":
-        return "missing, and it has no default."
+        return MISSING
     if kind == "literal_error":
         return f"expected {context['expected']}, came {came}.{_meant(problem['input'], context['expected'])}"
     if kind == "value_error":

@@ -8,9 +8,9 @@ import numpy as np
 
 from realitygap.calibration import ranges_of, scribbler_prior
 from realitygap.calibration._handles import parameters_of, robot_numbers
+from realitygap.platforms import SimEnsemble, SimPlatform
 from realitygap.records import ObservedTrial
-from realitygap.robots import SimPlatform
-from realitygap.trials import SimEnsemble, TrialPlan
+from realitygap.trials import TrialPlan
 from realitygap.world import load_robot, paper_arena
 
 ROBOT, ARENA = load_robot("scribbler-s2-fluke2"), paper_arena()

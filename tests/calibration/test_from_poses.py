@@ -10,9 +10,8 @@ import pytest
 from realitygap.calibration import fit_from_poses, numbers_of, ranges_of, scribbler_prior, values_of
 from realitygap.calibration._rays import rays_of
 from realitygap.calibration._shots import shots_of
-from realitygap.robots import SimPlatform
-from realitygap.study._calibrate_all import all_plans
-from realitygap.trials import SimEnsemble, SimTarget
+from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
+from realitygap.study._calibrate.whole import all_plans
 from realitygap.world import Obstacle, RangeSensor, paper_arena
 
 ARENA = paper_arena()

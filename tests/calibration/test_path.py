@@ -10,10 +10,9 @@ import pytest
 
 from realitygap.calibration import end_pose_of, fit_path, moved_in, of_one_length, path_plans, ruled
 from realitygap.calibration._path import STRAIGHT, TURNING
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import ObservedTrial
-from realitygap.robots import SimPlatform
-from realitygap.study._calibrate_kinds import _moved_in_sim
-from realitygap.trials import SimTarget
+from realitygap.study._calibrate.kinds import _moved_in_sim
 from realitygap.world import INCH, load_robot, paper_arena
 
 pytestmark = pytest.mark.slow

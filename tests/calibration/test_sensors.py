@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import Placement, fit_sensor, independence
-from realitygap.calibration._ir_mixture import MixtureReadings, step_of
-from realitygap.calibration._ir_pulses import PulseReadings
-from realitygap.calibration._ir_scales import AMPLITUDE, BURST, DECAY, DROP, GAIN, OUTLIER
-from realitygap.robots import Command, SimPlatform
-from realitygap.trials import NoiseKey, SimRobot
+from realitygap.calibration.infrared._mixture import MixtureReadings, step_of
+from realitygap.calibration.infrared._pulses import PulseReadings
+from realitygap.calibration.infrared._scales import AMPLITUDE, BURST, DECAY, DROP, GAIN, OUTLIER
+from realitygap.platforms import SimPlatform, SimRobot
+from realitygap.robots import Command
+from realitygap.trials import NoiseKey
 from realitygap.world import INCH, Pose, load_robot
 
 PULSES = (AMPLITUDE, DECAY, *DROP, BURST)

@@ -11,15 +11,15 @@ import pytest
 from typer.testing import CliRunner
 
 from realitygap.calibration import path_plans
-from realitygap.cli import _calibrate, _calibrate_guide, app
+from realitygap.cli import _calibrate, _calibration_operator, app
 from realitygap.errors import RealityGapError
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import read_observations, write_observations
-from realitygap.robots import SimPlatform
 from realitygap.study import parse_length, save_calibration
-from realitygap.study._calibrate import _still_said
-from realitygap.study._calibrate_kinds import Parts
+from realitygap.study._calibrate.kinds import Parts
+from realitygap.study._calibrate.one import _still_said
 from realitygap.study._targets import observations_head
-from realitygap.trials import SimTarget, _target_robot
+from realitygap.trials import _target_robot
 from realitygap.world import Fitted, load_calibration, load_robot, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -127,7 +127,7 @@ def person(monkeypatch):
 
     def answering(*answers: str) -> Person:
         somebody = Person(*answers)
-        monkeypatch.setattr(_calibrate_guide, "_ask_at_terminal", somebody)
+        monkeypatch.setattr(_calibration_operator, "_ask_at_terminal", somebody)
         monkeypatch.setattr(_calibrate, "_is_led", lambda robot, witness: True)
         return somebody
 
@@ -412,7 +412,7 @@ def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):
 
 def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, monkeypatch):
     from realitygap.calibration import MotionFit
-    from realitygap.study import _calibrate_kinds
+    from realitygap.study._calibrate import kinds as _calibrate_kinds
 
     asked = {}
 

@@ -20,10 +20,11 @@ from realitygap.errors import RealityGapError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.lab._described import study_of
 from realitygap.lab._studies import Studies
+from realitygap.platforms import SimPlatform
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, read_observations, write_observations
 from realitygap.report import export_frame, export_individual, save_view, summarize_tasks
 from realitygap.report._driven import read_driven
-from realitygap.robots import SimPlatform, read_recording
+from realitygap.robots import read_recording
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.runs import Condition, replay, run_replicates
 from realitygap.study import (

@@ -96,7 +96,7 @@ pty_only = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-termina
 @pty_only
 def test_a_person_is_led_through_a_study(tmp_path, study):
     out = tmp_path / "out"
-    terminal = Terminal("run", str(study), "--port", "real", "--out", str(out), "--who", "anna")
+    terminal = Terminal("drive", str(study), "--port", "real", "--out", str(out), "--who", "anna")
     terminal.answer("then press Enter", "\n")
     terminal.wait_for("battery under load: 7.20 V")
     terminal.wait_for("pen: red")
@@ -132,7 +132,7 @@ def test_a_key_aborts_a_trial_and_the_operator_says_what_becomes_of_it(tmp_path,
     long = study.read_text().replace("steps = 3", "steps = 30000")
     study.write_text(long)
     out = tmp_path / "out"
-    terminal = Terminal("run", str(study), "--port", "real", "--out", str(out), "--score", "later")
+    terminal = Terminal("drive", str(study), "--port", "real", "--out", str(out), "--score", "later")
     terminal.answer("then press Enter", "\n")
     terminal.answer("Enter drives", "\n")
     terminal.answer("space aborts", " ")
@@ -152,7 +152,7 @@ def test_a_key_aborts_a_trial_and_the_operator_says_what_becomes_of_it(tmp_path,
 @pytest.mark.parametrize("when", ["trial", "sheet"])
 def test_a_line_that_was_entered_is_kept_when_the_program_is_killed_at_the_next(tmp_path, study, when):
     out = tmp_path / "out"
-    run = ("run", str(study), "--port", "real", "--out", str(out), "--no-wait", "--score", when)
+    run = ("drive", str(study), "--port", "real", "--out", str(out), "--no-wait", "--score", when)
     terminal = Terminal(*run)
     terminal.answer("Escape: later", "dl\r")
     terminal.wait_for("Escape: later")
@@ -208,7 +208,7 @@ def no_terminal(monkeypatch, capsys):
 
 def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path, study, no_terminal):
     out = tmp_path / "out"
-    run = ("run", str(study), "--port", "real", "--out", str(out))
+    run = ("drive", str(study), "--port", "real", "--out", str(out))
     refused = no_terminal(*run)
     assert refused.returncode == 1
     assert "There is no terminal in which to ask" in refused.stderr
@@ -296,7 +296,7 @@ def test_a_second_count_is_another_persons(driven, no_terminal):
 def test_blind_trials_are_listed_without_their_conditions(tmp_path, study, no_terminal):
     study.write_text(study.read_text().replace("[trials]", "[trials]\nblind = true"))
     out = tmp_path / "out"
-    no_terminal("run", str(study), "--port", "real", "--out", str(out), "--no-wait")
+    no_terminal("drive", str(study), "--port", "real", "--out", str(out), "--no-wait")
     rows = json.loads(no_terminal("trials", "list", str(out), "--json").stdout)
     assert [row["condition"] for row in rows] == [None, None]
     assert "robot" not in no_terminal("trials", "list", str(out)).stdout
@@ -305,32 +305,40 @@ def test_blind_trials_are_listed_without_their_conditions(tmp_path, study, no_te
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--no-wait",), "--who go with --port"),
-        (("--witness", "127.0.0.1:1"), "--who go with --port"),
-        (("--port", "real", "--in-flight", "maybe"), "--in-flight is 'maybe', expected void or driven"),
-        (("--port", "real", "--score", "never"), "--score is 'never', expected trial, sheet or later"),
+        (("--in-flight", "maybe"), "--in-flight is 'maybe', expected void or driven"),
+        (("--score", "never"), "--score is 'never', expected trial, sheet or later"),
     ],
 )
-def test_wrong_options_of_a_run_are_refused_before_anything_is_done(
+def test_wrong_options_of_drive_are_refused_before_anything_is_done(
     tmp_path, study, no_terminal, options, said
 ):
     out = tmp_path / "out"
-    done = no_terminal("run", str(study), "--out", str(out), *options)
+    done = no_terminal("drive", str(study), "--port", "real", "--out", str(out), *options)
     assert done.returncode == 1
     assert said in done.stderr
     assert not out.exists()
 
 
-def test_a_port_without_a_condition_for_it_is_refused_before_anything_is_computed(tmp_path, no_terminal):
-    done = no_terminal("run", "paper", "--out", str(tmp_path / "out"), "--port", "real")
+def test_drive_refuses_a_study_without_a_robot_before_anything_is_written(tmp_path, no_terminal):
+    done = no_terminal("drive", "paper", "--out", str(tmp_path / "out"), "--port", "real")
     assert done.returncode == 1
-    assert "study 'paper' has no condition with platform 'scribbler'" in done.stderr
+    assert "No condition of study 'paper' is on a robot" in done.stderr
+    assert "`realitygap run` computes it." in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_run_names_drive_for_a_study_that_only_a_robot_drives(tmp_path, study, no_terminal):
+    out = tmp_path / "out"
+    done = no_terminal("run", str(study), "--out", str(out))
+    assert done.returncode == 1
+    assert done.stderr.startswith("realitygap: Every condition of study ")
+    assert f"realitygap drive {study} --port PORT" in done.stderr
+    assert not out.exists()
 
 
 def test_a_person_is_not_spoken_to_where_the_json_goes(tmp_path, study, no_terminal):
     done = no_terminal(
-        "run", str(study), "--out", str(tmp_path / "out"), "--port", "real", "--no-wait", "--json"
+        "drive", str(study), "--out", str(tmp_path / "out"), "--port", "real", "--no-wait", "--json"
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["physical"]["n_driven"] == 2
@@ -342,7 +350,7 @@ def test_an_unattended_run_tells_of_each_generation(tmp_path, study, monkeypatch
         monkeypatch.setattr(
             sys,
             "argv",
-            ["realitygap", "run", str(study), "--port", "emulator://s2?fluke=1&speed=off", *options],
+            ["realitygap", "drive", str(study), "--port", "emulator://s2?fluke=1&speed=off", *options],
         )
         with pytest.raises(SystemExit) as ended:
             main()
@@ -360,7 +368,16 @@ def test_an_unattended_run_tells_of_each_generation(tmp_path, study, monkeypatch
 def test_despite_preflight_drives_an_emulated_robot_with_a_weak_battery(tmp_path, study, monkeypatch, capsys):
     def run(*options):
         port = "emulator://s2?fluke=1&speed=off"
-        command = ["realitygap", "run", str(study), "--port", port, "--out", str(tmp_path / "out"), *options]
+        command = [
+            "realitygap",
+            "drive",
+            str(study),
+            "--port",
+            port,
+            "--out",
+            str(tmp_path / "out"),
+            *options,
+        ]
         monkeypatch.setattr(sys, "argv", command)
         with pytest.raises(SystemExit) as ended:
             main()
@@ -382,7 +399,7 @@ def test_despite_preflight_drives_an_emulated_robot_with_a_weak_battery(tmp_path
 def driven(tmp_path, study, no_terminal):
     """A folder whose two trials are driven and not scored."""
     out = tmp_path / "out"
-    done = no_terminal("run", str(study), "--port", "real", "--out", str(out), "--no-wait")
+    done = no_terminal("drive", str(study), "--port", "real", "--out", str(out), "--no-wait")
     assert done.returncode == 0, done.stderr
     return out
 

@@ -51,7 +51,7 @@ def command(monkeypatch, capsys):
 def driven(tmp_path, command):
     study, out = tmp_path / "small.toml", tmp_path / "out"
     study.write_text(STUDY)
-    assert command("run", study, "--port", "real", "--out", out, "--no-wait").returncode == 0
+    assert command("drive", study, "--port", "real", "--out", out, "--no-wait").returncode == 0
     return out
 
 
@@ -103,7 +103,7 @@ def test_the_counts_of_a_photo_go_on_as_any_others(driven, photo, command, tmp_p
     again = command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
     assert again.returncode == 1
     assert "none of these trials waits for its cells; they are 2 scored" in again.stderr
-    run = command("run", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    run = command("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
     assert run.returncode == 0, run.stderr
     corrected = command(
         "score", photo, "--study", driven, "--sheet", "1", "--yes", "--correct", "--who", "anna"
@@ -113,7 +113,7 @@ def test_the_counts_of_a_photo_go_on_as_any_others(driven, photo, command, tmp_p
 
 def test_a_pen_that_drew_a_void_trial_too_is_left_out(driven, photo, command, tmp_path):
     command("trials", "void", driven, "1", "--text", "it was pushed")
-    command("run", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    command("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
     done = command("score", photo, "--study", driven, "--sheet", "1", "--yes")
     assert "the pen also drew trial 1, which is void" in done.stderr
     assert "1 trials entered." in done.stdout

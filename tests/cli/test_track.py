@@ -14,21 +14,21 @@ from realitygap.errors import VisionError
 from realitygap.records import LEDGER_NAME, Ledger, read_observations, write_observations
 from realitygap.study import (
     calibrate_from,
+    drive_study,
     gap_between,
     keep_tracked,
     observations_head,
     open_target,
     place_trial,
-    run_study,
     sample_controllers,
     trial_of_file,
 )
 from realitygap.testing import Film, FilmedCamera, path_through, save_film
-from realitygap.trials import PATH_PARTS, TrialPlan, WitnessOperator
+from realitygap.trials import PATH_PARTS, TrialPlan
 from realitygap.vision import Lens, Track, fit_lens, read_lens
 from realitygap.world import paper_arena
 from tests.cli.test_commands import realitygap
-from tests.study.physical import small_study
+from tests.study.physical import Unattended, small_study
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +56,7 @@ def command(monkeypatch, capsys, tmp_path):
     return run
 
 
-class _Looking(WitnessOperator):
+class _Looking(Unattended):
     """Knows where the robot drove, and leaves its cells to be counted by a camera."""
 
     def __init__(self):
@@ -76,12 +76,8 @@ def driven(tmp_path_factory):
     """A study whose first generation was driven and not scored, with a video of one of its trials."""
     folder = tmp_path_factory.mktemp("track")
     operator = _Looking()
-    run_study(
-        small_study("coverage", steps="8"),
-        folder / "out",
-        port="emulator://s2?fluke=1&speed=off",
-        operator=operator,
-    )
+    study = small_study("coverage", steps="8")
+    drive_study(study, "emulator://s2?fluke=1&speed=off", folder / "out", operator=operator)
     farthest = max(operator.paths, key=lambda number: np.ptp(operator.paths[number][0][:, :2], axis=0).sum())
     path, cells = operator.paths[farthest]
     with Ledger.open(folder / "out" / LEDGER_NAME, writable=False) as ledger:

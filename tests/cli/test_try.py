@@ -29,7 +29,8 @@ def files(tmp_path):
     for name, inputs in (("ranges", RANGES), ("lights", LIGHTS)):
         genome.with_interface(ControllerInterface(inputs)).save(tmp_path / f"{name}.json")
     genome.save(tmp_path / "paper.json")
-    (tmp_path / "same.toml").write_text(sample_twin("same", 1).to_toml())
+    for family in ("same", "close"):
+        (tmp_path / f"{family}.toml").write_text(sample_twin(family, 1).to_toml())
     return tmp_path
 
 
@@ -40,9 +41,10 @@ def test_controller_of_single_sensors_drives_wherever_they_are(files, on):
     assert len(json.loads(out)["coverage"]) == 1
 
 
-def test_controller_that_sees_light_drives_on_sim_and_is_refused_elsewhere(files):
-    assert "mean coverage" in tried(files / "lights.json", "--on", "sim", "--arena", "light", "--steps", 5)
-    for on in ("jyro", f"twin:{files / 'same.toml'}"):
+def test_controller_that_sees_light_drives_where_light_is_and_is_refused_elsewhere(files):
+    for on in ("sim", "scribbler:emulator://s2?fluke=2&arena=light&speed=off"):
+        assert "mean coverage" in tried(files / "lights.json", "--on", on, "--arena", "light", "--steps", 5)
+    for on in ("jyro", f"twin:{files / 'close.toml'}"):
         assert "light.0 to light.2 are missing" in tried(files / "lights.json", "--on", on, "--steps", 5)
 
 
@@ -50,3 +52,11 @@ def test_inputs_of_a_file_can_be_named(files):
     by_names = tried(files / "paper.json", "--on", "sim", "--steps", 5, "--inputs", ",".join(RANGES))
     assert by_names == tried(files / "ranges.json", "--on", "sim", "--steps", 5)
     assert "Name each of them" in tried(files / "paper.json", "--on", "sim", "--inputs", "range.0,bias")
+
+
+def test_outputs_of_a_file_can_be_named(files):
+    wheels = ("--steps", 5, "--outputs", "left,right")
+    assert "mean coverage" in tried(files / "paper.json", "--on", "sim", *wheels)
+    assert "expected move, turn, or left, right" in tried(
+        files / "paper.json", "--on", "sim", "--outputs", "left,turn"
+    )

@@ -2,7 +2,7 @@
 
 import pytest
 
-from realitygap.robots.scribbler._opcodes import (
+from realitygap.robots.scribbler.opcodes import (
     FLUKE_2_COMMANDS,
     FLUKE_COMMANDS,
     ROBOT_ANSWERS,

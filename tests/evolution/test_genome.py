@@ -18,7 +18,7 @@ from realitygap.evolution import (
     decode_all,
     genome_from_record,
 )
-from realitygap.kernels._network import activate
+from realitygap.kernels.neat.network import activate
 from tests.kernels.genome_arrays import from_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Neat, Recurrent, feed_forward

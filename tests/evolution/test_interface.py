@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realitygap.errors import ControllerError, RecordError
-from realitygap.evolution import ControllerInterface, Genome, NeatSettings, Population, inputs_of_ranges
+from realitygap.evolution import ControllerInterface, Genome, NeatSettings, Population, inputs_of_robot
 from realitygap.evolution._interface import listed
 
 AVOID = ControllerInterface(("range.0", "range.1", "bias"))
@@ -76,15 +76,15 @@ def test_inputs_are_computed_by_their_names(names, readings, stalled, step):
     told = {"obstacle": max(readings), "stall": float(stalled), "time": step / 10}
     told |= {f"range.{k}": reading for k, reading in enumerate(readings)}
     sense = ControllerInterface((*names, "bias")).bind(10)
-    assert sense(readings, stalled, step) == [told[name] for name in names]
+    assert sense(readings, stalled, step, {}) == [told[name] for name in names]
 
 
 def test_what_a_robot_lacks_is_named_in_one_message():
     with pytest.raises(ControllerError) as refused:
-        ControllerInterface(("range.1", "light.0", "light.1")).check(inputs_of_ranges(3), "X", "Y")
+        ControllerInterface(("range.1", "light.0", "light.1")).check(inputs_of_robot(3), "X", "Y")
     assert str(refused.value).startswith(
-        "X sees range.1, light.0 to light.1, and Y has obstacle, stall, time, range.0 to range.2: light.0 to light.1 "
-        "are missing."
+        "X sees range.1, light.0 to light.1, and Y has obstacle, stall, time, last_move, last_turn, range.0 to "
+        "range.2: light.0 to light.1 are missing."
     )
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
-from realitygap.kernels._genome import NeatRules
-from realitygap.kernels._network import IDENTITY, SIGMOID, TANH
+from realitygap.kernels.neat.genome import NeatRules
+from realitygap.kernels.neat.network import IDENTITY, SIGMOID, TANH
 
 
 def test_stanley_2002_holds_the_numbers_of_the_paper() -> None:

@@ -91,7 +91,7 @@ PORT = "emulator://s2?fluke=1&speed=off"
 WRITES = {
     "run": Write("run paper --replicates 2 --chunk 1 --threads 1 --out {}/run", _digest, _chunks),
     "ledger": Write(
-        f"run small.toml --port {PORT} --no-wait --out {{}}/physical",
+        f"drive small.toml --port {PORT} --no-wait --out {{}}/physical",
         lambda path: str(scored(path / "physical")),
         _scored,
     ),

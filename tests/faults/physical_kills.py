@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.study import run_study
+from realitygap.study import drive_study
 from tests.study.physical import scored, small_study
 from tests.study.test_killed import Telling, check_nothing_was_asked_twice
 
@@ -28,7 +28,7 @@ def inject(seed: int, n: int, folder: Path) -> Iterator[str]:
     wanted = {}
     for name, study in studies.items():
         begun = time.monotonic()
-        run_study(study, folder / name, port=PORT)
+        drive_study(study, PORT, folder / name)
         wanted[name] = scored(folder / name), time.monotonic() - begun
     left = n
     number = 0
@@ -61,7 +61,7 @@ def inject(seed: int, n: int, folder: Path) -> Iterator[str]:
 
 def _drive(study: object, path: Path) -> None:
     diary = path.with_suffix(".diary")
-    run_study(study, path, port=PORT, operator=Telling(lambda _: None, diary))  # type: ignore[arg-type]
+    drive_study(study, PORT, path, operator=Telling(lambda _: None, diary))  # type: ignore[arg-type]
 
 
 def _scored_trials(path: Path) -> dict[int, object]:

@@ -14,8 +14,8 @@ from gymnasium.utils.env_checker import check_env
 
 import realitygap.gym
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.robots import JyroPlatform, SimPlatform
-from realitygap.trials import NoiseKey, trace_genome, try_genomes
+from realitygap.platforms import JyroPlatform, SimPlatform, trace_genome, try_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
 ENV = "realitygap/ScribblerCoverage-v1"
@@ -382,8 +382,8 @@ def test_platforms_have_names_and_noise_of_their_own(tmp_path):
 @pytest.mark.parametrize(
     ("platform", "message"),
     [
-        ("simm", "platform is 'simm'. Did you mean 'sim'"),
-        ("sim:", "platform is 'sim:'"),
+        ("simm", "'simm' is no platform. Did you mean 'sim'"),
+        ("sim:", "'sim:' is no platform, expected sim or sim:FILE"),
         ("sim:nothing.toml", "There is no robot file nothing.toml"),
         (SimPlatform(set={"arena.start.x": {"uniform": [0.0, 0.4]}}), "does not fit at the start"),
     ],

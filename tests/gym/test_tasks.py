@@ -14,12 +14,12 @@ import realitygap.gym
 from realitygap.errors import TaskError
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.gym._robots import ARENAS, INPUTS, KHEPERA, WITHIN
-from realitygap.robots import JyroPlatform, SimPlatform, TwinPlatform
+from realitygap.platforms import JyroPlatform, SimPlatform, TwinPlatform, trace_genomes
 from realitygap.robots.twin import sample_twin
 from realitygap.runs import MazeTrials
 from realitygap.study import load_study
 from realitygap.tasks import TASKS
-from realitygap.trials import NoiseKey, trace_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
 pytestmark = pytest.mark.slow
@@ -206,11 +206,11 @@ def test_network_driven_through_a_maze_is_its_path():
 @pytest.mark.parametrize("kind", IDS)
 def test_defaults_are_those_of_the_study_of_the_task(kind):
     condition = load_study(kind).conditions[0]
-    assert SimPlatform(robot="khepera", **KHEPERA[kind]) == condition.sim
+    assert SimPlatform(robot="khepera", **KHEPERA[kind]) == condition.on
     assert condition.network_inputs == (*INPUTS[kind], "bias")
     assert condition.arena == ArenaSettings(preset=ARENAS.get(kind, kind))
     task = TASKS[kind](inputs=(*INPUTS[kind], "bias"), **WITHIN.get(kind, {}))
-    assert condition.fitness_task == task
+    assert condition.task_of_trials == task
 
 
 @pytest.mark.parametrize(
@@ -221,9 +221,9 @@ def test_defaults_are_those_of_the_study_of_the_task(kind):
         ({"platform": "scribbler:/dev/ttyUSB0"}, ValueError, "a robot on a port"),
         ({"platform": "twin:nothing.toml"}, Exception, "nothing.toml"),
         (
-            {"kind": "avoid", "platform": "jyro", "task": {"inputs": ["range.0"]}},
+            {"kind": "avoid", "platform": "jyro", "task": {"inputs": ["range.3"]}},
             ValueError,
-            "Choose another platform",
+            r"range\.3 is missing",
         ),
         ({"kind": "light", "platform": "jyro", "arena": {"preset": "paper"}}, TaskError, "wants a light"),
         ({"kind": "goal", "arena": {"preset": "avoid"}}, ValueError, "goal"),
@@ -238,7 +238,7 @@ def test_what_no_environment_can_be_is_refused(settings, error, message):
 
 
 def test_twin_refuses_noise():
-    with pytest.raises(ValueError, match=r"noise is 0\.1, expected none on platform 'twin'"):
+    with pytest.raises(ValueError, match=r"noise is 0\.1, expected none with platform 'twin'"):
         realitygap.gym.RobotEnv(platform="twin:worn.toml", noise=0.1)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
+from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
 from tests.reference.neat import Gene, Genome, History, Neat
 from tests.reference.philox import Stream
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._philox import PURPOSE_NOISE
-from realitygap.kernels._trial import largest_noisy_readings
+from realitygap.kernels.jyro.trial import largest_noisy_readings
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.math.philox import PURPOSE_NOISE
 
 
 def largest_noisy(

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim import start_sim, step_sim
-from realitygap.kernels._sim_lanes import SimRules, make_sim_room
-from realitygap.kernels._sim_shape import make_sim_shape, sim_table
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim.lanes import SimRules, make_sim_room
+from realitygap.kernels.sim.shape import make_sim_shape, sim_table
+from realitygap.kernels.sim.trial import start_sim, step_sim
 
 Number = float | NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels._lanes import LANES, Poses
+from realitygap.kernels.math.lanes import LANES, Poses
 
 PRECISIONS = (np.float64, np.float32)
 # Relative to numbers of about 1: a few roundings.

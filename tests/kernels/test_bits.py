@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realitygap.kernels._bits import highest_bit, lowest_bit, power_of_two
-from realitygap.kernels._compile import kernel
+from realitygap.kernels.compile.decorators import kernel
+from realitygap.kernels.math.bits import highest_bit, lowest_bit, power_of_two
 
 
 @kernel

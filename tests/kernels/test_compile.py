@@ -1,19 +1,23 @@
 """The cache of compiled kernels: kept, renewed with the sources, and never in the way."""
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numba
 import pytest
 
 import realitygap.kernels
-from realitygap.kernels import _cache, _compile, _compiling, _math
+from realitygap.kernels.compile import cache as kernel_cache
+from realitygap.kernels.compile import decorators, progress
+from realitygap.kernels.math import elementary
 
 CODE = """
-from realitygap.kernels import _math
-print(_math.tanh(0.5))
-print(_math.tanh.stats.cache_hits.total(), _math.tanh.stats.cache_misses.total())
+from realitygap.kernels.math import elementary
+print(elementary.tanh(0.5))
+print(elementary.tanh.stats.cache_hits.total(), elementary.tanh.stats.cache_misses.total())
 """
 
 
@@ -48,14 +52,14 @@ def damage(content: bytes) -> list[bytes]:
 
 def test_damage_anywhere_in_a_file_is_noticed(tmp_path):
     path = tmp_path / "a.kernel"
-    _cache.write_sealed(path, list(range(1000)))
+    kernel_cache.write_sealed(path, list(range(1000)))
     whole = path.read_bytes()
     for damaged in damage(whole):
         path.write_bytes(damaged)
         with pytest.raises(ValueError, match="is damaged"):
-            _cache.read_sealed(path)
+            kernel_cache.read_sealed(path)
     path.write_bytes(whole)
-    assert _cache.read_sealed(path) == list(range(1000))
+    assert kernel_cache.read_sealed(path) == list(range(1000))
 
 
 @pytest.mark.slow
@@ -70,32 +74,32 @@ def test_a_damaged_file_is_compiled_again_and_replaced(tmp_path):
 
 
 def test_the_cache_folder_is_private_even_if_it_was_open(tmp_path):
-    folder = _cache.private_folder(tmp_path / "root")
+    folder = kernel_cache.private_folder(tmp_path / "root")
     assert folder.stat().st_mode & 0o777 == (tmp_path / "root").stat().st_mode & 0o777 == 0o700
     folder.chmod(0o777)
-    assert _cache.private_folder(tmp_path / "root").stat().st_mode & 0o777 == 0o700
+    assert kernel_cache.private_folder(tmp_path / "root").stat().st_mode & 0o777 == 0o700
 
 
 def test_a_folder_of_another_user_is_refused(tmp_path, monkeypatch):
-    _cache.private_folder(tmp_path)
-    monkeypatch.setattr(_cache.os, "getuid", lambda: 54321)
+    kernel_cache.private_folder(tmp_path)
+    monkeypatch.setattr(kernel_cache.os, "getuid", lambda: 54321)
     with pytest.raises(PermissionError, match="another user owns it"):
-        _cache.private_folder(tmp_path)
+        kernel_cache.private_folder(tmp_path)
 
 
 def test_a_link_in_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "kernels").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(OSError, match=r"symbolic links|Not a directory"):
-        _cache.private_folder(tmp_path)
+        kernel_cache.private_folder(tmp_path)
 
 
 def test_a_root_that_every_user_can_write_to_is_refused_unless_it_is_sticky(tmp_path):
     tmp_path.chmod(0o777)
     with pytest.raises(PermissionError, match="every user can write"):
-        _cache.private_folder(tmp_path)
+        kernel_cache.private_folder(tmp_path)
     tmp_path.chmod(0o1777)
-    assert _cache.private_folder(tmp_path).is_dir()
+    assert kernel_cache.private_folder(tmp_path).is_dir()
 
 
 def test_a_folder_that_cannot_be_written_is_said_and_passed_over():
@@ -107,10 +111,10 @@ def test_a_folder_that_cannot_be_written_is_said_and_passed_over():
 @pytest.mark.parametrize("folder", ["", "caches", "./caches"])
 def test_a_relative_folder_for_caches_is_none(folder, monkeypatch):
     # an empty one put the kernels into whatever folder a command was run in
-    monkeypatch.setattr(_cache.sys, "platform", "linux")
+    monkeypatch.setattr(kernel_cache.sys, "platform", "linux")
     monkeypatch.delenv("REALITYGAP_CACHE", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", folder)
-    assert _cache.cache_root() == Path.home() / ".cache" / "realitygap"
+    assert kernel_cache.cache_root() == Path.home() / ".cache" / "realitygap"
 
 
 def copy_of_package(folder: Path) -> Path:
@@ -129,10 +133,10 @@ def test_an_edit_compiles_the_kernels_that_import_it_and_no_others(tmp_path):
     copy = copy_of_package(tmp_path / "copy")
     start(tmp_path / "cache", PYTHONPATH=str(copy.parent))
     for module, counts in [
-        ("_coverage", (1, 0)),
-        ("_math", (0, 1)),
-        ("_compile", (0, 1)),
-        ("_lower", (0, 1)),
+        ("tasks/coverage", (1, 0)),
+        ("math/elementary", (0, 1)),
+        ("compile/decorators", (0, 1)),
+        ("compile/lower", (0, 1)),
     ]:
         changed = copy / "kernels" / f"{module}.py"
         changed.write_text(changed.read_text() + "\n# another comment\n")
@@ -140,51 +144,113 @@ def test_an_edit_compiles_the_kernels_that_import_it_and_no_others(tmp_path):
         assert value_and_cache(done)[1] == counts, module
 
 
-def test_the_hash_of_a_module_covers_what_its_imports_import():
-    folder = Path(_cache.__file__).parent
-    assert "_walls" not in (folder / "_run.py").read_text()
+def modules_of_hash(module: str) -> set[str]:
+    """Return the modules whose sources are part of the hash of a module."""
     seen = []
-    original = _cache._imported
+    original = kernel_cache._imported
     try:
-        _cache._imported = lambda module: (seen.append(module), original(module))[1]
-        _cache.sources_hash.__wrapped__("realitygap.kernels._run")
+        kernel_cache._imported = lambda module: (seen.append(module), original(module))[1]
+        kernel_cache.sources_hash.__wrapped__(module)
     finally:
-        _cache._imported = original
-    assert {"_run", "_trial", "_walls", "_species", "_compile", "_pipeline", "_lower"} <= set(seen)
-    assert not any(module.startswith("_sim") for module in seen)
+        kernel_cache._imported = original
+    return set(seen)
+
+
+def test_the_hash_of_a_module_covers_what_its_imports_import():
+    folder = Path(realitygap.kernels.__file__).parent
+    assert "walls" not in (folder / "jyro" / "run.py").read_text()
+    covered = modules_of_hash("realitygap.kernels.jyro.run")
+    assert {"jyro.run", "jyro.trial", "jyro.walls", "neat.species", "math.bits"} <= covered
+    assert {"compile.decorators", "compile.cache", "compile.pipeline", "compile.lower"} <= covered
+    assert not any(module.startswith("sim.") for module in covered)
+
+
+def test_the_hash_of_a_kernel_elsewhere_covers_each_file_of_kernels():
+    folder = Path(realitygap.kernels.__file__).parent
+    files = {".".join(path.relative_to(folder).with_suffix("").parts) for path in folder.rglob("*.py")}
+    assert "sim.words" in files
+    assert modules_of_hash("tests.kernels.elsewhere") == files
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("from .walls import f", "jyro.walls"),
+        ("from . import walls", "jyro.walls"),
+        ("from ..math import bits", "math.bits"),
+        ("from ..math.bits import f", "math.bits"),
+        ("from ..math import f", "math.__init__"),
+        ("from realitygap.kernels.math.bits import f", "math.bits"),
+        ("from realitygap.kernels.math import bits", "math.bits"),
+        ("import realitygap.kernels.math.bits as bits", "math.bits"),
+    ],
+)
+def test_an_edit_in_a_folder_changes_the_hash_of_who_imports_it(tmp_path, monkeypatch, line, name):
+    for folder in ("compile", "jyro", "math"):
+        (tmp_path / folder).mkdir()
+    for path in (
+        "compile/cache",
+        "compile/decorators",
+        "jyro/walls",
+        "math/bits",
+        "math/other",
+        "math/__init__",
+    ):
+        (tmp_path / f"{path}.py").write_text("")
+    (tmp_path / "jyro" / "trial.py").write_text(f"def late():\n    {line}\n")
+    monkeypatch.setattr(kernel_cache, "_FOLDER", tmp_path)
+
+    def hash_now():
+        return kernel_cache.sources_hash.__wrapped__("realitygap.kernels.jyro.trial")
+
+    before = hash_now()
+    (tmp_path / "math" / "other.py").write_text("# an edit\n")
+    assert hash_now() == before
+    (tmp_path / f"{name.replace('.', '/')}.py").write_text("# an edit\n")
+    assert hash_now() != before
 
 
 # without the faster way through Numba
 
 CODE_OF_BOTH = """
 import warnings
+import numba
 import numpy as np
-from realitygap.kernels import _compile, _distances, _math, _pipeline
+numba.__version__ = {version} or numba.__version__
+from realitygap.kernels.compile import decorators, pipeline
+from realitygap.kernels.math import elementary
+from realitygap.kernels.neat import distances
 if {broken}:
     def refuse(*_):
         raise AttributeError("another Numba")
-    _pipeline._Entry.define_pipelines = refuse
+    pipeline._Entry.define_pipelines = refuse
 with warnings.catch_warnings(record=True) as caught:
     warnings.simplefilter("always")
-    measure = _distances.make_measure(0, 4, 3, True)
-    behaviors = _distances.make_behaviors(2, 12)
+    measure = distances.make_measure(0, 4, 3, True)
+    behaviors = distances.make_behaviors(2, 12)
     for row, cells in enumerate(([0, 5, 7], [1, 5])):
-        _distances.describe(measure, np.array(cells, np.uint8), len(cells), 0.5, 0.25, behaviors, row)
+        distances.describe(measure, np.array(cells, np.uint8), len(cells), 0.5, 0.25, behaviors, row)
     between = np.zeros((2, 2))
-    _distances.distances_between(measure, behaviors, behaviors, between)
-print([float(_math.tanh(x)).hex() for x in (-3.0, 0.1, 0.7)], between.tolist())
-print(_compile._is_plain, [str(item.message)[:60] for item in caught])
+    distances.distances_between(measure, behaviors, behaviors, between)
+print([float(elementary.tanh(x)).hex() for x in (-3.0, 0.1, 0.7)], between.tolist())
+print(decorators._is_plain, [str(item.message)[:60] for item in caught])
 """
 
 
-def results(cache: Path, *, broken: bool = False, **environment: str) -> list[str]:
-    done = subprocess.run(
-        [sys.executable, "-c", CODE_OF_BOTH.replace("{broken}", str(broken))],
+def run_both(cache: Path, *, broken: bool, version: str, **environment: str) -> subprocess.CompletedProcess:
+    code = CODE_OF_BOTH.replace("{broken}", str(broken)).replace("{version}", repr(version))
+    return subprocess.run(
+        [sys.executable, "-c", code],
         capture_output=True,
         text=True,
         env={"PATH": "/usr/bin:/bin", "REALITYGAP_CACHE": str(cache), **environment},
-        check=True,
+        check=False,
     )
+
+
+def results(cache: Path, *, broken: bool = False, version: str = "", **environment: str) -> list[str]:
+    done = run_both(cache, broken=broken, version=version, **environment)
+    assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 
 
@@ -193,24 +259,97 @@ def test_numbas_own_pipeline_gives_the_same_results(tmp_path):
     fast = results(tmp_path)
     assert fast[1] == "False []"
     for _ in range(2):  # compiled, and loaded
-        plain = results(tmp_path, **{_compile.PLAIN: "1"})
+        plain = results(tmp_path, **{decorators.PLAIN: "1"})
         assert plain == [fast[0], "True []"]
 
 
 @pytest.mark.slow
 def test_a_numba_of_another_make_compiles_in_its_own_way_after_one_warning(tmp_path):
     expected = results(tmp_path)[0]
-    got, state = results(tmp_path / "other", broken=True)
+    got, state = results(tmp_path / "other", broken=True, version="0.99.0")
     assert got == expected
     assert state.startswith("True ['Numba ")
     assert state.count("compiles in another way") == 1
 
 
+@pytest.mark.slow
+def test_a_fault_of_our_pipeline_is_raised_with_a_known_numba(tmp_path):
+    done = run_both(tmp_path, broken=True, version="")
+    assert done.returncode == 1
+    assert "AttributeError: another Numba" in done.stderr
+    assert "REALITYGAP_PLAIN_NUMBA=1" in done.stderr
+
+
+def test_the_warning_names_what_was_raised(monkeypatch):
+    monkeypatch.setattr(numba, "__version__", "0.99.0")
+    monkeypatch.setattr(decorators, "_is_plain", False)
+    monkeypatch.setattr(elementary.tanh, "_plain_entry", lambda x: x)
+    with pytest.warns(RuntimeWarning, match=r"Numba 0.99.0 .* \(KeyError: 'a part'\)"):
+        assert elementary.tanh._call_plainly((0.5,), KeyError("a part")) == 0.5
+
+
+# kernels that others call
+
+CODE_OF_SHARED = """
+import numpy as np
+from realitygap.kernels.neat import genome
+from tests.kernels.genome_arrays import rules_of, settings
+from tests.reference.neat import Neat
+rules = rules_of(Neat(settings(), 4, 2, 3))
+genomes = genome.make_genomes(5, 2, 29, 3)
+genome.first_genomes(genomes, rules, np.uint64(7), np.int64(0), np.int64(0))
+print(genomes.weight.sum().hex())
+print(genome.first_genomes.stats.cache_hits.total(), genome.first_genomes.stats.cache_misses.total())
+"""
+
+
+def start_shared(cache: Path) -> list[str]:
+    done = subprocess.run(
+        [sys.executable, "-c", CODE_OF_SHARED],
+        capture_output=True,
+        text=True,
+        env={"PATH": "/usr/bin:/bin", "REALITYGAP_CACHE": str(cache)},
+        cwd=Path(__file__).parents[2],
+        check=True,
+    )
+    return done.stdout.splitlines()
+
+
+@pytest.mark.slow
+def test_a_shared_kernel_is_a_file_of_its_own_that_its_callers_need(tmp_path):
+    value, counts = start_shared(tmp_path)
+    assert counts == "0 1"
+    caller, callee = sorted(
+        tmp_path.rglob("*first_genomes*.kernel"), key=lambda path: path.stat().st_mtime_ns
+    )[::-1]
+    assert kernel_cache.read_sealed(caller)[2] == [kernel_cache.SHARED + callee.stem]
+    assert start_shared(tmp_path) == [value, "1 0"]
+    callee.unlink()  # compiled again, and its caller with it
+    assert start_shared(tmp_path) == [value, "0 1"]
+    assert start_shared(tmp_path) == [value, "1 0"]
+
+
+# what is kept
+
+
+def test_files_that_no_process_has_read_for_long_are_deleted(tmp_path):
+    old, recent, unfinished = (tmp_path / name for name in ("a.kernel", "b.kernel", ".writing-c"))
+    for path in (old, recent, unfinished):
+        kernel_cache.write_sealed(path, 1)
+    for path, age in ((old, 1.1), (recent, 0.5), (unfinished, 1.1)):
+        when = time.time() - age * kernel_cache.UNUSED_S
+        os.utime(path, (when, when))
+    assert kernel_cache.read_sealed(recent) == 1
+    assert recent.stat().st_mtime > time.time() - 60
+    kernel_cache.write_sealed(tmp_path / "d.kernel", 1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b.kernel", "d.kernel"]
+
+
 def test_a_wrong_argument_is_an_error_and_changes_nothing():
     with pytest.raises(numba.errors.NumbaError):
-        _math.tanh("0.5")
-    assert not _compile._is_plain
-    assert _math.tanh(0.5) == pytest.approx(0.46211715726)
+        elementary.tanh("0.5")
+    assert not decorators._is_plain
+    assert elementary.tanh(0.5) == pytest.approx(0.46211715726)
 
 
 # what is reported
@@ -218,18 +357,18 @@ def test_a_wrong_argument_is_an_error_and_changes_nothing():
 
 def test_a_long_compilation_is_reported_with_its_time(monkeypatch):
     lines = []
-    monkeypatch.setattr(_compiling, "_listener", lines.append)
-    monkeypatch.setattr(_compiling, "LONG_S", 0.0)
-    _compiling.begin_compiling("run")
-    _compiling._started["run"][0].join()
-    _compiling.end_compiling("run")
+    monkeypatch.setattr(progress, "_listener", lines.append)
+    monkeypatch.setattr(progress, "LONG_S", 0.0)
+    progress.begin_compiling("run")
+    progress._started["run"][0].join()
+    progress.end_compiling("run")
     assert lines == ["Compiling the kernel run (once per version) ...", "Compiled run in 0 s."]
 
 
 def test_a_short_compilation_is_not_reported(monkeypatch):
     lines = []
-    monkeypatch.setattr(_compiling, "_listener", lines.append)
-    monkeypatch.setattr(_compiling, "LONG_S", 60.0)
-    _compiling.begin_compiling("run")
-    _compiling.end_compiling("run")
+    monkeypatch.setattr(progress, "_listener", lines.append)
+    monkeypatch.setattr(progress, "LONG_S", 60.0)
+    progress.begin_compiling("run")
+    progress.end_compiling("run")
     assert lines == []

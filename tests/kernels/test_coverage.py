@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _coverage
+from realitygap.kernels.tasks import coverage
 from realitygap.world import ArenaSettings, paper_arena
 from realitygap.world._arena import NAMED_STARTS
 from tests.reference.coverage import cells_on_line, first_visits
@@ -24,9 +24,9 @@ def kernel_cells(points: list[tuple[float, float]], columns: int = COLUMNS, rows
     visited = np.zeros(columns * rows, np.bool_)
     order = np.zeros(columns * rows, np.uint8)
     u, v = points[0]
-    n = _coverage.visit(math.floor(u), math.floor(v), columns, rows, visited, order, np.int64(0))
+    n = coverage.visit(math.floor(u), math.floor(v), columns, rows, visited, order, np.int64(0))
     for to_u, to_v in points[1:]:
-        n = _coverage.visit_line(u, v, to_u, to_v, columns, rows, visited, order, n)
+        n = coverage.visit_line(u, v, to_u, to_v, columns, rows, visited, order, n)
         u, v = to_u, to_v
     cells = order[:n].tolist()
     assert sorted(cells) == np.flatnonzero(visited).tolist()
@@ -161,8 +161,8 @@ def test_standing_still_visits_nothing_more() -> None:
 @pytest.mark.parametrize(("name", "cell"), [("corner", (1, 1)), ("center", (6, 3)), ("left", (1, 3))])
 def test_named_starts_lie_in_the_cells_that_are_said(name: str, cell: tuple[int, int]) -> None:
     arena = ArenaSettings.model_validate({"start": name}).arena()
-    u = _coverage.to_grid(arena.start.x, arena.grid.x, arena.grid.cell)
-    v = _coverage.to_grid(arena.start.y, arena.grid.y, arena.grid.cell)
+    u = coverage.to_grid(arena.start.x, arena.grid.x, arena.grid.cell)
+    v = coverage.to_grid(arena.start.y, arena.grid.y, arena.grid.cell)
     assert (math.floor(u), math.floor(v)) == cell
     assert set(NAMED_STARTS) == {"corner", "center", "left"}
     if name == "center":
@@ -176,14 +176,14 @@ def test_every_border_of_the_papers_grid_is_met_from_meters() -> None:
     grid = paper_arena().grid
     for k in range(13):
         for meters in (grid.x + k * grid.cell, (3 + 3 * k) * 0.0254, 3 * 0.0254 * (k + 1), 0.0762 * (k + 1)):
-            assert _coverage.to_grid(meters, grid.x, grid.cell) == float(k)
+            assert coverage.to_grid(meters, grid.x, grid.cell) == float(k)
 
 
 def test_only_what_is_nearer_than_the_margin_is_put_on_a_border() -> None:
-    assert _coverage.to_grid(2.0 + 0.9e-9, 0.0, 1.0) == 2.0
-    assert _coverage.to_grid(2.0 - 0.9e-9, 0.0, 1.0) == 2.0
-    assert _coverage.to_grid(-3.0 + 0.9e-9, 0.0, 1.0) == -3.0
-    assert _coverage.to_grid(2.0 + 1.1e-9, 0.0, 1.0) == 2.0 + 1.1e-9
-    assert _coverage.to_grid(2.0 - 1.1e-9, 0.0, 1.0) == 2.0 - 1.1e-9
-    assert _coverage.to_grid(1.25, 0.25, 0.5) == 2.0
-    assert _coverage.to_grid(1.3, 0.0, 1.0) == 1.3
+    assert coverage.to_grid(2.0 + 0.9e-9, 0.0, 1.0) == 2.0
+    assert coverage.to_grid(2.0 - 0.9e-9, 0.0, 1.0) == 2.0
+    assert coverage.to_grid(-3.0 + 0.9e-9, 0.0, 1.0) == -3.0
+    assert coverage.to_grid(2.0 + 1.1e-9, 0.0, 1.0) == 2.0 + 1.1e-9
+    assert coverage.to_grid(2.0 - 1.1e-9, 0.0, 1.0) == 2.0 - 1.1e-9
+    assert coverage.to_grid(1.25, 0.25, 0.5) == 2.0
+    assert coverage.to_grid(1.3, 0.0, 1.0) == 1.3

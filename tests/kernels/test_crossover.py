@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Population
-from realitygap.kernels import _crossover
-from realitygap.kernels._genome import make_genomes
+from realitygap.kernels.neat import crossover
+from realitygap.kernels.neat.genome import make_genomes
 from tests.kernels.genome_arrays import cursor, from_arrays, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Gene, Genome, Neat, has_cycle
@@ -27,7 +27,7 @@ def child_of(neat: Neat, a: Genome, b: Genome, fitness: tuple[float, float], see
     new = make_genomes(1, neat.n_outputs, old.innovation.shape[1] * 2, old.hidden.shape[1] * 2)
     stream = tuple(map(np.uint32, [CHILD, 1 << 12, 0, seed, 0]))
     reached = np.empty(new.innovation.shape[1] + 1, np.int32)
-    _crossover.crossover(
+    crossover.crossover(
         old,
         np.int64(0),
         np.int64(1),

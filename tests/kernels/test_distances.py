@@ -8,17 +8,17 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _distances
+from realitygap.kernels.neat import distances
 from tests.reference import distances as reference
 from tests.reference.effort import cases
 
 KINDS = {
-    "paper": _distances.PAPER,
-    "ordered": _distances.ORDERED,
-    "jaccard": _distances.JACCARD,
-    "hamming": _distances.HAMMING,
-    "edit": _distances.EDIT,
-    "alignment": _distances.ALIGNMENT,
+    "paper": distances.PAPER,
+    "ordered": distances.ORDERED,
+    "jaccard": distances.JACCARD,
+    "hamming": distances.HAMMING,
+    "edit": distances.EDIT,
+    "alignment": distances.ALIGNMENT,
 }
 
 
@@ -26,11 +26,11 @@ def random_behavior(rng: random.Random, n_cells: int) -> list[int]:
     return rng.sample(range(n_cells), rng.choice([0, 1, 2, rng.randint(0, n_cells), n_cells]))
 
 
-def described(measure: _distances.Measure, behaviors: list[list[int]], n_cells: int) -> _distances.Behaviors:
-    packed = _distances.make_behaviors(len(behaviors), n_cells)
+def described(measure: distances.Measure, behaviors: list[list[int]], n_cells: int) -> distances.Behaviors:
+    packed = distances.make_behaviors(len(behaviors), n_cells)
     packed.marks[:] = 7  # what was there before does not matter
     for row, cells in enumerate(behaviors):
-        _distances.describe(measure, np.array(cells, np.uint8), len(cells), 0.25 * row, -1.0, packed, row)
+        distances.describe(measure, np.array(cells, np.uint8), len(cells), 0.25 * row, -1.0, packed, row)
     return packed
 
 
@@ -39,7 +39,7 @@ def described(measure: _distances.Measure, behaviors: list[list[int]], n_cells: 
 def test_many_against_many_equal_the_reference(name: str, columns: int, rows: int) -> None:
     rng = random.Random(columns)
     n_cells = columns * rows
-    measure = _distances.make_measure(KINDS[name], columns, rows, True)
+    measure = distances.make_measure(KINDS[name], columns, rows, True)
     plain = reference.BY_NAME[name]
     few = name in ("edit", "alignment")
     for _ in range(cases(3 if few else 10, 1)):
@@ -47,18 +47,18 @@ def test_many_against_many_equal_the_reference(name: str, columns: int, rows: in
         other = [*one[:1], *(random_behavior(rng, n_cells) for _ in range(3))]
         found = np.empty((3, 4))
         a, b = described(measure, one, n_cells), described(measure, other, n_cells)
-        _distances.distances_between(measure, a, b, found)
+        distances.distances_between(measure, a, b, found)
         expected = [[plain(x, y, columns, rows) for y in other] for x in one]
         assert found == pytest.approx(np.array(expected), rel=1e-12, abs=1e-12)
 
 
 def test_final_positions_are_compared_in_a_straight_line() -> None:
-    measure = _distances.make_measure(_distances.FINAL, 12, 6, True)
-    behaviors = _distances.make_behaviors(3, 72)
+    measure = distances.make_measure(distances.FINAL, 12, 6, True)
+    behaviors = distances.make_behaviors(3, 72)
     for row, (x, y) in enumerate([(0.0, 0.0), (0.3, 0.4), (-1.0, 0.0)]):
-        _distances.describe(measure, np.zeros(0, np.uint8), 0, x, y, behaviors, row)
+        distances.describe(measure, np.zeros(0, np.uint8), 0, x, y, behaviors, row)
     distance = np.empty(3)
-    _distances.distances_to(measure, behaviors, 0, behaviors, 3, distance)
+    distances.distances_to(measure, behaviors, 0, behaviors, 3, distance)
     assert distance.tolist() == pytest.approx([0.0, 0.5, 1.0], rel=1e-15)
 
 
@@ -74,30 +74,30 @@ def test_final_positions_are_compared_in_a_straight_line() -> None:
     ],
 )
 def test_what_an_alignment_costs(one: list[int], other: list[int], expected: float) -> None:
-    measure = _distances.make_measure(_distances.ALIGNMENT, 12, 6, True)
+    measure = distances.make_measure(distances.ALIGNMENT, 12, 6, True)
     a, b = described(measure, [one], 72), described(measure, [other], 72)
     row = np.empty(73)
-    cost = _distances.alignment_cost(a.marks[0], len(one), b.marks[0], len(other), measure.cost, row)
+    cost = distances.alignment_cost(a.marks[0], len(one), b.marks[0], len(other), measure.cost, row)
     assert cost == pytest.approx(expected)
-    share = _distances.distance_of(measure, a, 0, b, 0)
+    share = distances.distance_of(measure, a, 0, b, 0)
     assert share == pytest.approx(2 * expected / (len(one) + len(other) + expected))
 
 
 def test_two_that_visit_nothing_are_equal_and_one_that_does_is_as_far_as_can_be() -> None:
     for name in ("jaccard", "alignment"):
-        measure = _distances.make_measure(KINDS[name], 12, 6, True)
+        measure = distances.make_measure(KINDS[name], 12, 6, True)
         packed = described(measure, [[], [], [4, 5]], 72)
         found = np.empty((3, 3))
-        _distances.distances_between(measure, packed, packed, found)
+        distances.distances_between(measure, packed, packed, found)
         assert found.tolist() == [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0]]
 
 
 def test_a_copied_behavior_is_the_behavior() -> None:
-    measure = _distances.make_measure(_distances.JACCARD, 12, 6, True)
+    measure = distances.make_measure(distances.JACCARD, 12, 6, True)
     packed = described(measure, [[3, 70], [5]], 72)
-    to = _distances.make_behaviors(2, 72)
-    _distances.copy_behavior(packed, 0, to, 1)
+    to = distances.make_behaviors(2, 72)
+    distances.copy_behavior(packed, 0, to, 1)
     assert to.n_cells[1] == 2
     assert to.points[1].tolist() == packed.points[0].tolist()
-    assert _distances.distance_of(measure, packed, 0, to, 1) == 0.0
-    assert math.isclose(_distances.distance_of(measure, packed, 1, to, 1), 1.0)
+    assert distances.distance_of(measure, packed, 0, to, 1) == 0.0
+    assert math.isclose(distances.distance_of(measure, packed, 1, to, 1), 1.0)

@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _double_pole
-from realitygap.kernels._network import decode, make_networks
+from realitygap.kernels.neat.network import decode, make_networks
+from realitygap.kernels.tasks import double_pole
 from realitygap.study import task_settings
 from tests.kernels.genome_arrays import grown, rules_of, to_arrays
 from tests.reference import double_pole as reference
@@ -34,7 +34,7 @@ def test_accelerations_equal_those_of_lagrange() -> None:
         rng = random.Random(seed)
         state, force = random_state(rng), rng.uniform(-10, 10)
         _, cart, _, pole_1, _, pole_2 = reference.slopes(state, force)
-        found = _double_pole.accelerations(force, *state[2:])
+        found = double_pole.accelerations(force, *state[2:])
         assert found == pytest.approx((cart, pole_1, pole_2), rel=1e-10, abs=1e-9)
 
 
@@ -42,13 +42,13 @@ def test_a_mirrored_cart_moves_as_a_mirror_image() -> None:
     for seed in range(20):
         rng = random.Random(seed)
         state, force = random_state(rng), rng.uniform(-10, 10)
-        forth = _double_pole.cart_step(force, 0.01, *state)
-        back = _double_pole.cart_step(-force, 0.01, *(-value for value in state))
+        forth = double_pole.cart_step(force, 0.01, *state)
+        back = double_pole.cart_step(-force, 0.01, *(-value for value in state))
         assert back == tuple(-value for value in forth)
 
 
 def test_nothing_moves_where_all_stands_upright_without_force() -> None:
-    assert _double_pole.cart_step(0.0, 0.01, 1.0, *[0.0] * 5) == (1.0, *[0.0] * 5)
+    assert double_pole.cart_step(0.0, 0.01, 1.0, *[0.0] * 5) == (1.0, *[0.0] * 5)
 
 
 def test_energy_is_kept_but_for_friction_and_the_error_is_of_fourth_order() -> None:
@@ -58,7 +58,7 @@ def test_energy_is_kept_but_for_friction_and_the_error_is_of_fourth_order() -> N
     def end(n_steps: int) -> list[float]:
         state = tuple(start)
         for _ in range(n_steps):
-            state = _double_pole.cart_step(0.0, 0.5 / n_steps, *state)
+            state = double_pole.cart_step(0.0, 0.5 / n_steps, *state)
         return list(state)
 
     exact = end(4000)
@@ -81,10 +81,10 @@ class Trial:
         decode(arrays, FIRST, self.rules, self.networks, FIRST)
         self.values = np.full(neat.first_hidden + hidden_room, 9.0)  # a trial must not see what was there
         self.before = np.zeros_like(self.values)
-        self.shaking = np.zeros(_double_pole.SHAKE_ACTIONS)
+        self.shaking = np.zeros(double_pole.SHAKE_ACTIONS)
 
     def actions(self, most: int, start: tuple[float, ...]) -> int:
-        return _double_pole.balance(
+        return double_pole.balance(
             self.networks,
             FIRST,
             self.rules,
@@ -98,7 +98,7 @@ class Trial:
         )
 
     def generalization(self) -> int:
-        return _double_pole.generalization(
+        return double_pole.generalization(
             self.networks, FIRST, self.rules, HALF, self.values, self.before, self.shaking
         )
 
@@ -150,12 +150,12 @@ def balancing(*, velocities: bool = True) -> Trial:
 def test_a_network_that_balances_is_let_go_after_the_last_action() -> None:
     n = cases(1000, 150)
     trial = balancing()
-    start = _double_pole.first_start()
+    start = double_pole.first_start()
     assert trial.actions(n, start) == n
     assert trial.actions(7, start) == 7
     path = trial.path(n, start)
     assert len(path) == n
-    fitness = _double_pole.gruau_fitness(n, trial_shaking(trial, n, start))
+    fitness = double_pole.gruau_fitness(n, trial_shaking(trial, n, start))
     assert fitness == pytest.approx(reference.gruau_fitness(path), rel=1e-6)
 
 
@@ -166,9 +166,9 @@ def trial_shaking(trial: Trial, n: int, start: tuple[float, ...]) -> np.ndarray:
 
 @pytest.mark.parametrize("n", [0, 1, 99, 100])
 def test_short_trials_count_for_their_length_alone(n: int) -> None:
-    shaking = np.full(_double_pole.SHAKE_ACTIONS, np.nan)
-    assert _double_pole.gruau_fitness(n, shaking) == pytest.approx(n / 10_000)
+    shaking = np.full(double_pole.SHAKE_ACTIONS, np.nan)
+    assert double_pole.gruau_fitness(n, shaking) == pytest.approx(n / 10_000)
 
 
 def test_a_cart_at_rest_has_a_finite_fitness() -> None:
-    assert np.isfinite(_double_pole.gruau_fitness(1000, np.zeros(_double_pole.SHAKE_ACTIONS)))
+    assert np.isfinite(double_pole.gruau_fitness(1000, np.zeros(double_pole.SHAKE_ACTIONS)))

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from realitygap.kernels import _marks
-from realitygap.kernels._lanes import LANES, Line
+from realitygap.kernels.math.lanes import LANES, Line
+from realitygap.kernels.tasks import marks
 from tests.reference.coverage import cell_of, cells_on_line, first_visits
 from tests.reference.effort import cases
 
@@ -35,19 +35,19 @@ def marked(paths: list[Path], columns: int, rows: int, real: type) -> list[tuple
     for k in [0, *range(points.shape[1])]:
         x, y = np.zeros((2, LANES), real)
         x[: len(paths)], y[: len(paths)] = points[:, k].T
-        _marks.place_line(grid, x, y, line)
-        _marks.mark_line(line, grid[3], columns, rows, visited, fresh, any_fresh)
-        _marks.mark_ends(line, columns, rows, ends)
-        _marks.list_fresh(
+        marks.place_line(grid, x, y, line)
+        marks.mark_line(line, grid[3], columns, rows, visited, fresh, any_fresh)
+        marks.mark_ends(line, columns, rows, ends)
+        marks.list_fresh(
             line, columns, rows, fresh, any_fresh, np.int64(len(paths)), cells, np.int64(0), n_line
         )
     found = []
     for lane in range(len(paths)):
         order = cells[lane, : n_line[lane]].tolist()
-        assert len(order) == _marks.count_cells(visited, lane)
+        assert len(order) == marks.count_cells(visited, lane)
         listed = np.zeros(columns * rows, np.uint8)
-        _marks.list_cells(ends, lane, columns, rows, listed)
-        found.append((order, set(listed[: _marks.count_cells(ends, lane)].tolist())))
+        marks.list_cells(ends, lane, columns, rows, listed)
+        found.append((order, set(listed[: marks.count_cells(ends, lane)].tolist())))
     return found
 
 

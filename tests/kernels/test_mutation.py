@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _mutation
-from realitygap.kernels._mutation import Innovations
+from realitygap.kernels.neat import mutation
+from realitygap.kernels.neat.mutation import Innovations
 from tests.kernels.genome_arrays import cursor, from_arrays, grown, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Genome, Neat, has_cycle
@@ -26,7 +26,7 @@ class Mutator:
         """Begin a run, or be in the middle of one, when the next number and node are `next_number`."""
         self.neat = neat
         self.rules = rules_of(neat)
-        self.innovations: Innovations = _mutation.make_innovations(self.rules, 1_000)
+        self.innovations: Innovations = mutation.make_innovations(self.rules, 1_000)
         if next_number is not None:
             self.innovations.counters[:2] = next_number
 
@@ -39,16 +39,16 @@ class Mutator:
         reached = np.empty(arrays.innovation.shape[1] + 1, np.int32)
         row, taken = np.int64(0), cursor()
         if what == "add_node":
-            done = _mutation.add_node(arrays, row, self.rules, self.innovations, stream, taken)
+            done = mutation.add_node(arrays, row, self.rules, self.innovations, stream, taken)
         elif what == "add_link":
-            done = _mutation.add_link(arrays, row, self.rules, self.innovations, stream, taken, reached)
+            done = mutation.add_link(arrays, row, self.rules, self.innovations, stream, taken, reached)
         else:
-            done = _mutation.mutate(arrays, row, self.rules, self.innovations, stream, taken, reached)
+            done = mutation.mutate(arrays, row, self.rules, self.innovations, stream, taken, reached)
         assert not arrays.full[0]
         return from_arrays(self.neat, arrays, 0), done
 
     def new_generation(self) -> None:
-        _mutation.start_generation(self.innovations)
+        mutation.start_generation(self.innovations)
 
 
 def stream_of(seed: int) -> Stream:
@@ -95,12 +95,12 @@ def test_mutation_equals_the_reference() -> None:
 def test_the_same_link_gets_the_same_number_in_one_generation_and_a_new_one_later() -> None:
     mutator = Mutator(Neat(settings(), 2, 1))
     links = [(0, 5), (1, 5), (5, 0)]
-    numbers = [_mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
+    numbers = [mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
     assert numbers == [2, 3, 4]  # after the two of the first genomes; direction matters
-    again = [_mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
+    again = [mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
     assert again == numbers
     mutator.new_generation()
-    later = [_mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
+    later = [mutation.number_of_link(mutator.innovations, np.int32(a), np.int32(b)) for a, b in links]
     assert later == [5, 6, 7]
 
 

@@ -7,7 +7,7 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _network
+from realitygap.kernels.neat import network as network_kernels
 from tests.kernels.genome_arrays import grown, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Gene, Genome, Neat, Recurrent, feed_forward
@@ -23,15 +23,15 @@ class KernelNetwork:
         self.rules = rules_of(neat)
         arrays = to_arrays(neat, [genome])
         room, hidden_room = arrays.innovation.shape[1], arrays.hidden.shape[1]
-        self.networks = _network.make_networks(np.int64(2), self.rules, room, hidden_room)
+        self.networks = network_kernels.make_networks(np.int64(2), self.rules, room, hidden_room)
         self.row = np.int64(1)
-        _network.decode(arrays, np.int64(0), self.rules, self.networks, self.row)
+        network_kernels.decode(arrays, np.int64(0), self.rules, self.networks, self.row)
         self.values = np.zeros(neat.first_hidden + hidden_room)
         self.before = np.zeros_like(self.values)
 
     def step(self, inputs: list[float]) -> list[float]:
         self.values[: len(inputs)] = inputs
-        _network.activate(self.networks, self.row, self.rules, self.values, self.before)
+        network_kernels.activate(self.networks, self.row, self.rules, self.values, self.before)
         return self.values[self.rules.n_inputs : self.rules.n_inputs + self.rules.n_outputs].tolist()
 
 

@@ -8,21 +8,22 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _distances, _novelty
+from realitygap.kernels.neat import distances
+from realitygap.kernels.neat import novelty as novelty_kernels
 from tests.reference import novelty as reference
 from tests.reference.effort import COMPILED, cases
 
 COLUMNS, ROWS = 12, 6
 BY_COLUMN, BY_ROW = (
-    _distances.make_measure(_distances.PAPER, COLUMNS, ROWS, by_column) for by_column in (True, False)
+    distances.make_measure(distances.PAPER, COLUMNS, ROWS, by_column) for by_column in (True, False)
 )
 Cells = list[int]
 Points = list[tuple[int, int]]
 
 
-def sorted_places(cells: Cells, table: _distances.CellTable) -> np.ndarray:
+def sorted_places(cells: Cells, table: distances.CellTable) -> np.ndarray:
     places = np.empty(table.place.size, np.int32)
-    _distances.sort_cells(np.array(cells), len(cells), table, places)
+    distances.sort_cells(np.array(cells), len(cells), table, places)
     return places[: len(cells)].copy()
 
 
@@ -37,10 +38,10 @@ def random_cells(rng: random.Random, n_cells: int) -> Cells:
     return rng.sample(range(n_cells), rng.choice([1, 2, rng.randint(1, n_cells), n_cells]))
 
 
-def packed(behaviors: list[Cells], measure: _distances.Measure) -> _distances.Behaviors:
-    found = _distances.make_behaviors(len(behaviors), COLUMNS * ROWS)
+def packed(behaviors: list[Cells], measure: distances.Measure) -> distances.Behaviors:
+    found = distances.make_behaviors(len(behaviors), COLUMNS * ROWS)
     for k, cells in enumerate(behaviors):
-        _distances.describe(measure, np.array(cells, np.int64), len(cells), 0.0, 0.0, found, k)
+        distances.describe(measure, np.array(cells, np.int64), len(cells), 0.0, 0.0, found, k)
     return found
 
 
@@ -50,7 +51,7 @@ def packed(behaviors: list[Cells], measure: _distances.Measure) -> _distances.Be
 )
 def test_cells_are_sorted_as_pairs(columns: int, rows: int, by_column: bool) -> None:
     rng = random.Random(1)
-    table = _distances.make_cell_table(columns, rows, by_column)
+    table = distances.make_cell_table(columns, rows, by_column)
     for _ in range(cases(80, 10)):
         cells = random_cells(rng, columns * rows) if columns * rows > 1 else [0]
         found = points_at(sorted_places(cells, table), columns, rows, by_column)
@@ -62,7 +63,7 @@ def test_cells_are_sorted_as_pairs(columns: int, rows: int, by_column: bool) -> 
 def test_the_difference_of_two_places_says_how_far_apart_the_cells_are(
     columns: int, rows: int, by_column: bool
 ) -> None:
-    table = _distances.make_cell_table(columns, rows, by_column)
+    table = distances.make_cell_table(columns, rows, by_column)
     places = sorted_places(list(range(columns * rows)), table)
     points = points_at(places, columns, rows, by_column)
     for one, a in zip(places.tolist(), points, strict=True):
@@ -78,11 +79,11 @@ def test_the_distance_equals_the_reference(by_column: bool) -> None:
     for _ in range(cases(500, 50)):
         one, other = random_cells(rng, COLUMNS * ROWS), random_cells(rng, COLUMNS * ROWS)
         a, b = sorted_places(one, table), sorted_places(other, table)
-        distance = _distances.pointwise_distance(a, len(a), b, len(b), table.span)
+        distance = distances.pointwise_distance(a, len(a), b, len(b), table.span)
         points = [reference.points_of(cells, COLUMNS, x_first=by_column) for cells in (one, other)]
         assert distance == pytest.approx(reference.paper_distance(*points, COLUMNS, ROWS), rel=1e-13)
-        assert distance == _distances.pointwise_distance(b, len(b), a, len(a), table.span)
-        assert _distances.pointwise_distance(a, len(a), a, len(a), table.span) == 0.0
+        assert distance == distances.pointwise_distance(b, len(b), a, len(a), table.span)
+        assert distances.pointwise_distance(a, len(a), a, len(a), table.span) == 0.0
 
 
 # the paper's archive
@@ -94,13 +95,13 @@ class KernelPaperArchive:
     def __init__(self, size: int, *, above_all: bool, by_column: bool) -> None:
         self.above_all, self.by_column = above_all, by_column
         self.measure = BY_COLUMN if by_column else BY_ROW
-        self.archive = _novelty.make_archive(0, size, COLUMNS * ROWS)
+        self.archive = novelty_kernels.make_archive(0, size, COLUMNS * ROWS)
 
     def update(self, behaviors: list[Cells]) -> list[float]:
         n = len(behaviors)
         novelty, distance = np.empty(n), np.empty((n, self.archive.archived.size))
         archive = self.archive._replace(place_of=np.empty(n, np.int64), distance=distance)
-        _novelty.paper_archive_step(
+        novelty_kernels.paper_archive_step(
             packed(behaviors, self.measure), self.measure, archive, self.above_all, novelty
         )
         return novelty.tolist()
@@ -199,7 +200,7 @@ def test_nearest_novelty_equals_the_reference() -> None:
         n, m, k = rng.randint(1, 6), rng.randint(0, 9), rng.randint(1, 8)
         distance = np.array([[float(rng.randint(0, 5)) for _ in range(n + m)] for _ in range(n)])
         np.fill_diagonal(distance, -1.0)
-        novelty = [_novelty.mean_of_nearest(row, np.int64(n + m), np.empty(k)) for row in distance]
+        novelty = [novelty_kernels.mean_of_nearest(row, np.int64(n + m), np.empty(k)) for row in distance]
         expected = [reference.mean(sorted(v for v in row if v >= 0)[:k]) for row in distance.tolist()]
         assert novelty == pytest.approx(expected, rel=1e-13)
 
@@ -211,7 +212,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         rng = random.Random(seed)
         n, k, generations = 4 + seed % 6, rng.randint(1, 12), 10
         start = [20.0, 400.0, 0.0, 150.0][seed % 4]
-        archive = _distances.make_behaviors(n * generations, COLUMNS * ROWS)
+        archive = distances.make_behaviors(n * generations, COLUMNS * ROWS)
         state, counters = np.zeros(1, np.int64), np.zeros(2, np.int64)
         threshold = np.array([start])
         plain = reference.NearestArchive(
@@ -220,8 +221,10 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
         for _ in range(generations):
             behaviors = [random_cells(rng, COLUMNS * ROWS) for _ in range(n)]
             novelty = np.empty(n)
-            room = _novelty.NearestRoom(np.empty(n + n * generations), np.empty(k), np.empty(n, np.bool_))
-            _novelty.nearest_archive_step(
+            room = novelty_kernels.NearestRoom(
+                np.empty(n + n * generations), np.empty(k), np.empty(n, np.bool_)
+            )
+            novelty_kernels.nearest_archive_step(
                 packed(behaviors, BY_COLUMN),
                 BY_COLUMN,
                 patience,
@@ -247,7 +250,7 @@ def test_the_growing_archive_equals_the_reference(patience: int) -> None:
 def admitted(novelty: list[float], threshold: float, patience: int) -> tuple[list[bool], float]:
     entered = np.empty(len(novelty), np.bool_)
     level = np.array([threshold])
-    _novelty.admit(np.array(novelty), np.zeros(2, np.int64), level, patience, entered)
+    novelty_kernels.admit(np.array(novelty), np.zeros(2, np.int64), level, patience, entered)
     return entered.tolist(), float(level[0])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realitygap.kernels._peak import CHAINS, multiply_adds
+from realitygap.kernels.math.peak import CHAINS, multiply_adds
 
 
 @pytest.mark.parametrize("lanes", [4, 16])

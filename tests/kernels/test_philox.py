@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels import _philox
+from realitygap.kernels.math import philox
 from tests.reference import philox as reference
 from tests.reference.effort import cases
 from tests.reference.philox import Stream
@@ -24,9 +24,9 @@ KNOWN = [
 
 LIMITS = {
     "replicate": 2**32 - 1,
-    "generation": _philox.MAX_GENERATIONS - 1,
-    "individual": _philox.MAX_INDIVIDUALS - 1,
-    "repeat": _philox.MAX_REPEATS - 1,
+    "generation": philox.MAX_GENERATIONS - 1,
+    "individual": philox.MAX_INDIVIDUALS - 1,
+    "repeat": philox.MAX_REPEATS - 1,
     "purpose": 255,
 }
 
@@ -36,17 +36,17 @@ def words(text: str) -> tuple[int, ...]:
 
 
 def kernel_philox(counter: tuple[int, ...], key: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(int(word) for word in _philox.philox(*map(np.uint32, (*counter, *key))))
+    return tuple(int(word) for word in philox.philox(*map(np.uint32, (*counter, *key))))
 
 
 def number(stream, index):
     """Number `index` of a stream, as kernels take it."""
-    return _philox.unit(_philox.draw_words(stream, index >> 2)[index & 3])
+    return philox.unit(philox.draw_words(stream, index >> 2)[index & 3])
 
 
 def stream_of(key: int, **fields: int) -> tuple[np.uint32, ...]:
     names = ("replicate", "generation", "individual", "repeat", "purpose")
-    stream: tuple[np.uint32, ...] = _philox.make_stream(
+    stream: tuple[np.uint32, ...] = philox.make_stream(
         np.uint64(key), *(np.int64(fields[name]) for name in names)
     )
     return stream
@@ -75,7 +75,7 @@ def test_streams_equal_the_reference() -> None:
         plain = Stream(key, **fields)
         for index in [0, 1, 2, 3, 4, 7, 400, 3 * 10**6 + 1]:
             assert number(stream, np.int64(index)) == plain.number(index)
-        assert tuple(map(int, _philox.draw_words(stream, np.int64(87)))) == plain.words(87)
+        assert tuple(map(int, philox.draw_words(stream, np.int64(87)))) == plain.words(87)
 
 
 def test_different_streams_never_share_a_counter_even_at_the_limits_of_the_fields() -> None:
@@ -90,20 +90,20 @@ def test_different_streams_never_share_a_counter_even_at_the_limits_of_the_field
 
 
 def test_the_purposes_are_different() -> None:
-    purposes = {name: int(value) for name, value in vars(_philox).items() if name.startswith("PURPOSE_")}
+    purposes = {name: int(value) for name, value in vars(philox).items() if name.startswith("PURPOSE_")}
     assert len(set(purposes.values())) == len(purposes)
     assert max(purposes.values()) < 256
-    first = [_philox.PURPOSE_NOISE, _philox.PURPOSE_GENOME, _philox.PURPOSE_CHILD, _philox.PURPOSE_SPECIES]
+    first = [philox.PURPOSE_NOISE, philox.PURPOSE_GENOME, philox.PURPOSE_CHILD, philox.PURPOSE_SPECIES]
     assert list(map(int, first)) == [1, 2, 3, 4]
     assert (reference.NOISE, reference.GENOME, reference.CHILD, reference.SPECIES) == (1, 2, 3, 4)
 
 
 def test_unit_is_never_zero_or_one_and_centered() -> None:
-    lowest, highest = _philox.unit(np.uint32(0)), _philox.unit(np.uint32(2**32 - 1))
+    lowest, highest = philox.unit(np.uint32(0)), philox.unit(np.uint32(2**32 - 1))
     assert lowest > 0.0
     assert highest < 1.0
     assert lowest + highest == 1.0  # so words come in pairs whose mean is one half
-    assert _philox.unit(np.uint32(2**31)) + _philox.unit(np.uint32(2**31 - 1)) == 1.0
+    assert philox.unit(np.uint32(2**31)) + philox.unit(np.uint32(2**31 - 1)) == 1.0
 
 
 def test_numbers_are_uniform() -> None:

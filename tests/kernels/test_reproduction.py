@@ -13,10 +13,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels import _reproduction
-from realitygap.kernels._genome import make_genomes
-from realitygap.kernels._mutation import make_innovations
-from realitygap.kernels._species import make_species
+from realitygap.kernels.neat import reproduction
+from realitygap.kernels.neat.genome import make_genomes
+from realitygap.kernels.neat.mutation import make_innovations
+from realitygap.kernels.neat.species import make_species
 from tests.kernels.genome_arrays import from_arrays, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Gene, Genome, Neat, Species
@@ -32,7 +32,7 @@ FEW = hypothesis_settings(max_examples=cases(300, 50), deadline=None, derandomiz
 
 def rounded(share: list[float], total: int) -> list[int]:
     count = np.zeros(len(share), np.int64)
-    _reproduction.round_to_sum(np.array(share, np.float64), np.int64(total), count, np.empty(len(share)))
+    reproduction.round_to_sum(np.array(share, np.float64), np.int64(total), count, np.empty(len(share)))
     return count.tolist()
 
 
@@ -99,9 +99,9 @@ def offspring(
         table.identity[k], table.size[k], table.improved[k] = 10 + k, len(kind), improved[k]
     table.improved_at[0] = improved_at
     shared = np.empty(len(fitness))
-    _reproduction.not_negative(np.array(fitness, np.float64), rules, shared)
+    reproduction.not_negative(np.array(fitness, np.float64), rules, shared)
     count = np.zeros(len(members), np.int64)
-    _reproduction.share_offspring(
+    reproduction.share_offspring(
         shared, np.array(species_of, np.int32), table, rules, np.int64(generation), count
     )
     species = [Species(10 + k, improved[k]) for k in range(len(members))]
@@ -209,7 +209,7 @@ def test_members_are_ranked_by_fitness_equal_ones_in_their_order() -> None:
     fitness = np.array([1.0, 5.0, 3.0, 5.0, 9.0, 3.0])
     species_of = np.array([7, 7, 7, 7, 8, 7], np.int32)
     members = np.empty(6, np.int64)
-    n = _reproduction.ranked_members(fitness, species_of, np.int32(7), members)
+    n = reproduction.ranked_members(fitness, species_of, np.int32(7), members)
     assert members[:n].tolist() == [1, 3, 2, 5, 0]
 
 
@@ -221,7 +221,7 @@ def test_only_a_better_best_fitness_is_an_improvement() -> None:
     table.best[:2] = -math.inf
     species_of = np.array([3, 3, 5, 5], np.int32)
     for generation, fitness in enumerate([[1.0, 2.0, 4.0, 3.0], [2.0, 2.0, 4.0, 4.0], [0.0, 3.0, 1.0, 1.0]]):
-        _reproduction.note_improvement(np.array(fitness), species_of, table, np.int64(generation))
+        reproduction.note_improvement(np.array(fitness), species_of, table, np.int64(generation))
     assert table.best[:2].tolist() == [3.0, 4.0]
     assert table.improved[:2].tolist() == [2, 0]
     assert (table.floats[1], table.improved_at[0]) == (4.0, 0)
@@ -253,7 +253,7 @@ class Brood:
         self.parents = np.empty((n, 2), np.int32)
         innovations = make_innovations(rules, n)
         innovations.counters[:2] = 1_000
-        _reproduction.reproduce(
+        reproduction.reproduce(
             old,
             np.array(fitness),
             np.array([k for k, kind in enumerate(members) for _ in kind], np.int32),

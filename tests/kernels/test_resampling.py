@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from realitygap.kernels._resampling import count_drawn
+from realitygap.kernels.math.resampling import count_drawn
 
 
 @pytest.mark.parametrize(("b", "n", "m", "u"), [(1, 1, 1, 1), (7, 20, 20, 6), (3, 50, 4, 9), (5, 0, 3, 2)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._block import RunRows
+from realitygap.kernels.neat.block import RunRows
 from realitygap.runs import Condition, frame_of, replay, run_rows
 from realitygap.runs import _runs as runs_module
 from tests.kernels.genome_arrays import from_arrays, rules_of, to_arrays

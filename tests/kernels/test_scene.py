@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _scene
+from realitygap.kernels.jyro import scene
 from realitygap.trials._scene import SceneTrack, simulate_case
 from realitygap.world._case import Case
-from realitygap.world._jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES
+from realitygap.world.jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES
 from tests.reference import scene as reference
 from tests.reference.trial import touch
 
@@ -136,9 +136,9 @@ def test_round7_is_pythons_round() -> None:
     halves = [(rng.randint(-(10**9), 10**9) + 0.5) / 1e7 for _ in range(20_000)]  # on or beside a half
     exact_halves = [k / 2.0**8 for k in range(-2000, 2000)]  # among them halves that no rounding blurs
     for value in [*values, *halves, *exact_halves, 0.0, -0.0, -1e-9, 2.0**29, math.nextafter(2.0**29, 0)]:
-        assert _scene.round7(value) == round(value, 7), value
-    assert _scene.round7(math.inf) == math.inf
-    assert math.isnan(_scene.round7(math.nan))
+        assert scene.round7(value) == round(value, 7), value
+    assert scene.round7(math.inf) == math.inf
+    assert math.isnan(scene.round7(math.nan))
 
 
 def test_lines_agree_with_exact_geometry_away_from_touching() -> None:
@@ -151,9 +151,9 @@ def test_lines_agree_with_exact_geometry_away_from_touching() -> None:
         if abs(turn) < 0.05:
             continue
         one, other = np.empty(6), np.empty(6)
-        _scene.set_line(one, *a, *b)
-        _scene.set_line(other, *c, *d)
-        crossed, x, y = _scene.crossing(one, other)
+        scene.set_line(one, *a, *b)
+        scene.set_line(other, *c, *d)
+        crossed, x, y = scene.crossing(one, other)
         along = ((c[0] - a[0]) * (d[1] - c[1]) - (c[1] - a[1]) * (d[0] - c[0])) / turn
         meet = touch(a, b, c, d)
         if crossed and meet:
@@ -166,8 +166,8 @@ def test_lines_agree_with_exact_geometry_away_from_touching() -> None:
 def test_a_line_on_top_of_another_does_not_cross_it() -> None:
     for ends in [(0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0)]:
         line = np.empty(6)
-        _scene.set_line(line, *ends)
-        assert not _scene.crossing(line, line)[0]
+        scene.set_line(line, *ends)
+        assert not scene.crossing(line, line)[0]
 
 
 # moving

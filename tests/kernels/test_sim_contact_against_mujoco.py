@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import minimize
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim import start_sim, step_sim
-from realitygap.kernels._sim_lanes import SimRules, make_sim_room
-from realitygap.kernels._sim_shape import make_sim_shape, sim_table
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim.lanes import SimRules, make_sim_room
+from realitygap.kernels.sim.shape import make_sim_shape, sim_table
+from realitygap.kernels.sim.trial import start_sim, step_sim
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'realitygap[twin]'")
 

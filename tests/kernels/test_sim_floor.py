@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _sim_floor
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import floor
 from tests.kernels.sim_rows import PRECISIONS, TOLERANCE, poses, random_words, row
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -18,7 +18,7 @@ GRID = np.array([-0.2, 0.1, 10.0])
 
 def sample(image: Any, x: Any, y: Any, real: Any = np.float64, grid: Any = GRID) -> np.ndarray:
     brightness = row(7.0, real)
-    _sim_floor.sample_image(
+    floor.sample_image(
         np.asarray(image, np.float32), np.asarray(grid), row(x, real), row(y, real), brightness
     )
     return brightness
@@ -26,7 +26,7 @@ def sample(image: Any, x: Any, y: Any, real: Any = np.float64, grid: Any = GRID)
 
 def tape(pieces: Any, x: Any, y: Any, real: Any = np.float64) -> np.ndarray:
     brightness = row(1.0, real)
-    _sim_floor.lay_tape(np.array(pieces, np.float64).reshape(-1, 6), row(x, real), row(y, real), brightness)
+    floor.lay_tape(np.array(pieces, np.float64).reshape(-1, 6), row(x, real), row(y, real), brightness)
     return brightness
 
 
@@ -76,7 +76,7 @@ def test_tape_is_where_the_reference_has_it(real: Any) -> None:
 def test_a_sensor_looks_where_it_is_mounted() -> None:
     x, y = row(0.0, np.float64), row(0.0, np.float64)
     at = poses(0.5, 0.2, np.pi / 2, np.float64)
-    _sim_floor.place_point(row(0.05, np.float64), row(0.01, np.float64), at, x, y)
+    floor.place_point(row(0.05, np.float64), row(0.01, np.float64), at, x, y)
     assert (x[0], y[0]) == pytest.approx((0.49, 0.25))  # ahead is +y, left is -x
 
 
@@ -85,9 +85,7 @@ def answer(
 ) -> np.ndarray:
     real = np.float64
     reading = row(0.0, real)
-    _sim_floor.answer_line(
-        row(brightness, real), row(threshold, real), row(noise, real), words, as_level, reading
-    )
+    floor.answer_line(row(brightness, real), row(threshold, real), row(noise, real), words, as_level, reading)
     return reading
 
 

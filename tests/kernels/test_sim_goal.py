@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from realitygap.kernels import _sim_goal
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import goal as goal_kernels
 from tests.kernels.sim_rows import PRECISIONS, poses, row
 
 
@@ -16,7 +16,7 @@ def sectors(goal_x, goal_y, x, y, heading, real=np.float64):
     """(4, LANES) of all quarters."""
     seen = np.empty((4, LANES), real)
     for sector in range(4):
-        _sim_goal.see_goal_sector(
+        goal_kernels.see_goal_sector(
             row(goal_x, real), row(goal_y, real), np.int64(sector), poses(x, y, heading, real), seen[sector]
         )
     return seen
@@ -45,11 +45,11 @@ def test_the_distance_is_a_part_of_that_from_the_start():
     value = row(7.0, np.float64)
     x = np.linspace(0.0, 3.0, LANES)
     real = np.float64
-    _sim_goal.see_goal_distance(
+    goal_kernels.see_goal_distance(
         row(2.0, real), row(0.0, real), row(0.5, real), row(0.0, real), poses(x, 0.0, 0.0, real), value
     )
     assert value == pytest.approx(np.minimum(abs(2.0 - x) / 1.5, 1.0))
-    _sim_goal.see_goal_distance(
+    goal_kernels.see_goal_distance(
         row(2.0, real), row(0.0, real), row(2.0, real), row(0.0, real), poses(x, 0.0, 0.0, real), value
     )
     assert (value == 1.0).all()

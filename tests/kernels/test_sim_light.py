@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realitygap.kernels import _sim_light
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import light
 from tests.kernels.sim_rows import PRECISIONS, TOLERANCE, poses, random_words, row
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -30,16 +30,14 @@ def receive(
     """(LANES,) light before gain and noise; lamps are x, y, strength, lit."""
     lobe = [row(0.0, real) for _ in range(4)]
     turn = 2 * np.pi
-    _sim_light.prepare_light(
-        row(np.asarray(direction) / turn, real), row(np.asarray(width) / turn, real), *lobe
-    )
+    light.prepare_light(row(np.asarray(direction) / turn, real), row(np.asarray(width) / turn, real), *lobe)
     ahead, left, distance, reading = (row(0.0, real) for _ in range(4))
     for lamp_x, lamp_y, strength, lit in lamps:
-        _sim_light.look_to(
+        light.look_to(
             row(lamp_x, real), row(lamp_y, real), row(mount[0], real), row(mount[1], real),
             poses(x, y, heading, real), ahead, left, distance,
         )  # fmt: skip
-        _sim_light.add_light(ahead, left, distance, row(strength, real), *lobe, row(lit, real), reading)
+        light.add_light(ahead, left, distance, row(strength, real), *lobe, row(lit, real), reading)
     return reading
 
 
@@ -94,7 +92,7 @@ def test_light_noise_has_the_stated_spread() -> None:
     answers = []
     for _ in range(cases(1_000, 20)):
         reading = row(0.25, np.float64)
-        _sim_light.answer_light(row(2.0, np.float64), row(0.1, np.float64), random_words(rng, 1)[0], reading)
+        light.answer_light(row(2.0, np.float64), row(0.1, np.float64), random_words(rng, 1)[0], reading)
         answers.append(reading)
     seen = np.concatenate(answers)
     assert seen.mean() == pytest.approx(0.5, abs=4 * 0.05 / np.sqrt(seen.size))
@@ -111,5 +109,5 @@ def test_readings_stay_between_nothing_and_all(
 ) -> None:
     reading = receive(x, y, 0.0, (0.0, 0.0), 0.0, width, [(0.0, 0.0, strength, 1.0)], real)
     word = random_words(np.random.default_rng(seed), 1)[0]
-    _sim_light.answer_light(row(gain, real), row(noise, real), word, reading)
+    light.answer_light(row(gain, real), row(noise, real), word, reading)
     assert ((reading >= 0) & (reading <= 1)).all()

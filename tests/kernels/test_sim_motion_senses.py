@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _sim_encoders, _sim_stall
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._math import normal
+from realitygap.kernels.math.elementary import normal
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import encoders, stall
 from tests.kernels.sim_rows import poses, random_words, row, rows
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -33,7 +33,7 @@ class Driven:
     def drive(self, left: Any, right: Any, words: np.ndarray) -> None:
         self.wheels += rows([left, right], self.real)
         for k in range(2):
-            _sim_encoders.read_encoder(
+            encoders.read_encoder(
                 self.wheels[k],
                 self.before[k],
                 self.gain[k],
@@ -42,7 +42,7 @@ class Driven:
                 self.counted[k],
                 self.step_said[k],
             )
-        _sim_encoders.reckon(
+        encoders.reckon(
             self.step_said[0], self.step_said[1], self.track, self.axle, self.drift, self.reckoned
         )
 
@@ -124,7 +124,7 @@ def test_without_errors_a_turn_on_the_spot_goes_around_the_axle() -> None:
 def test_as_an_input_full_speed_is_one() -> None:
     value = row(0.0, np.float64)
     said = row(np.linspace(-0.2, 0.2, LANES), np.float64)
-    _sim_encoders.as_input(said, row(0.15, np.float64), 0.5, value)
+    encoders.as_input(said, row(0.15, np.float64), 0.5, value)
     assert value == pytest.approx(np.clip(said / 0.075, -1, 1))
 
 
@@ -136,13 +136,13 @@ class Stalling:
         self.was, self.before = rows([0.0, 1.0, 0.0, 0.0], real), rows([0.0, 0.0], real)
         self.wheels, self.idled = rows([0.0, 0.0], real), rows([0.0, 0.0, 0.0], real)
         self.idler, self.share = row(idler, real), row(share, real)
-        _sim_stall.prepare_stall(row(window, real), step_s, self.idled[2])
+        stall.prepare_stall(row(window, real), step_s, self.idled[2])
         self.plain = reference.Idler(idler, share, window, step_s, (0.0, 0.0, 0.0))
 
     def step(self, pose: tuple[float, float, float], left: float, right: float) -> bool:
         self.wheels += rows([left, right], np.float64)
         stalled = row(7.0, np.float64)
-        _sim_stall.idler_stall(
+        stall.idler_stall(
             self.was, poses(*pose, np.float64), self.wheels, self.before, self.idler, self.share, self.idled[2],
             self.idled[0], self.idled[1], stalled,
         )  # fmt: skip

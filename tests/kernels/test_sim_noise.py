@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realitygap.kernels import _sim_noise, _sim_range
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import noise, ranges
 from tests.kernels.sim_rows import PRECISIONS, TOLERANCE, random_words, row, rows, unit_of
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -23,9 +23,9 @@ def mix(
 ) -> np.ndarray:
     """(LANES,) readings with dropouts and outliers, each (most, at, width)."""
     reading, drop_rate, outlier_rate = row(readings, real), row(0.0, real), row(0.0, real)
-    _sim_range.rate_of(row(drop[2], real), drop_rate)
-    _sim_range.rate_of(row(outlier[2], real), outlier_rate)
-    _sim_noise.mixture(
+    ranges.rate_of(row(drop[2], real), drop_rate)
+    ranges.rate_of(row(outlier[2], real), outlier_rate)
+    noise.mixture(
         row(near, real), words[0], words[1], rows(drop[:2], real), drop_rate, rows(outlier[:2], real), outlier_rate,
         reading,
     )  # fmt: skip
@@ -118,7 +118,7 @@ def test_gain_noise_is_proportional_to_the_reading(real: Any) -> None:
     answers = np.empty((n, LANES))
     for k in range(n):
         reading = row(readings, real)
-        _sim_noise.gain_noise(random_words(rng, 1)[0], row(gain, real), reading)
+        noise.gain_noise(random_words(rng, 1)[0], row(gain, real), reading)
         answers[k] = reading / readings
     standard = (answers[:, 1:] - 1) / gain[1:]
     size = standard.size
@@ -132,14 +132,14 @@ def test_uniform_noise_is_the_papers(real: Any) -> None:
     """Mean exactly 0 over opposite words; the largest is the level; variance level^2 / 3."""
     words = np.array([0, 2**32 - 1, 2**31, 2**31 - 1] + [2**20] * (LANES - 4), np.uint32)
     reading = row(0.0, real)
-    _sim_noise.uniform_noise(words, row(0.5, real), reading)
+    noise.uniform_noise(words, row(0.5, real), reading)
     assert reading[0] == -reading[1] == pytest.approx(-0.5, abs=1e-7)
     assert reading[2] == -reading[3] == pytest.approx(0.0, abs=1e-7)
     rng = np.random.default_rng(5)
     answers = []
     for _ in range(cases(1_000, 20)):
         reading = row(0.0, real)
-        _sim_noise.uniform_noise(random_words(rng, 1)[0], row(0.1, real), reading)
+        noise.uniform_noise(random_words(rng, 1)[0], row(0.1, real), reading)
         answers.append(reading)
     moved = np.concatenate(answers).astype(np.float64)
     assert moved.var() == pytest.approx(0.01 / 3, abs=4 * 0.01 * np.sqrt(4 / 45 / moved.size))  # 1 in 16,000
@@ -194,8 +194,8 @@ def test_the_second_word_is_independent_of_the_choice_and_keeps_complements() ->
         for _ in range(cases(300, 10)):
             word, spare = random_words(rng, 2)
             value, opposite = np.zeros((2, LANES), np.uint32)
-            _sim_noise.second_word(word, spare, np.int64(place), value)
-            _sim_noise.second_word(~word, ~spare, np.int64(place), opposite)
+            noise.second_word(word, spare, np.int64(place), value)
+            noise.second_word(~word, ~spare, np.int64(place), opposite)
             assert (opposite == ~value).all()
             assert (value >> 21 == word & 0x7FF).all()
             assert (value >> 11 & 0x3FF == spare >> 10 * place & 0x3FF).all()

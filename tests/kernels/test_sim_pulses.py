@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from realitygap.kernels import _sim_pulses, _sim_range
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import pulses as pulses_kernels
+from realitygap.kernels.sim import ranges
 from tests.kernels.sim_rows import PRECISIONS, random_words, row, rows
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -28,8 +29,8 @@ def count(
     real: Any = np.float64,
 ) -> np.ndarray:
     reading, rate = row(share, real), row(0.0, real)
-    _sim_range.rate_of(row(miss[2], real), rate)
-    _sim_pulses.count_pulses(
+    ranges.rate_of(row(miss[2], real), rate)
+    pulses_kernels.count_pulses(
         row(near, real), np.int64(pulses), words, rows(miss[:2], real), rate, row(burst, real),
         row(0.0, real), row(0.0, real), reading,
     )  # fmt: skip
@@ -37,7 +38,7 @@ def count(
 
 
 def n_words(pulses: int) -> int:
-    return int(_sim_pulses.pulse_words(np.int64(pulses)))
+    return int(pulses_kernels.pulse_words(np.int64(pulses)))
 
 
 @pytest.mark.parametrize("real", PRECISIONS)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _sim_senses
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._math import normal
-from realitygap.kernels._sim_lanes import SimRules, make_sim_room
-from realitygap.kernels._sim_shape import make_sim_shape, sim_rows, sim_table
-from realitygap.kernels._trial import largest_noisy_readings
+from realitygap.kernels.jyro.trial import largest_noisy_readings
+from realitygap.kernels.math.elementary import normal
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import senses
+from realitygap.kernels.sim.lanes import SimRules, make_sim_room
+from realitygap.kernels.sim.shape import make_sim_shape, sim_rows, sim_table
 from tests.kernels.genome_arrays import rules_of, settings
 from tests.kernels.sim_rows import poses
 from tests.reference import senses as reference
@@ -23,15 +23,17 @@ from tests.reference.neat import Neat
 from tests.reference.philox import Stream
 
 KEY = 41
-RESPONSES = ("linear", "ir", "table", "pulses")
+RESPONSES = ("linear", "ir", "table", "pulses", "lorentz")
+FIRST_RAYS = {"linear": (0, 1), "ir": (1, 3), "table": (4, 1), "pulses": (5, 3), "lorentz": (8, 3)}
+N_RAYS = 11
 TABLE = 3
 TAPE = (0.2, -1.0, 0.2, 1.0, 0.1, 0.1)
 SHAPE = make_sim_shape(
     parts=[1],
     range_response=RESPONSES,
-    range_rays=[1, 3, 1, 3],
-    range_table=[0, 0, TABLE, 0],
-    range_pulses=[0, 0, 0, 10],
+    range_rays=[rays for _, rays in FIRST_RAYS.values()],
+    range_table=[0, 0, TABLE, 0, 0],
+    range_pulses=[0, 0, 0, 10, 0],
     n_light=2,
     n_line=2,
     line_levels=[False, True],
@@ -49,7 +51,7 @@ def numbers_of(rng: np.random.Generator) -> Numbers:
         "reach": (0.4, 0.8), "amplitude": (0.5, 2.0), "decay": (0.05, 0.3), "noise_uniform": (0.0, 0.1),
         "noise_gain": (0.0, 0.2), "drop_most": (0.0, 0.6), "drop_at": (0.1, 0.4), "drop_width": (0.02, 0.1),
         "outlier_most": (0.0, 0.4), "outlier_at": (0.1, 0.4), "outlier_width": (0.02, 0.1), "burst": (0.0, 1.0),
-        "incidence": (0.0, 0.0),
+        "incidence": (0.0, 0.0), "cone": (0.1, 0.6), "half_width": (0.06, 0.3), "peak": (-0.05, 0.05),
     }  # fmt: skip
     numbers = {
         f"range.{s}.{name}": rng.uniform(*span, LANES)
@@ -87,14 +89,14 @@ class Block:
         self.lanes.p[: len(table)] = table
         self.lanes.counters[0] = np.arange(LANES) * 256 + 1
         self.lanes.counters[2] = 3
-        _sim_senses.start_senses(shape, self.rules, self.lanes)
+        senses.start_senses(shape, self.rules, self.lanes)
 
     def readings(self, pose: Any, distances: np.ndarray, step: int, cosines: Any = 1.0) -> np.ndarray:
         self.lanes.rates[:] = cosines
         for ours, given in zip(self.lanes.pose, poses(*pose, self.lanes.low.dtype.type), strict=True):
             ours[:] = given
         self.lanes.distances[:] = distances
-        _sim_senses.answer(self.shape, self.rules, np.uint64(KEY), self.lanes, np.int64(step))
+        senses.answer(self.shape, self.rules, np.uint64(KEY), self.lanes, np.int64(step))
         return self.lanes.readings.copy()
 
 
@@ -145,6 +147,10 @@ class Plain:
                 for j in range(TABLE)
             ]
             reading = reference.table(min(rays), entries)
+        elif kind == "lorentz":
+            of_lorentz = (self.number(f"range.{s}.{name}") for name in ("half_width", "peak"))
+            cone = self.number(f"range.{s}.cone")
+            reading = reference.enki(rays, cone, reach, of["amplitude"], *of_lorentz)
         else:
             factors = reference.at_a_slant(cosines, k)
             reading = of["amplitude"] * reference.returned(rays, reach, decay, factors)
@@ -160,7 +166,7 @@ class Plain:
             reading *= 1 + of["noise_gain"] * float(normal(np.uint32(value), 0.0))
             choices = ((choice >> 11) + 0.5) / 2**21, ((value >> 9) + 0.5) / 2**23
             reading = reference.mixed(reading, *choices, nothing, anything)
-        uniform = ((self.word(1, self.step, s) >> 8) * 2 + 1 - 2**24) / 2**24
+        uniform = ((self.word(1, self.step * -(-len(RESPONSES) // 4), s) >> 8) * 2 + 1 - 2**24) / 2**24
         return reference.limited(reading + of["noise_uniform"] * uniform)
 
     def light(self, k: int, pose: tuple[float, float, float]) -> float:
@@ -194,17 +200,16 @@ def test_every_sensor_answers_what_its_own_words_say(most_incidence: float) -> N
     block = Block(numbers)
     for step in [0, 1, 7, *range(100, 100 + cases(8, 1))]:
         x, y, heading = rng.uniform(-0.5, 0.5, (3, LANES)) * [[1], [1], [6]]
-        distances = np.empty((8, LANES))
-        for s, first in ((0, 0), (1, 1), (2, 4), (3, 5)):
-            n = 1 if s in (0, 2) else 3
+        distances = np.empty((N_RAYS, LANES))
+        for s, (first, n) in enumerate(FIRST_RAYS.values()):
             reach = numbers[f"range.{s}.reach"]
             distances[first : first + n] = np.minimum(rng.uniform(0, 1.2, (n, LANES)) * reach, reach)
-        cosines = rng.uniform(0.01, 1.0, (8, LANES))
+        cosines = rng.uniform(0.01, 1.0, (N_RAYS, LANES))
         answer = block.readings((x, y, heading), distances, step, cosines)
         for lane in range(0, LANES, 5):
             plain, pose = Plain(numbers, lane, step), (float(x[lane]), float(y[lane]), float(heading[lane]))
             rays, slants = distances[:, lane].tolist(), cosines[:, lane].tolist()
-            parts = (slice(0, 1), slice(1, 4), slice(4, 5), slice(5, 8))
+            parts = [slice(first, first + n) for first, n in FIRST_RAYS.values()]
             wanted = [
                 *(plain.range(s, rays[part], slants[part]) for s, part in enumerate(parts)),
                 *(plain.light(k, pose) for k in range(2)),
@@ -218,7 +223,7 @@ def test_a_trial_reads_the_same_in_any_lane() -> None:
     rng = np.random.default_rng(2)
     numbers = numbers_of(rng)
     order = rng.permutation(LANES)
-    pose, distances = rng.uniform(-0.5, 0.5, (3, LANES)), rng.uniform(0, 0.6, (8, LANES))
+    pose, distances = rng.uniform(-0.5, 0.5, (3, LANES)), rng.uniform(0, 0.6, (N_RAYS, LANES))
     answer = Block(numbers).readings(tuple(pose), distances, 5)
     moved = Block({name: values[order] for name, values in numbers.items()})
     moved.lanes.counters[:] = moved.lanes.counters[:, order]
@@ -229,7 +234,7 @@ def test_noise_of_one_kind_stays_where_noise_of_another_is_switched_off() -> Non
     """Gain, mixture and the paper's noise draw words of their own, and a level of 0 draws nothing away."""
     rng = np.random.default_rng(3)
     numbers = numbers_of(rng)
-    distances = rng.uniform(0, 0.3, (8, LANES))
+    distances = rng.uniform(0, 0.3, (N_RAYS, LANES))
 
     def read(**zero: float) -> np.ndarray:
         given = {
@@ -270,4 +275,4 @@ def test_the_papers_noise_is_jyros_to_the_bit() -> None:
 def test_every_number_has_a_row_of_its_own() -> None:
     rows = sim_rows(SHAPE)
     assert sorted(rows.values()) == list(range(SHAPE.n_rows))
-    assert rows["range.3.burst"] == rows["range.3.x"] + _sim_senses.BURST
+    assert rows["range.3.burst"] == rows["range.3.x"] + senses.BURST

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.kernels import _sim_sight
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim_shape import make_sim_shape
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim import sight
+from realitygap.kernels.sim.shape import make_sim_shape
 from tests.kernels.sim_rows import PRECISIONS, row
 from tests.reference import senses as reference
 from tests.reference.effort import cases
@@ -41,16 +41,14 @@ def place(outlines: Sequence[Sequence[Outline]], real: Any) -> tuple[Any, np.nda
 def shade(shape: Any, p: np.ndarray, a: Any, b: Any) -> np.ndarray:
     real = p.dtype.type
     lit = row(7.0, real)
-    _sim_sight.shade_light(
-        shape, p, row(a[0], real), row(a[1], real), row(b[0], real), row(b[1], real), 0.5, lit
-    )
+    sight.shade_light(shape, p, row(a[0], real), row(a[1], real), row(b[0], real), row(b[1], real), 0.5, lit)
     return lit
 
 
 def gaps(shape: Any, p: np.ndarray, x: Any, y: Any) -> np.ndarray:
     real = p.dtype.type
     room = [row(0.0, real) for _ in range(3)]
-    _sim_sight.gap_of_point(shape, p, row(x, real), row(y, real), *room)
+    sight.gap_of_point(shape, p, row(x, real), row(y, real), *room)
     return room[2]
 
 
@@ -115,5 +113,5 @@ def test_walls_of_a_room_keep_out_the_light_of_other_rooms() -> None:
 def test_a_bump_sensor_feels_what_is_within_its_reach() -> None:
     reading = row(7.0, np.float64)
     gap = row(np.linspace(-0.01, 0.02, LANES), np.float64)
-    _sim_sight.answer_bump(gap, row(0.005, np.float64), reading)
+    sight.answer_bump(gap, row(0.005, np.float64), reading)
     assert (reading == (gap <= 0.005)).all()

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Population
-from realitygap.kernels import _species
-from realitygap.kernels._species import SpeciesTable
+from realitygap.kernels.neat import species as species_kernels
+from realitygap.kernels.neat.species import SpeciesTable
 from tests.kernels.genome_arrays import grown, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Gene, Genome, Neat
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered")
 
 def distance(neat: Neat, a: Genome, b: Genome) -> float:
     arrays = to_arrays(neat, [a, b])
-    return float(_species.genome_distance(arrays, np.int64(0), arrays, np.int64(1), rules_of(neat)))
+    return float(species_kernels.genome_distance(arrays, np.int64(0), arrays, np.int64(1), rules_of(neat)))
 
 
 def genome(*genes: tuple[int, float], disabled: int = -1) -> Genome:
@@ -116,7 +116,7 @@ class Speciation:
             settings(weight_coefficient=1.0, **{"threshold": 1.0, "target_species": 0, **changes}), 1, 1
         )
         self.rules = rules_of(self.neat)
-        self.table: SpeciesTable = _species.make_species(self.rules, n)
+        self.table: SpeciesTable = species_kernels.make_species(self.rules, n)
         self.species_of = np.zeros(n, np.int32)
         self.old = to_arrays(self.neat, [genome((0, 0.0))] * n)
         self.generation = 0
@@ -124,7 +124,7 @@ class Speciation:
     def place(self, *weights: float, fitness: list[float] | None = None) -> list[int]:
         new = to_arrays(self.neat, [genome((0, weight)) for weight in weights])
         fit = np.array(fitness or [0.0] * len(weights))
-        _species.speciate(
+        species_kernels.speciate(
             new,
             self.old,
             fit,
@@ -209,7 +209,7 @@ def test_a_table_that_was_cleared_has_no_species_left() -> None:
     species.place(0.0, 5.0)
     species.table.floats[:] = 7.0
     species.table.improved_at[0] = 7
-    _species.clear_species(species.rules, species.table)
+    species_kernels.clear_species(species.rules, species.table)
     assert species.table.counts.tolist() == [0, 0]
     assert species.table.floats.tolist() == [1.0, -math.inf]
     assert species.table.improved_at.tolist() == [0]

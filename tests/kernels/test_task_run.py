@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all
-from realitygap.kernels import _double_pole, _task_run
-from realitygap.kernels._xor import try_xor
+from realitygap.kernels.tasks import double_pole, run
+from realitygap.kernels.tasks.xor import try_xor
 from realitygap.runs import TaskRun, run_task
 from realitygap.runs import _classical as classical_module
 from realitygap.study import task_settings
@@ -31,27 +31,27 @@ class Tries:
         self.networks = decode_all([genome])
         self.values = np.zeros(self.rules.n_inputs + self.networks.bias.shape[1])
         self.before = np.zeros_like(self.values)
-        self.shaking = np.zeros(_double_pole.SHAKE_ACTIONS)
+        self.shaking = np.zeros(double_pole.SHAKE_ACTIONS)
 
     def xor(self) -> tuple[float, bool]:
         return try_xor(self.networks, FIRST, self.rules, self.bias_value, self.values, self.before)
 
     def actions(self, most: int) -> int:
-        return _double_pole.balance(
+        return double_pole.balance(
             self.networks,
             FIRST,
             self.rules,
             self.bias_value,
             self.velocities,
             np.int64(most),
-            _double_pole.first_start(),
+            double_pole.first_start(),
             self.values,
             self.before,
             self.shaking,
         )
 
     def generalization(self) -> int:
-        return _double_pole.generalization(
+        return double_pole.generalization(
             self.networks, FIRST, self.rules, self.bias_value, self.values, self.before, self.shaking
         )
 
@@ -63,7 +63,7 @@ def fitness_and_solved(task: str, genome: Genome) -> tuple[float, bool]:
     if task == "double-pole":
         actions = tries.actions(100_000)
         return float(actions), actions == 100_000
-    return _double_pole.gruau_fitness(tries.actions(1_000), tries.shaking), False
+    return double_pole.gruau_fitness(tries.actions(1_000), tries.shaking), False
 
 
 def plain_run(task: str, settings: NeatSettings, seed: int, replicate: int) -> TaskRun:
@@ -126,7 +126,7 @@ def chosen_to_test(fitness: list[float], species_of: list[int], tested: list[flo
     numbers = sorted(set(species_of))
     species.counts[0] = len(numbers)
     species.identity[: len(numbers)] = numbers
-    return _task_run._next_to_test(
+    return run._next_to_test(
         np.array(fitness),
         np.array(species_of, np.int32),
         species,

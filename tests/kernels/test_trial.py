@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from realitygap import evolution
-from realitygap.kernels import _trial, _walls
-from realitygap.kernels._lanes import LANES, Poses, Seen
-from realitygap.robots import JyroPlatform
-from realitygap.trials import NoiseKey, Trajectory, jyro_scene, simulate_case, trace_genome, try_genomes
+from realitygap.kernels.jyro import trial as trial_kernels
+from realitygap.kernels.jyro import walls as walls_kernels
+from realitygap.kernels.math.lanes import LANES, Poses, Seen
+from realitygap.platforms import JyroPlatform, jyro_scene, trace_genome, try_genomes
+from realitygap.trials import NoiseKey, Trajectory, simulate_case
 from realitygap.world import Arena, Pose, paper_arena
 from realitygap.world._case import Case
 from tests.kernels.genome_arrays import grown, rules_of, settings, to_arrays
@@ -300,7 +301,7 @@ def test_planes_and_segments_give_one_path_where_walls_enclose_the_robot(
         trial = {"noise": 0.3, "noise_key": NoiseKey(seed)}
         planes = trace_genome(platform, arena, genome, **trial)
         with monkeypatch.context() as patch:
-            patch.setattr("realitygap.trials._jyro.is_enclosed", lambda *_: False)
+            patch.setattr("realitygap.platforms.jyro._trials.is_enclosed", lambda *_: False)
             segments = trace_genome(platform, arena, genome, **trial)
         assert planes.stalled.tolist() == segments.stalled.tolist(), seed
         differences.append(apart(planes.poses, segments.poses))
@@ -354,7 +355,7 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
     genome = as_genome(neat, grown(neat, 5, 2))
     ranges = [0.1 + 0.01 * k for k in range(n)]
     scene = jyro_scene(JyroPlatform(precision="double"), arena)
-    rules = _trial.TrialRules(
+    rules = trial_kernels.TrialRules(
         n_steps=87,
         clip=False,
         bias_input=False,
@@ -368,10 +369,10 @@ def test_each_trial_of_a_call_may_have_its_own_physics() -> None:
     counters = np.zeros((n, 3), np.uint32)
     counters[:, 0] = np.arange(n) * 256 + 1
     networks = evolution.decode_all([genome])
-    lanes, wiring = _trial.make_block(scene, genome.rules, networks.place.shape[1])
-    trace = _trial.make_trace(scene.heading, 3, 3, -1, 1)
+    lanes, wiring = trial_kernels.make_block(scene, genome.rules, networks.place.shape[1])
+    trace = trial_kernels.make_trace(scene.heading, 3, 3, -1, 1)
     rows = np.zeros(n, np.int32)
-    _trial.run_trials(
+    trial_kernels.run_trials(
         scene,
         rules,
         genome.rules,
@@ -491,13 +492,13 @@ def test_touching_counts_and_the_next_number_does_not() -> None:
 
     def touches(x: float, y: float) -> bool:
         low = np.empty(LANES)
-        _walls.touch_segments(wall, square, *lanes_at(x, y), low)
+        walls_kernels.touch_segments(wall, square, *lanes_at(x, y), low)
         assert (low == low[0]).all()
         return bool(low[0] <= 0)
 
     def beyond(x: float, y: float) -> bool:
         low = np.empty(LANES)
-        _walls.gap_to_planes(plane, square, *lanes_at(x, y), low)
+        walls_kernels.gap_to_planes(plane, square, *lanes_at(x, y), low)
         return bool(low[0] <= 0)
 
     assert touches(0.75, 1.0)
@@ -518,7 +519,9 @@ def test_a_ray_reads_from_its_mount_and_not_past_its_range() -> None:
     reach, fractions, rates = np.full(LANES, 0.2), np.empty((3, LANES)), np.empty((3, LANES))
 
     def readings(x: float, heading: float = 0.0) -> list[float]:
-        _walls.sense_segments(scene.walls, scene.sensors, reach, *lanes_at(x, 0.0, heading), fractions, rates)
+        walls_kernels.sense_segments(
+            scene.walls, scene.sensors, reach, *lanes_at(x, 0.0, heading), fractions, rates
+        )
         return (fractions[:, 0] * 0.2).tolist()
 
     for x, expected in [
@@ -547,7 +550,7 @@ def test_a_ray_reads_from_its_mount_and_not_past_its_range() -> None:
     ],
 )
 def test_outputs_are_limited_to_commands(output: float, command: float) -> None:
-    assert _trial.as_command(output) == command
+    assert trial_kernels.as_command(output) == command
 
 
 def test_a_recurrent_network_that_grows_without_limit_still_ends_its_trial() -> None:

@@ -7,8 +7,8 @@ import random
 import numpy as np
 import pytest
 
-from realitygap.kernels._network import decode, make_networks
-from realitygap.kernels._xor import try_xor
+from realitygap.kernels.neat.network import decode, make_networks
+from realitygap.kernels.tasks.xor import try_xor
 from tests.kernels.genome_arrays import grown, rules_of, settings, to_arrays
 from tests.reference.effort import cases
 from tests.reference.neat import Gene, Genome, Neat, feed_forward

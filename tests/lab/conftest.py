@@ -79,9 +79,17 @@ class RunningLab:
 
     def lag(self) -> float:
         """The most that its event loop was late since this was asked last [s]."""
+        return float(self._get("lag"))
+
+    def slow_counts(self) -> None:
+        """Have its pages change before whoever enters a count hears of it."""
+        self._get("slow-counts")
+
+    def _get(self, path: str) -> bytes:
         cookie = f"{self.cookie['name']}={self.token}"
-        with urlopen(Request(f"{self.address}lag", headers={"Cookie": cookie})) as answer:
-            return float(answer.read())
+        with urlopen(Request(self.address + path, headers={"Cookie": cookie})) as answer:
+            content: bytes = answer.read()
+            return content
 
     def make_checks_endless(self) -> None:
         """Have every check of a study file with the word "endless" take longer than its limit."""
@@ -155,6 +163,8 @@ def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
         page.on("pageerror", lambda error: complain(str(error)))
         context.on("request", lambda request: check_request(request.url))
         page.goto(lab.address + path)
+        # Before its handshake with the server a page may swap two events that are 10 ms apart.
+        page.wait_for_function("() => window.did_handshake !== false")
         return page
 
     def check_request(url: str) -> None:

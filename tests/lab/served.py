@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import faulthandler
-import multiprocessing
 import os
 import sys
 import time
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 import uvicorn  # noqa: F401  # imported once, for all that are forked
 from fastapi import FastAPI  # noqa: F401
@@ -18,6 +19,8 @@ from nicegui import app
 
 import realitygap.lab.pages  # noqa: F401
 from realitygap.lab import open_lab
+from realitygap.lab._counts import Counts
+from tests.forks import fork_context
 
 LOG = "lab.log"
 """What a lab says to its terminal, beside its folder."""
@@ -46,6 +49,18 @@ async def lag() -> float:
     return most
 
 
+@app.get("/slow-counts")
+async def slow_counts() -> None:
+    """From now on, whoever enters a count waits for a second after it is in the ledger."""
+    score = Counts.score
+
+    def score_slowly(*given: Any) -> None:
+        score(*given)
+        time.sleep(1.0)
+
+    Counts.score = score_slowly  # type: ignore[method-assign]
+
+
 def serve(root: Path, port: int, told: Connection) -> None:
     """Serve the lab of a folder; say its address."""
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # of which NiceGUI thinks that it is under test itself
@@ -62,10 +77,9 @@ def serve(root: Path, port: int, told: Connection) -> None:
         open_lab(root, port=port, show=False, tell=tell)
 
 
-def begin(root: Path, port: int) -> tuple[multiprocessing.process.BaseProcess, str]:
+def begin(root: Path, port: int) -> tuple[BaseProcess, str]:
     """Begin to serve; the process, and its address."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__])
+    context = fork_context()
     here, there = context.Pipe(duplex=False)
     process = context.Process(target=serve, args=(root, port, there))
     process.start()

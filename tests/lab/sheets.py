@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.lab._drawn import keep_drawn
 from realitygap.records import LEDGER_NAME, Ledger, Score
-from realitygap.study import parse_study, run_study
+from realitygap.study import drive_study, parse_study
 from realitygap.testing import (
     Film,
     FilmedCamera,
@@ -18,9 +18,10 @@ from realitygap.testing import (
     photograph_sheet,
     save_film,
 )
-from realitygap.trials import PATH_PARTS, Card, DrivenTrial, WitnessOperator
+from realitygap.trials import PATH_PARTS, Card, DrivenTrial
 from realitygap.vision import SheetLayout
 from realitygap.world import paper_arena
+from tests.study.physical import Unattended
 
 from .robot_study import FAST, TEXT
 
@@ -29,7 +30,7 @@ STEPS = 40
 LEAD_S, STEP_S = 0.8, 0.5
 
 
-class _Uncounted(WitnessOperator):
+class _Uncounted(Unattended):
     """Has trials driven, keeps their lines, and counts none."""
 
     def __init__(self, folder: Path) -> None:
@@ -48,12 +49,8 @@ def drive_paths(root: Path, steps: int = STEPS) -> dict[int, np.ndarray]:
     """A study whose first sheet is full; (n, 3) where the robot was in each of its trials, by number."""
     folder = root / "by-robot"
     operator = _Uncounted(folder)
-    run_study(
-        parse_study(TEXT.format(steps=steps, blind="true"), "study.toml"),
-        folder,
-        port=FAST,
-        operator=operator,
-    )
+    study = parse_study(TEXT.format(steps=steps, blind="true"), "study.toml")
+    drive_study(study, FAST, folder, operator=operator)
     return operator.paths
 
 

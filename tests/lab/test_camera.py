@@ -6,29 +6,42 @@ import numpy as np
 import pytest
 
 from realitygap.errors import StudyError
-from realitygap.lab._camera import ProposingCamera, under_camera
+from realitygap.lab._camera import under_camera
 from realitygap.lab._counts import Counts
-from realitygap.lab._drawn import Draft
+from realitygap.lab._drawn import Draft, read_drawn
 from realitygap.lab._files import refuse_camera
+from realitygap.lab._page_operator import PageOperator
 from realitygap.lab._proposals import read_proposals
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
-from realitygap.study import run_study
-from realitygap.trials import WitnessOperator
+from realitygap.study import CameraObserver, drive_study
 from realitygap.world import paper_arena
 from tests.study.physical import small_study
-from tests.vision.test_track_live import _AboveStudy, _Beside
+from tests.vision.test_track_live import _AboveEmulator
 
 PORT = "emulator://s2?fluke=1&speed=off"
 
 
+class _Page:
+    """A page at which a person agrees to everything, and counts later."""
+
+    def say(self, what, **values):
+        pass
+
+    def ask(self, what, **values):
+        return {}
+
+    def at_once(self, what, act):
+        pass
+
+
 def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebody_has_looked(tmp_path):
     study, folder = small_study("coverage", steps="6"), tmp_path / "seen"
-    witness, said = WitnessOperator(), []
-    camera = ProposingCamera(
-        _Beside(witness), _AboveStudy(witness), paper_arena().grid, said.append, folder, "camera 2"
-    )
-    assert run_study(study, folder, port=PORT, operator=camera).physical.waiting
-    run_study(study, tmp_path / "true", port=PORT)
+    operator = PageOperator(_Page(), folder)
+    camera = _AboveEmulator(lambda: operator.observer.beside)
+    operator.observer, operator.proposer = CameraObserver(camera, paper_arena()), "camera 2"
+    assert drive_study(study, PORT, folder, operator=operator).physical.waiting
+    assert all(read_drawn(folder, number) for number in (1, 2, 3))
+    drive_study(study, PORT, tmp_path / "true")
     with Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as ledger:
         true = {row["trial"]: row for row in ledger.scores()}
     counts = Counts(folder, ResultsFolder.open(folder).description)
@@ -53,10 +66,10 @@ def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebod
 
 
 def test_a_camera_that_is_a_file_or_is_not_there_is_refused_in_words(tmp_path):
-    study, beside = small_study(), _Beside(WitnessOperator())
+    study, operator = small_study(), PageOperator(_Page(), tmp_path)
 
     def look(spec):
-        with under_camera(spec, study, tmp_path, beside, print, asks=True):
+        with under_camera(spec, study, operator, print, asks=True):
             pass
 
     with pytest.raises(StudyError, match="expected its number such as 0"):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -48,3 +51,37 @@ def test_a_question_that_is_asked_no_more_takes_none_with_it(job):
     ask(job, 2)
     job._hear({"kind": "answered", "number": 1})
     assert job.answer(2)
+
+
+INTERRUPTED_WHILE_IT_REPORTS = """
+from realitygap.lab import _channel, _work
+
+say = _channel.Channel.say
+
+def interrupted(self, kind, **values):
+    if kind == "error":
+        raise KeyboardInterrupt
+    say(self, kind, **values)
+
+_channel.Channel.say = interrupted
+raise SystemExit(_work.main())
+"""
+
+
+def test_process_interrupted_while_it_reports_a_failure_prints_no_traceback(tmp_path):
+    order = json.dumps({"work": "robot", "port": str(tmp_path / "no-such-port")})
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED_WHILE_IT_REPORTS],
+        stdin=subprocess.PIPE,  # open until the end: a process whose server is gone interrupts itself
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdin is not None
+        process.stdin.write(order + "\n")
+        process.stdin.flush()
+        assert process.wait(60) == 130
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+        assert process.stdout is not None
+        assert json.loads(process.stdout.read().splitlines()[-1]) == {"kind": "interrupted"}

@@ -65,11 +65,12 @@ def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
     page.get_by_text("4 of 72 cells").wait_for()
     lab.kill()
     lab.start()
+    lab.slow_counts()
     page = visit(PAGE)
     page.get_by_label("Your name").fill("anna")
     page.get_by_text("4 of 72 cells").wait_for()
     page.get_by_role("button", name="Enter this count").click()
-    page.get_by_text("4 cells are in the ledger").wait_for()
+    page.get_by_text("Trial 1: 4 cells are in the ledger").wait_for()
     assert states(lab) == ["scored", "driven"]
 
 

@@ -73,6 +73,7 @@ def test_report_is_written_and_works_in_its_sandbox(lab, visit):
     with page.context.expect_page() as opened:
         link.click()
     report, faults = opened.value, []
+    report.wait_for_load_state()
     report.on("console", lambda message: faults.append(message.text))
     report.on("pageerror", lambda error: faults.append(str(error)))
     report.reload()

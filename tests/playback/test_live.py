@@ -8,12 +8,13 @@ import pytest
 import realitygap.emulator  # noqa: F401 - makes its ports known
 from realitygap import Condition
 from realitygap.errors import RealityGapError
+from realitygap.platforms import JyroRobot
 from realitygap.playback import WatchedRobot, _live, play
 from realitygap.robots import Command, Robot
 from realitygap.robots.scribbler import Scribbler
 from realitygap.runs import genome_of, run_replicates
 from realitygap.testing import check_robot
-from realitygap.trials import JyroRobot, NoiseKey, drive_trial
+from realitygap.trials import NoiseKey, drive_trial
 from realitygap.world import Pose
 from tests.trials.fake_robot import FakeRobot
 
@@ -43,7 +44,7 @@ def test_a_network_drives_it_as_it_drives_the_robot_alone(heard):
     condition = Condition(name="novelty-50", selection="novelty", noise=0.5)
     row = run_replicates(condition, 3, 1).row(33, named=True)
     key = NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"])
-    platform = condition.jyro.model_copy(update={"precision": "double"})
+    platform = condition.on.model_copy(update={"precision": "double"})
     make = lambda: JyroRobot(platform, noise=0.5, noise_key=key)  # noqa: E731
     alone = make()
     network = genome_of(condition, row).network()

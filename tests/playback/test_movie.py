@@ -12,10 +12,10 @@ from PIL import Image
 from realitygap import Condition
 from realitygap.drawing import PENS
 from realitygap.errors import RealityGapError
+from realitygap.platforms import JyroPlatform
 from realitygap.playback import _movie, in_motion, save_movie
 from realitygap.playback._movie import picture_period
 from realitygap.playback._screen import TILE, TILE_VISITED, Screen, plain_style, ray_color, rgb
-from realitygap.robots import JyroPlatform
 from realitygap.runs import replay, run_replicates
 from realitygap.world import load_arena
 from realitygap.world._floor import BARE_FLOOR
@@ -94,7 +94,7 @@ def test_a_trial_of_87_steps_is_less_than_a_megabyte(tmp_path):
     condition = Condition(name="novelty-50", selection="novelty", noise=0.5)
     rows = run_replicates(condition, 3, 1)
     row = rows.row(int(rows["coverage_line"].arg_max()), named=True)
-    trial = in_motion(replay(condition, row), condition.arena.arena(), condition.jyro)
+    trial = in_motion(replay(condition, row), condition.arena.arena(), condition.on)
     path = save_movie(trial, tmp_path / "a.gif")
     assert path.stat().st_size < 600_000
     with Image.open(path) as image:

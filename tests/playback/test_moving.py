@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from realitygap import Condition
+from realitygap.platforms import JyroPlatform
 from realitygap.playback import RobotShape, first_visits, in_motion
 from realitygap.playback._moving import all_trials, nearness, placed, ray_ends
-from realitygap.robots import JyroPlatform
 from realitygap.runs import replay, run_replicates
 from realitygap.world import paper_arena
 
@@ -43,7 +43,7 @@ def test_cells_fill_in_as_the_trial_counted_them():
     condition = Condition(name="novelty-50", selection="novelty", noise=0.5)
     for row in run_replicates(condition, 3, 1).iter_rows(named=True):
         trajectory = replay(condition, row)
-        trial = in_motion(trajectory, condition.arena.arena(), condition.jyro)
+        trial = in_motion(trajectory, condition.arena.arena(), condition.on)
         assert list(trial.cells) == row["cells"]
         shares = [trial.at(k * trial.step_s).n_cells for k in range(trial.n_steps + 1)]
         assert shares == sorted(shares)

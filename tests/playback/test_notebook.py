@@ -6,7 +6,7 @@ import pytest
 
 CELLS = {
     "trials": "import realitygap\nfrom tests.playback.trials import straight\nrealitygap.watch(straight())",
-    "robot": "from realitygap.trials import JyroRobot\nrobot = realitygap.watch(JyroRobot(), speed=4)\nrobot",
+    "robot": "from realitygap.platforms import JyroRobot\nrobot = realitygap.watch(JyroRobot(), speed=4)\nrobot",
     "drive": "from realitygap.robots import Command\nrobot.reset()\nfor _ in range(30):\n"
     "    robot.observe()\n    robot.drive(Command(0.3, 0.2))\nrobot.stop()",
     "after": "print(robot.trial.n_steps, len(robot.widget.trials[0]['poses']), robot.widget.live)",

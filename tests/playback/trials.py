@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from realitygap.platforms import JyroPlatform
 from realitygap.playback import MovingTrial, in_motion
-from realitygap.robots import JyroPlatform
 from realitygap.world import paper_arena
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from realitygap.records import COLUMNS, EXTRA_SCHEMA, SCHEMA, ResultsFolder, column_table, list_column
 from realitygap.records._columns import check_rows
+from realitygap.records._digest import rows_digest
 from tests.records.rows import make_rows
 
 
@@ -122,3 +123,22 @@ def test_extra_columns_are_kept_digested_and_null_where_a_condition_has_none(tmp
     wrong = extra.with_columns(pl.col("drawn").list.first())
     with pytest.raises(ValueError, match="'drawn' is Float64, expected List"):
         check_rows(wrong, "sim", 0)
+
+
+def test_rows_with_genomes_of_partners_have_a_digest_and_are_checked():
+    rows = make_rows(n=1)
+    genomes = rows["genome"].to_list()
+    partners = pl.Series("partners", [genomes[:2]] * rows.height, EXTRA_SCHEMA["partners"])
+    whole = rows.with_columns(partners)
+    check_rows(whole, "coverage", 0)
+    changed = [{**genomes[1], "weight": [0.5 for _ in genomes[1]["weight"]]}, genomes[0]]
+    others = [
+        whole.with_columns(pl.Series("partners", [each] * rows.height, EXTRA_SCHEMA["partners"]))
+        for each in (genomes[1::-1], genomes[:1], changed)
+    ]
+    assert len({rows_digest(frame) for frame in (rows, whole, *others)}) == 5
+    lacking = [{**genomes[0], "weight": None}, genomes[1]]
+    with pytest.raises(ValueError, match=r"partners.weight' holds nulls"):
+        check_rows(
+            whole.with_columns(pl.Series("partners", [lacking] * rows.height, partners.dtype)), "coverage", 0
+        )

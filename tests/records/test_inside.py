@@ -23,8 +23,8 @@ from realitygap.records import (
     refuse_links_in,
     write_whole,
 )
-from realitygap.study._closing_plan import SMALL, adopt_plan
-from realitygap.study._transfer import TransferPlan, _adopt
+from realitygap.study._closing.plan import SMALL, adopt_plan
+from realitygap.study._transfer.strategies import TransferPlan, _adopt
 from tests.formats import FORMATS
 from tests.records.rows import DESCRIPTION, HASH, make_rows
 from tests.records.test_ledger import new_ledger

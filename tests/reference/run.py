@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome, PaperArchive, Population
+from realitygap.platforms import trace_genome, try_genomes
 from realitygap.runs import Condition
-from realitygap.trials import NoiseKey, trace_genome, try_genomes
+from realitygap.trials import NoiseKey
 
 from .coverage import cell_of
 from .novelty import NearestArchive, paper_distance, points_of
@@ -77,7 +78,7 @@ def run(condition: Condition, replicate: int) -> Run:
     for generation in range(condition.neat.generations):
         genomes = population.ask()
         noise = {"noise": condition.noise, "noise_key": NoiseKey(condition.key, replicate, generation)}
-        batch = try_genomes(condition.jyro, arena, genomes, **noise)
+        batch = try_genomes(condition.on, arena, genomes, **noise)
         cells = [batch.behavior(k).tolist() for k in range(len(genomes))]
         fitness = (batch.coverage_ends if condition.task.cells == "ends" else batch.coverage_line).tolist()
         novelty = [math.nan] * len(genomes)
@@ -86,7 +87,7 @@ def run(condition: Condition, replicate: int) -> Run:
             if condition.task.cells == "ends":
                 keys = [NoiseKey(condition.key, replicate, generation, k) for k in range(len(genomes))]
                 tracks = [
-                    trace_genome(condition.jyro, arena, genome, noise=condition.noise, noise_key=key)
+                    trace_genome(condition.on, arena, genome, noise=condition.noise, noise_key=key)
                     for genome, key in zip(genomes, keys, strict=True)
                 ]
                 behaviors = [cells_at_ends(track.poses, condition) for track in tracks]

@@ -1,6 +1,6 @@
 """What Jyro 0.3.2 does with a scene, written for the eye: one line, one ray, one robot at a time.
 
-The reference of `realitygap.kernels._scene`. It takes a `Case` and gives one `Row` per step and robot.
+The reference of `realitygap.kernels.jyro.scene`. It takes a `Case` and gives one `Row` per step and robot.
 Python's own `round` does the rounding. Headings are Jyro's: 0 faces +y, counter-clockwise.
 """
 

@@ -42,6 +42,24 @@ def infrared(distances: Sequence[float], reach: float, amplitude: float, decay: 
     return amplitude * returned(distances, reach, decay, [1.0] * len(distances))
 
 
+def lorentz(distance: float, reach: float, amplitude: float, half_width: float, peak: float) -> float:
+    """Enki's law of one ray: m = amplitude, c = half_width^2, x0 = peak."""
+    if distance >= reach:
+        return 0.0
+    if distance < peak:
+        return amplitude
+    return amplitude * (half_width**2 - peak**2) / (distance**2 - 2 * peak * distance + half_width**2)
+
+
+def enki(distances: Sequence[float], cone: float, *numbers: float) -> float:
+    """One ray, or three from right to left as Enki adds them up; `numbers` are those of `lorentz` in order."""
+    if len(distances) == 1:
+        return lorentz(distances[0], *numbers)
+    right, middle, left = distances
+    straight = lorentz(middle, *numbers) - 2 * lorentz(middle / math.cos(cone), *numbers)
+    return lorentz(right, *numbers) + lorentz(left, *numbers) + straight
+
+
 def at_a_slant(cosines: Sequence[float], incidence: float) -> list[float]:
     return [c / (c + incidence * (1 - c)) for c in cosines]
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from realitygap.robots import JyroPlatform
+from realitygap.platforms import JyroPlatform
 from realitygap.world import Arena
 
 from .coverage import Cell, cell_of, cells_on_line, first_visits

@@ -8,6 +8,7 @@ import pytest
 
 from realitygap.errors import RecordError
 from realitygap.records import ResultsFolder
+from realitygap.report import write_report
 from realitygap.study import parse_study, run_study
 
 STUDY = """
@@ -62,6 +63,12 @@ cells = "ends"
 def tiny_study(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
     """A study of four conditions that was really run: 7 runs of 3 generations of 8."""
     return run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder
+
+
+@pytest.fixture(scope="session")
+def tiny_html(tiny_study: ResultsFolder) -> str:
+    """The page of that study, which takes two seconds."""
+    return write_report(tiny_study).read_text("utf-8")
 
 
 @pytest.fixture

@@ -3,10 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realitygap.platforms import trace_genome
 from realitygap.report import retry_champions
 from realitygap.report._champions import FRESH_TRIALS
 from realitygap.runs import Condition, genome_of, replay
-from realitygap.trials import NoiseKey, trace_genome
+from realitygap.trials import NoiseKey
 from tests.report.results import describe, random_runs, settings, write_results
 
 
@@ -29,7 +30,7 @@ def test_champions_are_the_best_of_each_run_and_tried_anew(tiny_study):
     assert replay(condition, best).coverage_line == novelty.reported[4]
     for repeat in (1, 20):
         fresh = trace_genome(
-            condition.jyro,
+            condition.on,
             condition.arena.arena(),
             genome_of(condition, best),
             noise=condition.noise,

@@ -19,8 +19,7 @@ from realitygap.report import (
     write_report,
 )
 from realitygap.study import run_study
-from realitygap.trials import WitnessOperator
-from tests.study.physical import drive, small_study
+from tests.study.physical import Unattended, drive, small_study
 
 MORE = """
 [[condition]]
@@ -52,7 +51,7 @@ def folder(tmp_path_factory):
     return path
 
 
-class VoidsOne(WitnessOperator):
+class VoidsOne(Unattended):
     """Aborts the second trial, once."""
 
     n_seen = 0
@@ -63,7 +62,7 @@ class VoidsOne(WitnessOperator):
         return self.n_seen == 6
 
 
-class Leaves(WitnessOperator):
+class Leaves(Unattended):
     """Leaves the last trials of a sheet unscored."""
 
     def drawn(self, card, driven):
@@ -127,7 +126,7 @@ def test_a_correction_shows_in_reports(folder, tmp_path):
     assert "1 corrected afterwards" in page
 
 
-class Person(WitnessOperator):
+class Person(Unattended):
     """Counts cells on paper, as somebody who cannot see where steps end."""
 
     def drawn(self, card, driven):
@@ -145,6 +144,7 @@ def test_counts_of_a_person_have_no_ends_and_no_paths(tmp_path):
     assert "A dot in the color of its pen stands in each cell" in caption
     page = write_report(tmp_path / "small").read_text()
     assert "the lines themselves are on paper" in page
+    assert "realitygap drive STUDY.toml --port PORT --seed 1 --replicates 1 --out DIR" in page
     assert not re.search(r"[>\s]nan[<\s]", page, re.IGNORECASE)
     assert len(ResultsFolder.open(tmp_path / "small").digest()) == 64
 

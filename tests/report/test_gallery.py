@@ -14,10 +14,9 @@ import pytest
 from realitygap.drawing import PENS, Disc, Line, Text
 from realitygap.errors import RecordError
 from realitygap.evolution import network_picture
+from realitygap.platforms import JyroPlatform
 from realitygap.report import (
     NARROW,
-    draw_arena_and_robot,
-    draw_better_individuals,
     draw_individuals,
     draw_lineage,
     draw_networks,
@@ -26,17 +25,28 @@ from realitygap.report import (
     save_drawing,
     write_report,
 )
-from realitygap.report._drawing import inline
+from realitygap.report._arena_figure import draw_tally_arena
+from realitygap.report._drawing import WIDE, inline
 from realitygap.report._export import tables_of
-from realitygap.report._individuals_figure import _moved_apart
+from realitygap.report._individuals_figure import _moved_apart, draw_tally_better
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._tally import read_tally
-from realitygap.robots import JyroPlatform
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.study import parse_study, run_study
 from realitygap.world import arena_picture, paper_arena
 from tests.report.results import describe, random_runs, write_results
+
+
+def draw_arena_and_robot(folder, condition=None, *, width=WIDE):
+    tally = read_tally(folder)
+    return draw_tally_arena(tally, tally.name_of(condition), widths=[width])[0]
+
+
+def draw_better_individuals(folder, condition=None, replicate=None, *, width=WIDE):
+    tally = read_tally(folder)
+    return draw_tally_better(tally, tally.name_of(condition), replicate, widths=[width])[0]
+
 
 ALL = [
     draw_arena_and_robot,
@@ -278,9 +288,8 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     assert rows[0]["The paper: run 0"] == "0.154"
 
 
-@pytest.mark.slow
-def test_a_page_without_export_names_no_files(tiny_study, tmp_path):
-    assert "figures.txt" not in write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
+def test_a_page_without_export_names_no_files(tiny_html):
+    assert "figures.txt" not in tiny_html
 
 
 @pytest.mark.slow
@@ -415,8 +424,6 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
     assert f"generation 1: node h{grown['genome']['hidden'][0]}" in shown.alt
 
 
-@pytest.mark.slow
-def test_the_page_shows_the_lineage_below_the_species(tiny_study, tmp_path):
-    page = write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")
-    assert page.index('id="figure-11"') < page.index('id="figure-12"')
-    assert "Ancestors of coverage, run" in page
+def test_the_page_shows_the_lineage_below_the_species(tiny_html):
+    assert tiny_html.index('id="figure-11"') < tiny_html.index('id="figure-12"')
+    assert "Ancestors of coverage, run" in tiny_html

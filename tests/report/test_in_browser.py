@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 
 from realitygap.report import _replay, write_report
 from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import read_tally, settings_of
 from realitygap.runs import Condition, replay
+from realitygap.study import parse_study, run_study
 from realitygap.trials import Trajectory
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
@@ -56,8 +58,10 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def page_file(tiny_study, tmp_path_factory) -> Path:
-    return write_report(tiny_study, tmp_path_factory.mktemp("page") / "report.html")
+def page_file(tiny_html, tmp_path_factory) -> Path:
+    file = tmp_path_factory.mktemp("page") / "report.html"
+    file.write_text(tiny_html, "utf-8")
+    return file
 
 
 @pytest.fixture
@@ -563,3 +567,43 @@ def test_hostile_names_stay_text(show, tiny_study, monkeypatch, tmp_path):
     page.evaluate("link => { location.hash = link; }", link)
     page.wait_for_function("() => document.querySelectorAll('.robot').length == 4")
     assert page.locator("#replay-rows .trial").all_text_contents() == before
+
+
+SEVERAL = """
+[study]
+name = "several"
+replicates = 1
+
+[arena]
+robots = 3
+
+[neat]
+population = 4
+generations = 2
+
+[platform.sim]
+steps = 12
+
+[[condition]]
+name = "one"
+platform = "sim"
+"""
+
+
+def test_all_robots_of_a_trial_are_replayed(show, tmp_path) -> None:
+    folder = run_study(parse_study(SEVERAL, "several.toml"), tmp_path / "r").folder
+    condition = Condition.from_settings("one", dict(folder.description["conditions"][0]["settings"]))
+    row = next(folder.read("one").filter(pl.col("generation") == 1).iter_rows(named=True))
+    trial = replay(condition, row)
+    page = show("#replay=one/0/1/0@12", file=write_report(folder))
+    robots = page.locator(".robot")
+    assert robots.count() == 3
+    assert page.locator(".robot text, #replay-rows tr").count() == 1
+    places = [
+        tuple(map(float, re.findall(r"-?[\d.]+", robots.nth(k).get_attribute("transform"))[:2]))
+        for k in range(3)
+    ]
+    for k, robot in enumerate(trial.robots):
+        moved = np.subtract(robot.poses[-1, :2], trial.poses[-1, :2]) * [1000, -1000]
+        assert np.subtract(places[k], places[0]) == pytest.approx(moved, abs=0.2)
+    assert numbers(page)[0][10:] == [round(trial.coverage_line, 3), round(trial.coverage_ends, 3)]

@@ -8,15 +8,15 @@ from realitygap.errors import RecordError
 from realitygap.playback import MovingTrial
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.report import choose_moving, watch, write_movie
-from realitygap.study import run_study
+from realitygap.study import drive_study
 from tests.study.physical import small_study
 
 
 @pytest.fixture(scope="module")
 def emulated(tmp_path_factory):
     study = small_study("coverage", steps="12")
-    return run_study(
-        study, tmp_path_factory.mktemp("emulated") / "a", port="emulator://s2?fluke=2&speed=off"
+    return drive_study(
+        study, "emulator://s2?fluke=2&speed=off", tmp_path_factory.mktemp("emulated") / "a"
     ).folder
 
 

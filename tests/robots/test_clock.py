@@ -37,5 +37,5 @@ def test_ctrl_c_that_comes_just_before_a_wait_is_heard_soon(monkeypatch):
     monkeypatch.setattr(module.time, "sleep", unaware)
     since = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        SystemClock().sleep(5.0)
-    assert time.monotonic() - since < 2.5
+        SystemClock().sleep(60.0)
+    assert time.monotonic() - since < 30.0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from realitygap.errors import ProtocolError
 from realitygap.robots.scribbler import _codec as codec
-from realitygap.robots.scribbler._opcodes import ROBOT_ANSWERS, S2_ANSWERS, Op
+from realitygap.robots.scribbler.opcodes import ROBOT_ANSWERS, S2_ANSWERS, Op
 
 from .peers import INFOS
 

@@ -7,6 +7,7 @@ import gc
 import os
 import random
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -31,9 +32,11 @@ SERVE = {"pty": serve_pty, "tcp": serve_tcp}
 SETUPS = [("s1", "none"), ("s1", "1"), ("s2", "none"), ("s2", "1"), ("s2", "2")]
 STILL = (0.0, 0.0)
 KILLED_S = 0.5
-"""Time after which the motors of a killed program stand [s]."""
+"""Median time after which the motors of a killed program stand [s]."""
 FROZEN_S = 1.5
-"""Time after which those of a frozen program do [s]."""
+"""Median time after which those of a frozen program do [s]."""
+BUSY_S = 10.0
+"""Longest time that one of them may take on a machine with other work [s]."""
 
 DRIVE = """
 import sys, time
@@ -97,11 +100,11 @@ def loop(robot: Scribbler) -> None:
         robot.drive(Command(0.5, 0.1))
 
 
-def stands_within(server: Server, seconds: float) -> float:
-    """Wait until the motors are off; return how long that took, and fail if it took longer than this [s]."""
+def time_to_stand(server: Server) -> float:
+    """Wait until the motors are off, and return how long that took [s]."""
     since = time.monotonic()
     while server.witness.motors() != STILL:
-        assert time.monotonic() - since < seconds, "The motors are still running."
+        assert time.monotonic() - since < BUSY_S, "The motors are still running."
         time.sleep(0.005)
     return time.monotonic() - since
 
@@ -119,19 +122,21 @@ def is_alive(process: int) -> bool:
 def kill_at_random(server: Server, n_kills: int, number: int, seconds: float) -> None:
     """Kill, or freeze, programs that drive, at random moments; each time the motors stand soon."""
     rng = random.Random(n_kills)
+    times = []
     for _ in range(n_kills):
         with fork(loop, server.name) as child:
             time.sleep(rng.uniform(0, 0.3))
             os.kill(child, number)
-            stands_within(server, seconds)
+            times.append(time_to_stand(server))
             time.sleep(0.1)
             assert server.witness.motors() == STILL
+    assert statistics.median(times) < seconds
 
 
 @pytest.mark.parametrize("channel", SERVE)
 def test_motors_stop_after_kill(channel):
     with SERVE[channel](Emulator("s2", "1")) as server:
-        kill_at_random(server, 2, signal.SIGKILL, KILLED_S)
+        kill_at_random(server, 5, signal.SIGKILL, KILLED_S)
 
 
 @pytest.mark.long
@@ -152,23 +157,28 @@ def test_motors_stop_after_kill_in_the_middle_of_a_packet(model, fluke):
         os.write(robot.port.fileno(), bytes([109, 200, 200, 0, 0, 0, 0, 0, 0])[:n_bytes])
         os.kill(os.getpid(), signal.SIGKILL)
 
+    times = []
     for n_bytes in range(1, 9):
         with serve_pty(Emulator(model, fluke)) as server:
             with fork(tear, server.name):
-                stands_within(server, KILLED_S)
+                times.append(time_to_stand(server))
             if fluke == "1" and n_bytes == 4:  # a Fluke 1 never forgets the rest of a packet
                 with Scribbler(server.name) as robot:
                     assert robot.info.model == model
                 assert server.witness.motors() == STILL
+    assert statistics.median(times) < KILLED_S
 
 
 def test_motors_stop_after_kill_while_a_forked_child_holds_the_pipe():
     """A worker that was forked inherits the pipe, so that its end never comes."""
-    fork = "import os\nif os.fork() == 0:\n    time.sleep(2)\n    os._exit(0)\n"
+    fork = "import os\nif os.fork() == 0:\n    time.sleep(60)\n    os._exit(0)\n"
     with serve_pty(Emulator("s2", "1")) as server, program(DRIVE + fork + LOOP, server.name) as (process, _):
         time.sleep(0.2)
         process.kill()
-        stands_within(server, KILLED_S)
+        try:
+            time_to_stand(server)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)  # the child
 
 
 def test_next_program_waits_for_the_guardian_of_a_killed_one():
@@ -221,7 +231,7 @@ robot.close()
     with SERVE[channel](Emulator("s2", "1")) as server:
         with program(DRIVE + report, server.name) as (process, _):
             process.send_signal(signal.SIGSTOP)
-            stands_within(server, FROZEN_S)
+            time_to_stand(server)
             process.send_signal(signal.SIGCONT)
             said = process.stdout.readline()
             assert "This program was silent for 1 s, so the motors were stopped: '" in said
@@ -233,10 +243,10 @@ robot.close()
 
 def test_motors_stop_while_native_code_keeps_all_threads_from_running():
     busy = (
-        "import ctypes\nctypes.PyDLL(None).sleep(3)\n"  # PyDLL does not release the lock of the interpreter
+        "import ctypes\nctypes.PyDLL(None).sleep(60)\n"  # PyDLL does not release the lock of the interpreter
     )
     with serve_pty(Emulator("s2", "1")) as server, program(DRIVE + busy, server.name):
-        stands_within(server, FROZEN_S)
+        time_to_stand(server)
 
 
 def test_watchdog_that_speaks_first_does_not_hide_that_the_program_was_frozen():
@@ -250,7 +260,7 @@ except Exception as error:
     text = (DRIVE + report).replace("step_s=0.05", "step_s=0.05, watchdog_s=1.0")
     with serve_pty(Emulator("s2", "1")) as server, program(text, server.name) as (process, _):
         process.send_signal(signal.SIGSTOP)
-        stands_within(server, FROZEN_S)
+        time_to_stand(server)
         process.send_signal(signal.SIGCONT)
         assert "This program was silent for 1 s" in process.stdout.readline()
 
@@ -260,7 +270,7 @@ def test_guardian_that_is_killed_is_replaced_and_the_motors_stop():
         robot.drive(Command(1, 0))
         first = robot.link.guardian_id
         os.kill(first, signal.SIGKILL)
-        stands_within(server, KILLED_S)
+        time_to_stand(server)
         with pytest.raises(
             RobotError, match="The process that guards the robot ended, so the motors were stopped"
         ):
@@ -287,7 +297,7 @@ def test_ctrl_c_for_the_whole_group_lets_the_program_stop_its_robot():
         with program(DRIVE + LOOP, server.name) as (process, guardian):
             os.killpg(process.pid, signal.SIGINT)
             assert process.wait(10) != 0
-            stands_within(server, KILLED_S)
+            time_to_stand(server)
             assert not is_alive(guardian)
         with program(DRIVE + LOOP, server.name) as (process, guardian):
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -295,7 +305,7 @@ def test_ctrl_c_for_the_whole_group_lets_the_program_stop_its_robot():
             time.sleep(0.1)
             assert is_alive(guardian)
             process.kill()
-            stands_within(server, KILLED_S)
+            time_to_stand(server)
 
 
 def test_closed_robots_leave_no_process_and_no_descriptor():

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError
+from realitygap.platforms import SimTwin, open_twin
 from realitygap.robots import Command
 from realitygap.robots.twin import FAMILIES, TwinModel, TwinRobot, sample_twin
 from realitygap.testing import check_robot
-from realitygap.trials import SimTwin, open_twin
 from realitygap.world import Arena, Grid, Obstacle, Pose, load_arena, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -105,7 +105,8 @@ def test_looking_changes_nothing():
 
 
 def test_same_has_the_trials_of_sim_with_random_numbers_of_its_own():
-    from realitygap.trials import NoiseKey, SimRobot
+    from realitygap.platforms import SimRobot
+    from realitygap.trials import NoiseKey
 
     twin = open_twin(sample_twin("same", 4), paper_arena(), number=2)
     assert isinstance(twin, SimTwin)

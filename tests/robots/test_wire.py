@@ -105,15 +105,15 @@ CALLS = [
         "s2+fluke1",
         lambda r: r.observe(),
         [*FLUKE, echoed(79, answer=b"\x00")],
-        ((0.0, 0.5, 1.0), False, (0.0, 850.0, 6400.0)),
+        ((0.0, 0.5, 1.0), False, (0.0, 850.0, 6400.0), {}),
     ),
     (
         "s2",
         lambda r: r.observe(),
         [echoed(175, 0, answer=b"\x63"), echoed(175, 1, answer=b"\x00"), echoed(79, answer=b"\x01")],
-        ((0.0, 1.0), True, (99.0, 0.0)),
+        ((0.0, 1.0), True, (99.0, 0.0), {}),
     ),
-    ("s1", lambda r: r.observe(), [echoed(66, answer=bytes([0b01100]))], ((1.0, 0.0), True, (0.0, 1.0))),
+    ("s1", lambda r: r.observe(), [echoed(66, answer=bytes([0b01100]))], ((1.0, 0.0), True, (0.0, 1.0), {})),
     ("s1", lambda r: r.drive(Command(0.5, 0.25)), [echoed(109, 175, 125)], None),
     ("s1", lambda r: r.drive(Command(1.0, -0.5)), [echoed(109, 150, 200)], None),
 ]

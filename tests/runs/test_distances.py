@@ -49,7 +49,8 @@ def test_asking_and_telling_gives_the_rows_of_a_whole_run(name: str) -> None:
     for generation in range(condition.neat.generations):
         of_it = rows.filter(pl.col("generation") == generation)
         assert [asked.record for asked in evolution.ask()] == of_it["genome"].to_list()
-        assert list(evolution.tell(of_it["cells"].to_list()).novelty) == of_it["novelty"].to_list()
+        scores = of_it["coverage_line"].to_list()
+        assert list(evolution.tell(scores, of_it["cells"].to_list()).novelty) == of_it["novelty"].to_list()
 
 
 def test_a_distance_other_than_the_papers_is_another_condition() -> None:

@@ -3,8 +3,9 @@
 import polars as pl
 import pytest
 
+from realitygap.platforms import try_genomes
 from realitygap.runs import Condition, Evolution, run_replicates
-from realitygap.trials import NoiseKey, try_genomes
+from realitygap.trials import NoiseKey
 
 
 def rows_by_asking(condition: Condition, replicate: int) -> list[dict]:
@@ -13,14 +14,14 @@ def rows_by_asking(condition: Condition, replicate: int) -> list[dict]:
     for generation in range(condition.neat.generations):
         asked = evolution.ask()
         batch = try_genomes(
-            condition.jyro,
+            condition.on,
             condition.arena.arena(),
             [each.genome for each in asked],
             noise=condition.noise,
             noise_key=NoiseKey(condition.key, replicate, generation),
         )
         cells = [batch.behavior(k).tolist() for k in range(len(asked))]
-        told = evolution.tell(cells)
+        told = evolution.tell(batch.coverage_line.tolist(), cells)
         rows += [
             {
                 "species": each.species,
@@ -60,11 +61,14 @@ def test_the_order_of_cells_within_a_trial_does_not_matter():
     condition = Condition(name="a", selection="novelty", platform="scribbler")
     one, other = Evolution(condition, 0), Evolution(condition, 0)
     cells = [[k, k + 12, 2 * k + 24] for k in range(8)]
-    assert one.tell(cells) == other.tell([each[::-1] for each in cells])
+    scores = [0.1] * 8
+    assert one.tell(scores, cells) == other.tell(scores, [each[::-1] for each in cells])
     assert [each.record for each in one.ask()] == [each.record for each in other.ask()]
 
 
-def test_cells_of_too_few_individuals_are_refused():
+def test_scores_and_cells_of_too_few_individuals_are_refused():
     evolution = Evolution(Condition(name="a", platform="scribbler"), 0)
     with pytest.raises(ValueError, match="cells of 1 individuals, expected 8"):
-        evolution.tell([[1]])
+        evolution.tell([0.5] * 8, [[1]])
+    with pytest.raises(ValueError, match="scores of 1 individuals, expected 8"):
+        evolution.tell([0.5], [[1]] * 8)

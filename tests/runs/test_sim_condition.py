@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
             {"arena": {"preset": "goal"}, "task": {"kind": "goal", "inputs": ["goal_sector.4"]}},
             "goal_sector.4 is missing",
         ),
-        ({"platform": "jyro", "task": {"kind": "avoid"}}, "Choose platform 'sim'"),
+        ({"platform": "jyro", "task": {"kind": "light"}}, "light.0 to light.1 are missing"),
     ],
 )
 def test_a_mistake_is_said(values: dict[str, Any], said: str) -> None:

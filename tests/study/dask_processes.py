@@ -1,8 +1,12 @@
-"""A scheduler and workers as processes of their own, on the loopback interface, ended by their numbers."""
+"""A scheduler and workers as processes of their own, on the loopback interface, ended by their numbers.
+
+Most are forked from a process that has imported Dask, which takes two seconds of a processor otherwise.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import signal
 import socket
@@ -12,7 +16,30 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import distributed.cli.dask_scheduler
+import distributed.cli.dask_worker  # noqa: F401  # imported once, for all that are forked
 import psutil
+
+import realitygap.study._order  # noqa: F401
+from tests.forks import fork_context
+
+
+class Forked:
+    """A process that was forked, with the methods of `subprocess.Popen` that are used here."""
+
+    def __init__(self, *order: object) -> None:
+        self._process = fork_context().Process(target=_run, args=order)
+        self._process.start()
+        self.pid = self._process.pid
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self) -> None:
+        self._process.join()
+
+
+Process = subprocess.Popen | Forked
 
 
 def free_port() -> int:
@@ -28,7 +55,7 @@ def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> None:
         time.sleep(0.01)
 
 
-def kill(process: subprocess.Popen) -> None:
+def kill(process: Process) -> None:
     """End a process and its children without warning."""
     with contextlib.suppress(psutil.NoSuchProcess):
         family = psutil.Process(process.pid)
@@ -43,7 +70,7 @@ class DaskProcesses:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._started: list[subprocess.Popen] = []
+        self._started: list[Process] = []
         self.port = free_port()
         self.address = f"tcp://127.0.0.1:{self.port}"
 
@@ -54,38 +81,50 @@ class DaskProcesses:
         for process in self._started:
             kill(process)
 
-    def scheduler(self, prelude: str = "") -> subprocess.Popen:
-        process = self._start(
-            "scheduler", prelude, ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"]
-        )
+    def scheduler(self, prelude: str = "", *, new: bool = False) -> Process:
+        options = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"]
+        process = self._start("scheduler", prelude, options, new=new)
         wait_until(self._answers)
         return process
 
     def worker(
-        self, prelude: str = "", *, nanny: bool = False, threads: int = 1, path: Path | None = None
-    ) -> subprocess.Popen:
-        """A worker; `prelude` is Python that it runs first, `path` goes before its other packages."""
+        self,
+        prelude: str = "",
+        *,
+        nanny: bool = False,
+        threads: int = 1,
+        path: Path | None = None,
+        new: bool = False,
+    ) -> Process:
+        """A worker, as a new Python if so ordered.
+
+        `prelude` is Python that it runs first, `path` goes before its other packages.
+        """
         options = ["--nthreads", str(threads), "--host", "127.0.0.1", "--no-dashboard"]
         options += ["--local-directory", str(self._folder), "--death-timeout", "60"]
         options += [] if nanny else ["--no-nanny"]
-        return self._start("worker", prelude, [self.address, *options], path)
+        is_new = new or nanny or path is not None
+        return self._start("worker", prelude, [self.address, *options], path, new=is_new)
 
     def _start(
-        self, kind: str, prelude: str, arguments: list[str], path: Path | None = None
-    ) -> subprocess.Popen:
-        code = f"import sys\n{prelude}\nfrom distributed.cli.dask_{kind} import main\nmain()"
+        self, kind: str, prelude: str, arguments: list[str], path: Path | None = None, *, new: bool
+    ) -> Process:
         environment = dict(os.environ)
         if path is not None:
             environment["PYTHONPATH"] = str(path)
-        log = (self._folder / f"{kind}-{len(self._started)}.log").open("wb")
-        with log:
-            process = subprocess.Popen(
-                [sys.executable, "-c", code, *arguments],
-                cwd=self._folder,
-                env=environment,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-            )
+        log = self._folder / f"{kind}-{len(self._started)}.log"
+        if new:
+            code = f"import sys\n{prelude}\nfrom distributed.cli.dask_{kind} import main\nmain()"
+            with log.open("wb") as file:
+                process: Process = subprocess.Popen(
+                    [sys.executable, "-c", code, *arguments],
+                    cwd=self._folder,
+                    env=environment,
+                    stdout=file,
+                    stderr=subprocess.STDOUT,
+                )
+        else:
+            process = Forked(kind, prelude, arguments, environment, self._folder, log)
         self._started.append(process)
         return process
 
@@ -93,3 +132,17 @@ class DaskProcesses:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
             return True
         return False
+
+
+def _run(
+    kind: str, prelude: str, arguments: list[str], environment: dict[str, str], folder: Path, log: Path
+) -> None:
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(folder)
+    file = os.open(log, os.O_WRONLY | os.O_CREAT)
+    for stream in (1, 2):
+        os.dup2(file, stream)
+    sys.argv = [f"dask-{kind}", *arguments]
+    exec(prelude, {})
+    importlib.import_module(f"distributed.cli.dask_{kind}").main()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.study import PhysicalResult, Study, drive_study, parse_study
-from realitygap.trials import Operator, WitnessOperator
+from realitygap.trials import Operator, WitnessObserver
 from tests.trials.fake_robot import FakeRobot
 
 SMALL = """
@@ -29,6 +30,17 @@ platform = "scribbler"
 """
 
 
+class Unattended(Operator):
+    """Nobody beside an emulated robot, which its witness observes."""
+
+    def __init__(self, witness: Any = None, **options: Any) -> None:
+        super().__init__(WitnessObserver(witness), **options)
+
+    @property
+    def witness(self) -> Any:
+        return self.observer.witness
+
+
 def small_study(selection: str = "coverage", more: str = "", **changes: str) -> Study:
     text = SMALL.format(selection=selection) + more
     for old, new in changes.items():
@@ -45,18 +57,15 @@ def drive(
     robot: FakeRobot | None = None,
 ) -> PhysicalResult:
     """Carry out a study in a folder, begun or new, with a fake robot that is its own witness."""
-    folder = (
-        ResultsFolder.open(path)
-        if (path / "study.json").exists()
-        else ResultsFolder.create(path, study.description())
-    )
-    return drive_study(
+    result = drive_study(
         study,
-        folder,
-        operator or WitnessOperator(),
-        lambda platform: robot or FakeRobot(platform.wait_s, fault=fault),
         "fake",
+        path,
+        operator=operator or Unattended(),
+        open_robot=lambda platform: robot or FakeRobot(platform.wait_s, fault=fault),
     )
+    assert result.physical is not None
+    return result.physical
 
 
 def scored(path: Path) -> list[tuple]:

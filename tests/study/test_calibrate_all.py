@@ -10,10 +10,9 @@ from realitygap.calibration import (
     values_of,
 )
 from realitygap.evolution import Genome
-from realitygap.robots import SimPlatform
+from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study import calibrate_all
-from realitygap.study._calibrate_all import all_plans
-from realitygap.trials import SimEnsemble, SimTarget
+from realitygap.study._calibrate.whole import all_plans
 from realitygap.world import paper_arena
 
 pytestmark = pytest.mark.slow

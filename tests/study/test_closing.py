@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RecordError
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.report import goal_table, write_closing_page
-from realitygap.robots import SimPlatform
 from realitygap.study import SMALL, ClosingPlan, summarize_closing
-from realitygap.study._closing_plan import adopt_plan
-from realitygap.study._closing_summary import is_met, median_interval, share_interval
-from realitygap.study._closing_twin import ClosingTwin, held_out
-from realitygap.trials import SimTarget, TrialPlan
+from realitygap.study._closing.plan import adopt_plan
+from realitygap.study._closing.summary import is_met, median_interval, share_interval
+from realitygap.study._closing.twin import ClosingTwin, held_out
+from realitygap.trials import TrialPlan
 from realitygap.world import Calibration, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -160,7 +160,7 @@ def test_a_killed_study_leaves_no_process_behind(tmp_path):
             return False
 
     pytest.importorskip("mujoco", reason="twins need the extra twin")
-    command = [sys.executable, "-m", "realitygap", "run", "closing-the-gap", "--small", "--threads", "2"]
+    command = [sys.executable, "-m", "realitygap", "closing-the-gap", "--small", "--processes", "2"]
     study = subprocess.Popen([*command, "--out", str(tmp_path / "results")], stdout=subprocess.DEVNULL)
     began = time.monotonic()
     below = []
@@ -234,7 +234,7 @@ def test_a_folder_of_another_plan_is_left_alone_and_more_twins_extend_it(tmp_pat
         adopt_plan(tmp_path, replace(PLAN, observations=("cells",)))
     adopt_plan(tmp_path, replace(PLAN, twins=3))
     assert json.loads((tmp_path / "plan.json").read_text())["twins"] == 3
-    with pytest.raises(RecordError, match="realitygap run closing-the-gap"):
+    with pytest.raises(RecordError, match="realitygap closing-the-gap"):
         summarize_closing(tmp_path / "nothing")
 
 

@@ -238,7 +238,7 @@ def test_a_late_worker_cannot_publish_after_its_command_has_ended(study, digest,
 @pytest.mark.parametrize(
     "changed",
     [
-        "kernels/_trial.py",
+        "kernels/jyro/trial.py",
         pytest.param("_version.py", marks=pytest.mark.long),
         pytest.param("records/_version.py", marks=pytest.mark.long),
     ],
@@ -263,8 +263,8 @@ def test_a_worker_with_other_software_is_refused(study, dask, tmp_path, changed)
 
 def test_a_scheduler_needs_no_realitygap_and_a_worker_without_it_is_told(study, digest, dask, tmp_path):
     without = "sys.modules['realitygap'] = None"
-    dask.scheduler(without)
-    worker = dask.worker(without)
+    dask.scheduler(without, new=True)
+    worker = dask.worker(without, new=True)
     with pytest.raises(ClusterError, match=r"A worker of .* cannot load this realitygap \(.*realitygap"):
         run_study(study, tmp_path / "r", cluster=dask.address)
     kill(worker)

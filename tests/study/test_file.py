@@ -33,7 +33,7 @@ def test_paper_study_is_table_1_of_the_paper():
         assert condition.noise == int(noise) / 100
         assert (condition.neat.population, condition.neat.generations) == (8, 5)
         assert (condition.neat.add_link, condition.neat.add_node) == (0.1, 0.05)
-        assert condition.jyro.steps == 87
+        assert condition.on.steps == 87
         assert condition.has_bias_input == (selection == "novelty")
         assert condition.neat_rules.n_inputs == (4 if selection == "novelty" else 3)
         assert condition.neat_rules.n_outputs == 2
@@ -357,8 +357,8 @@ def test_conditions_override_sections_and_named_sets_fill_the_rest():
     assert base.neat.activation == "sigmoid"
     assert (other.neat.settings, other.neat.population, other.neat.add_node) == ("rosenzweig-remy", 20, 0.3)
     assert other.neat.activation == "tanh"
-    assert (base.jyro.steps, base.jyro.turn_per_step) == (50, 0.1)
-    assert (other.jyro.steps, other.jyro.turn_per_step) == (50, 0.5)
+    assert (base.on.steps, base.on.turn_per_step) == (50, 0.1)
+    assert (other.on.steps, other.on.turn_per_step) == (50, 0.5)
 
 
 def test_seed_and_replicates_can_be_given_beside_the_file():

@@ -7,8 +7,8 @@ import pytest
 
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.gap import GapSide
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import read_observations
-from realitygap.robots import SimPlatform
 from realitygap.study import (
     PARTS,
     Controller,
@@ -16,14 +16,13 @@ from realitygap.study import (
     open_target,
     part_of,
     recorded_spreads,
-    run_gap,
     sample_controllers,
     study_gap,
     try_on,
     why_gap,
 )
-from realitygap.study import _gap_between as study_gap_between
-from realitygap.trials import EndReason, SimTarget
+from realitygap.study._gap import between as study_gap_between
+from realitygap.trials import EndReason
 from realitygap.world import Calibration, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -57,6 +56,10 @@ class Counted:
 @pytest.fixture(scope="module")
 def some():
     return sample_controllers("random", 6, 1)
+
+
+def run_gap(*platforms_and_controllers, **settings):
+    return study_gap(*platforms_and_controllers, **settings).result
 
 
 def sim(key=1, **settings):

@@ -10,10 +10,10 @@ from realitygap.study import (
     pilot_spreads,
     plan_gap,
     recorded_spreads,
-    run_gap,
     sample_controllers,
+    study_gap,
 )
-from realitygap.study._gap_plan import Spreads
+from realitygap.study._gap.plan import Spreads
 from realitygap.world import paper_arena
 
 pytestmark = pytest.mark.slow
@@ -28,7 +28,7 @@ def test_a_pilot_tells_how_trials_and_controllers_vary():
 def test_observed_trials_tell_the_same(tmp_path):
     path, arena = tmp_path / "trials.jsonl", paper_arena()
     controllers = sample_controllers("random", 30, 1)
-    run_gap(
+    study_gap(
         open_target("sim", arena, key=1),
         open_target("sim", arena, key=2),
         controllers,
@@ -71,7 +71,7 @@ def refuse_pilots(monkeypatch):
     def pilot(*_):
         pytest.fail("A pilot was made for a question that cannot be answered.")
 
-    monkeypatch.setattr("realitygap.study._gap_plan.pilot_spreads", pilot)
+    monkeypatch.setattr("realitygap.study._gap.plan.pilot_spreads", pilot)
 
 
 def test_plan_for_a_tiny_effect_is_a_table_without_controllers():

@@ -15,17 +15,17 @@ import pytest
 
 from realitygap.errors import LedgerError, RealityGapError, RobotError
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.trials import TrialInterrupted, WitnessOperator
+from realitygap.trials import TrialInterrupted
 from tests.trials.fake_robot import FakeRobot
 
-from .physical import drive, scored, small_study
+from .physical import Unattended, drive, scored, small_study
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="kills processes")]
 
 Point = Callable[[str], None]
 
 
-class Telling(WitnessOperator):
+class Telling(Unattended):
     """A witness that says when it is called, and writes down which trials it was asked to place."""
 
     def __init__(self, point: Point, diary: Path) -> None:
@@ -130,12 +130,13 @@ def check_nothing_was_asked_twice(path: Path) -> None:
         seen[generation, individual] = number
 
 
-@pytest.mark.parametrize("selection", ["novelty"])
-def test_a_study_killed_at_any_point_goes_on_as_if_nothing_had_happened(tmp_path, selection):
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.long)])
+def test_a_study_killed_at_any_point_goes_on_as_if_nothing_had_happened(tmp_path, every):
+    selection = "novelty"
     n_points = count_points(tmp_path / "whole", selection)
     wanted = scored(tmp_path / "whole")
     assert n_points > 80
-    for number in range(n_points):
+    for number in range(0, n_points, every):
         path = tmp_path / f"killed-{number}"
         assert killed_at(number, path, selection), number
         assert not killed_at(10**9, path, selection), number
@@ -266,7 +267,7 @@ def test_a_full_disk_is_one_clear_error_and_what_was_scored_stays(tmp_path):
     assert scored(path) == scored(tmp_path / "whole")
 
 
-class FullAfter(WitnessOperator):
+class FullAfter(Unattended):
     """Fills the disk when so many trials were placed."""
 
     def __init__(self, n_trials: int, resource) -> None:

@@ -7,10 +7,10 @@ from realitygap.errors import LedgerError, RobotError, StudyError
 from realitygap.records import LEDGER_NAME, SCHEMA, Ledger, ResultsFolder, Score
 from realitygap.runs import _evolution as evolution
 from realitygap.study import load_study, run_study
-from realitygap.trials import WitnessOperator
+from realitygap.trials import WitnessObserver
 from tests.trials.fake_robot import FakeRobot
 
-from .physical import drive, scored, small_study
+from .physical import Unattended, drive, scored, small_study
 
 
 @pytest.mark.parametrize("selection", ["coverage", "novelty", "random"])
@@ -78,7 +78,7 @@ def test_a_trial_cut_off_may_count_as_driven(tmp_path):
     study = small_study()
     with pytest.raises(RobotError):
         drive(study, tmp_path / "r", fault=pull_the_plug)
-    result = drive(study, tmp_path / "r", operator=WitnessOperator(in_flight="driven"))
+    result = drive(study, tmp_path / "r", operator=Unattended(in_flight="driven"))
     assert "1 driven trials wait for their scores" in result.waiting
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["scored", "driven", "scored"]
@@ -93,11 +93,11 @@ def test_emulated_and_real_trials_are_not_mixed(tmp_path):
     assert not real.is_open
 
 
-class Anybody(WitnessOperator):
+class Anybody(Unattended):
     """Takes any robot, whatever is found."""
 
     def meet(self, robot):
-        self._witness = robot
+        self.observer = WitnessObserver(robot)
 
     def accept(self, preflight):
         return True
@@ -127,7 +127,7 @@ def test_a_robot_that_was_accepted_once_is_still_another(tmp_path):
             drive(small_study(replicates="3"), tmp_path / "r", robot=FakeRobot(name=name))
 
 
-class Meanwhile(WitnessOperator):
+class Meanwhile(Unattended):
     """Somebody else writes to the ledger while the operator is asked whether to close a generation."""
 
     def __init__(self, path, do):
@@ -170,12 +170,12 @@ def test_cells_entered_while_the_generation_is_closed_do_not_breed_what_they_wer
     path = tmp_path / "r"
     tell = evolution.Evolution.tell
 
-    def told_late(self, cells):
+    def told_late(self, scores, cells):
         monkeypatch.setattr(evolution.Evolution, "tell", tell)
         with Ledger.open(path / LEDGER_NAME) as ledger:
             ledger.undo(1)
             ledger.score(1, Score(range(30), "anna"))
-        return tell(self, cells)
+        return tell(self, scores, cells)
 
     monkeypatch.setattr(evolution.Evolution, "tell", told_late)
     with pytest.raises(LedgerError, match=r"Other cells of trials \[1\] were entered"):
@@ -184,7 +184,7 @@ def test_cells_entered_while_the_generation_is_closed_do_not_breed_what_they_wer
     assert scored(path)[0][-1] == list(range(30))
 
 
-class Stops(WitnessOperator):
+class Stops(Unattended):
     """Counts cells of a sheet afterwards, and is stopped at the second."""
 
     def drawn(self, card, driven):
@@ -203,7 +203,7 @@ def test_what_was_entered_of_a_sheet_is_kept_when_the_program_is_stopped(tmp_pat
         assert [trial.state for trial in ledger.trials()] == ["scored", "driven", "driven"]
 
 
-class Blind(WitnessOperator):
+class Blind(Unattended):
     """Its connection is gone when the first trial has ended."""
 
     def drawn(self, card, driven):
@@ -273,7 +273,7 @@ def test_the_papers_study_is_the_papers():
     assert len(study.trials.pens) == 8
     for condition in study.conditions:
         assert (condition.neat.population, condition.neat.generations) == (8, 5)
-        platform = condition.scribbler
+        platform = condition.on
         assert (platform.steps, platform.wait_s, platform.reading_max) == (100, 0.5, 1700)
 
 
@@ -295,7 +295,7 @@ def test_shuffled_blocks_mix_conditions_and_change_no_result(tmp_path):
     drive(small_study(more=plain), tmp_path / "plain")
     titles = []
 
-    class Listening(WitnessOperator):
+    class Listening(Unattended):
         def place(self, card):
             titles.append((card.title, card.pen, card.trial.condition, card.trial.individual))
             super().place(card)

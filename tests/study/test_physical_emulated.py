@@ -16,10 +16,10 @@ import pytest
 from realitygap.errors import RealityGapError
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.report import summarize, write_report
-from realitygap.study import load_study, run_study
-from realitygap.trials import TrialInterrupted, WitnessOperator
+from realitygap.study import drive_study, load_study, run_study
+from realitygap.trials import TrialInterrupted
 
-from .physical import scored, small_study
+from .physical import Unattended, scored, small_study
 from .test_killed import no_waiting_for_the_disk  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.slow
@@ -38,7 +38,7 @@ def trials_of(path: Path) -> list:
 def test_a_study_runs_unattended_and_comes_out_the_same_again(tmp_path, selection):
     study = small_study(selection, **LONGER)
     for name in ("a", "b"):
-        result = run_study(study, tmp_path / name, port=PORT)
+        result = drive_study(study, PORT, tmp_path / name)
         assert result.physical is not None
         assert (result.physical.n_complete, result.physical.n_driven) == (1, 6)
     assert scored(tmp_path / "a") == scored(tmp_path / "b")
@@ -76,9 +76,9 @@ def test_a_robot_in_another_arena_than_the_study_s_is_refused(tmp_path):
     file.write_text(OTHER_ARENA)
     study = small_study("coverage", **LONGER)
     with pytest.raises(RealityGapError, match=r"drives in the arena 'other', and the study is about 'paper'"):
-        run_study(study, tmp_path / "out", port=f"{PORT}&arena={file}")
+        drive_study(study, f"{PORT}&arena={file}", tmp_path / "out")
     assert {trial.state for trial in trials_of(tmp_path / "out")} == {"planned"}
-    assert run_study(study, tmp_path / "out", port=PORT).physical.n_complete == 1
+    assert drive_study(study, PORT, tmp_path / "out").physical.n_complete == 1
 
 
 def killed_after(n_trials: int, path: Path, study) -> bool:
@@ -86,7 +86,7 @@ def killed_after(n_trials: int, path: Path, study) -> bool:
     child = os.fork()
     if child == 0:
         try:
-            run_study(study, path, port=PORT, operator=KilledAfter(n_trials))
+            drive_study(study, PORT, path, operator=KilledAfter(n_trials))
         except BaseException:
             os._exit(1)
         os._exit(0)
@@ -97,7 +97,7 @@ def killed_after(n_trials: int, path: Path, study) -> bool:
     return False
 
 
-class KilledAfter(WitnessOperator):
+class KilledAfter(Unattended):
     """Ends its process without warning at a step."""
 
     def __init__(self, n_steps: int) -> None:
@@ -114,7 +114,7 @@ class KilledAfter(WitnessOperator):
 @pytest.mark.skipif(sys.platform == "win32", reason="kills processes")
 def test_a_study_killed_at_each_step_goes_on_as_if_nothing_had_happened(tmp_path):
     study = small_study("novelty", steps="3")
-    run_study(study, tmp_path / "whole", port=PORT)
+    drive_study(study, PORT, tmp_path / "whole")
     wanted = scored(tmp_path / "whole")
     n_steps = 6 * 3
     for step in range(n_steps):
@@ -143,7 +143,7 @@ def inject(n_faults: int, folder: Path) -> None:
             operator = Faulty(rng)
             result = None
             try:
-                result = run_study(small_study("novelty", steps="3"), path, port=port, operator=operator)
+                result = drive_study(small_study("novelty", steps="3"), port, path, operator=operator)
             except (RealityGapError, TrialInterrupted, KeyboardInterrupt):
                 assert operator.has_struck
             n_struck += operator.has_struck
@@ -160,7 +160,7 @@ def inject(n_faults: int, folder: Path) -> None:
         assert operator.witness.motors() == (0.0, 0.0)
 
 
-class Faulty(WitnessOperator):
+class Faulty(Unattended):
     """Does something to the program or the link at a random step."""
 
     def __init__(self, rng: random.Random) -> None:
@@ -204,8 +204,10 @@ def test_two_thousand_faults_on_the_wire(tmp_path):
 
 def test_a_mixed_study_has_simulated_arms_beside_an_emulated_one(tmp_path):
     study = load_study(ROOT / "examples" / "robot-beside-simulation.toml", replicates=1)
-    result = run_study(study, tmp_path / "mixed", port=PORT)
-    assert (result.n_runs, result.physical.n_runs, result.physical.n_complete) == (2, 2, 2)
+    result = run_study(study, tmp_path / "mixed")
+    assert (result.n_runs, result.physical.n_runs, result.physical.n_complete) == (2, 2, 0)
+    result = drive_study(study, PORT, tmp_path / "mixed")
+    assert (result.n_runs, result.physical.n_runs, result.physical.n_complete) == (0, 2, 2)
     labels = dict(summarize(result.folder).select("condition", "label").iter_rows())
     assert labels == {
         "coverage-10": "SIM",
@@ -219,7 +221,7 @@ def test_a_mixed_study_has_simulated_arms_beside_an_emulated_one(tmp_path):
 
 @pytest.mark.long
 def test_the_papers_physical_study_runs_unattended(tmp_path):
-    result = run_study("paper-robot", tmp_path / "paper", port=PORT)
+    result = drive_study("paper-robot", PORT, tmp_path / "paper")
     assert (result.physical.n_complete, result.physical.n_driven) == (6, 240)
     summary = summarize(result.folder)
     assert summary["label"].to_list() == ["EMULATED", "EMULATED"]
@@ -246,7 +248,7 @@ def test_an_emulator_in_another_program_is_driven_and_witnessed(tmp_path):
         assert witness is not None
         out = tmp_path / "out"
         done = subprocess.run(
-            [*command, "run", str(tmp_path / "small.toml"), "--out", str(out), "--port", str(tmp_path / "port"),
+            [*command, "drive", str(tmp_path / "small.toml"), "--out", str(out), "--port", str(tmp_path / "port"),
              "--witness", witness],
             capture_output=True, text=True, cwd=ROOT, timeout=120, check=False,
         )  # fmt: skip

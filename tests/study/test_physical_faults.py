@@ -15,12 +15,11 @@ import pytest
 from realitygap.emulator import Emulator, Server, serve_tcp
 from realitygap.errors import LedgerError, RealityGapError, RecordVersionError
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.study import run_study
-from realitygap.trials import WitnessOperator
+from realitygap.study import drive_study
 from tests.byte_proxy import DIRECTIONS, KINDS, ByteProxy
 from tests.trials.fake_robot import FakeRobot
 
-from .physical import drive, scored, small_study
+from .physical import Unattended, drive, scored, small_study
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +78,7 @@ def test_ledger_locked_by_another_process_is_one_message_and_the_study_resumes(t
     assert scored(tmp_path / "r") == scored(tmp_path / "whole")
 
 
-class LockingAfterTrial(WitnessOperator):
+class LockingAfterTrial(Unattended):
     """Has another process lock the ledger when the first trial was driven."""
 
     def __init__(self, path: Path, stack: contextlib.ExitStack) -> None:
@@ -137,7 +136,7 @@ def test_ledger_that_cannot_be_trusted_is_one_message_and_left_as_it_was(tmp_pat
 STEPS = 5
 
 
-class Disturbed(WitnessOperator):
+class Disturbed(Unattended):
     """Disturbs the link at each step: one byte in some way, or all of it."""
 
     def __init__(self, proxy: ByteProxy, server: Server, seed: int, kinds: tuple[str, ...]) -> None:
@@ -177,7 +176,7 @@ def disturb(
             operator = Disturbed(proxy, server, seed * 100 + sitting, kinds)
             result = None
             with contextlib.suppress(RealityGapError):
-                result = run_study(study, path, port=proxy.name, operator=operator)
+                result = drive_study(study, proxy.name, path, operator=operator)
             until = time.monotonic() + 5.0
             while server.witness.motors() != (0.0, 0.0):
                 assert time.monotonic() < until, "The motors are running after the sitting."

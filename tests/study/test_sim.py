@@ -176,8 +176,9 @@ def far(arrays, step_s, fitness):
 def with_task(tmp_path: Path, source: str, function: str = "far", **settings: Any) -> Condition:
     (tmp_path / "task.py").write_text(source)
     task = PythonTask.from_file(f"python:{tmp_path}/task.py:{function}").allowed()
-    values = {"name": "t", "platform": "sim", "sim": {"steps": 15}, "task": task, **settings}
-    return Condition(**values)
+    values = {"name": "t", "platform": "sim", "task": task, **settings}
+    steps = {"sim": {"steps": 15}} if values["platform"] == "sim" else {}
+    return Condition(**{**steps, **values})
 
 
 def test_a_function_of_ones_own_decides_who_has_children(tmp_path):
@@ -209,7 +210,7 @@ def test_a_compiled_function_reads_the_kernels_arrays_and_says_the_same(tmp_path
 def test_portions_of_trials_of_which_every_step_is_kept_change_nothing(tmp_path, monkeypatch):
     condition = with_task(tmp_path, PYTHON_TASK)
     whole = frame_of(condition, 0, run_rows(condition, 0, 9))
-    monkeypatch.setattr("realitygap.runs._staged.TRACE_BYTES", 1)
+    monkeypatch.setattr("realitygap.platforms._try.TRACE_BYTES", 1)
     assert frame_of(condition, 0, run_rows(condition, 0, 9)).equals(whole)
 
 
@@ -275,7 +276,7 @@ def test_a_task_that_is_not_there_is_one_mistake(tmp_path, task, text):
 def test_another_task_than_coverage_needs_what_jyro_has(tmp_path):
     with pytest.raises(ValueError, match="selection is 'coverage', which is another task"):
         with_task(tmp_path, PYTHON_TASK, selection="coverage")
-    condition = with_task(tmp_path, PYTHON_TASK, platform="jyro", sim={})
+    condition = with_task(tmp_path, PYTHON_TASK, platform="jyro")
     with pytest.raises(StudyError, match=r"far of task\.py failed: line 6: ValueError: These trials"):
         run_replicates(condition, 0, 1)
 

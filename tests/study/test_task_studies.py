@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from realitygap.cli._study import _print_result
+from realitygap.cli._study import print_result
 from realitygap.report import TASK_SCHEMA, summarize_tasks
 from realitygap.runs import Condition, replay, run_replicates
 from realitygap.study import load_study, run_study
@@ -85,11 +85,11 @@ def test_what_run_prints_and_summarizes_is_fitness_by_the_task(tmp_path: Path, c
         result.folder.read("evolved").group_by("replicate").agg(pl.col("task_fitness").max())["task_fitness"]
     )
     assert summary["median"][0] == pytest.approx(best_of_runs.median())
-    _print_result(result, as_json=False)
+    print_result(result, as_json=False)
     shown = capsys.readouterr().out
     assert "Fitness by the task" in shown
     assert "Best coverage" not in shown
-    _print_result(result, as_json=True)
+    print_result(result, as_json=True)
     assert json.loads(capsys.readouterr().out)["tasks"] == summary.to_dicts()
 
 

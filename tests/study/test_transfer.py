@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realitygap.errors import DescriptionError, RecordError, StudyError
-from realitygap.robots import JyroPlatform, SimPlatform
+from realitygap.errors import DescriptionError, RealityGapError, RecordError, StudyError
+from realitygap.platforms import JyroPlatform, SimPlatform, SimTarget
+from realitygap.records import read_observations
 from realitygap.study import STRATEGIES, choose_condition, transfer
-from realitygap.study._transfer import TransferPlan, _Work
-from realitygap.study._transfer_calibrated import Calibrating, fitted_condition
-from realitygap.study._transfer_result import Transferred, estimate_mean, summarize_transfer
-from realitygap.study._transfer_simulated import evolve_champions
-from realitygap.study._transferability import distances, nsga2_order
-from realitygap.trials import SimTarget
+from realitygap.study._transfer.calibrated import Calibrating, fitted_condition
+from realitygap.study._transfer.result import Transferred, estimate_mean, summarize_transfer
+from realitygap.study._transfer.simulated import evolve_champions
+from realitygap.study._transfer.strategies import TransferPlan, _Work
+from realitygap.study._transfer.transferability import distances, nsga2_order
 from realitygap.world import Calibration, load_calibration, load_robot, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -80,10 +80,10 @@ def test_only_trials_of_budget_and_fresh_ones_are_carried_out(result):
 
 def test_quality_is_the_mean_of_fresh_trials_and_regret_what_is_missing_to_the_best(result):
     found, _, folder = result
-    best = max(np.mean(each.coverage) for each in found.champions)
+    best = max(np.mean(each.scores) for each in found.champions)
     for row, champion in zip(found.strategies, found.champions, strict=True):
-        assert row.quality.estimate == pytest.approx(np.mean(champion.coverage))
-        assert row.regret.estimate == pytest.approx(best - np.mean(champion.coverage))
+        assert row.quality.estimate == pytest.approx(np.mean(champion.scores))
+        assert row.regret.estimate == pytest.approx(best - np.mean(champion.scores))
         assert row.quality.low <= row.quality.estimate <= row.quality.high
     assert json.loads((folder / "result.json").read_text())["best_known"] == pytest.approx(best)
 
@@ -167,15 +167,15 @@ def test_a_fit_on_the_budget_builds_on_the_robot_of_the_study(calibration, tmp_p
     """One that a file describes was looked for by its name, when half of the budget had been spent."""
     robot = load_robot("scribbler-s2-fluke2")
     own = robot.with_numbers({"drive.speed": 0.2}).model_copy(update={"name": "mine"})
-    condition = choose_condition("sim-paper", None, 1).model_copy(update={"sim": SimPlatform(robot=own)})
+    condition = choose_condition("sim-paper", None, 1).model_copy(update={"on": SimPlatform(robot=own)})
     made = load_calibration(calibration).model_copy(update={"robot": "mine"})
     (tmp_path / "3-cells-0.toml").write_text(made.to_toml())
     calibrating = Calibrating(CountingTarget(), tmp_path, 0, 0, 7, "cells", None, print)
     found, base = calibrating(condition, 6)
     fitted = fitted_condition(condition, found, "posterior", base)
-    assert fitted.sim.robot.drive.speed == 0.2
-    assert fitted.sim.robot.drive.gain_left == OTHER["drive.gain_left"]
-    assert fitted.sim.draws["drive.delay"] == (0.25, 0.25)
+    assert fitted.on.robot.drive.speed == 0.2
+    assert fitted.on.robot.drive.gain_left == OTHER["drive.gain_left"]
+    assert fitted.on.draws["drive.delay"] == (0.25, 0.25)
 
 
 def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):
@@ -189,13 +189,48 @@ def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tm
     ("study", "strategies", "text"),
     [
         ("sim-paper", ["plane"], "Did you mean 'plain'"),
-        ("wall", "plain", "expected coverage"),
+        ("wall", "plain", "range.3 to range.7 are missing"),
         ("paper", "randomized", "platform 'jyro', which has none"),
     ],
 )
 def test_what_cannot_be_transferred_is_refused_in_words(study, strategies, text, tmp_path):
-    with pytest.raises(StudyError, match=text):
+    with pytest.raises(RealityGapError, match=text):
         transfer(study, CountingTarget(), strategies, 3, out=tmp_path, **SMALL)
+
+
+AVOID = """
+[study]
+name = "avoid-3"
+[neat]
+population = 8
+generations = 3
+[task]
+kind = "avoid"
+inputs = ["range.0", "range.1", "range.2", "bias"]
+[[condition]]
+name = "avoid"
+platform = "sim"
+"""
+
+
+def test_all_strategies_carry_over_to_another_task(tmp_path):
+    """Readings score avoidance, so that only a strategy that compares cells asks for them."""
+    file = tmp_path / "avoid.toml"
+    file.write_text(AVOID)
+    found = transfer(file, CountingTarget(), "all", 6, out=tmp_path / "t", **SMALL)
+    assert found.score == "avoidance score"
+    assert {row.strategy for row in found.strategies} == set(STRATEGIES)
+    for champion in found.champions:
+        assert all(0 <= score <= 1 for score in champion.scores)
+    values = found.to_dict()
+    assert values["score"] == "avoidance score"
+    assert len(values["champions"][0]["scores"]) == SMALL["fresh_trials"]
+    seen = {
+        path.stem.partition("-")[0]: read_observations(path).head.observe
+        for path in (tmp_path / "t" / "trials").glob("*")
+    }
+    assert seen["select"] == "readings"
+    assert seen["transferability"] == "cells"
 
 
 def test_what_evolved_in_the_true_simulator_does_better_than_plain(calibration, tmp_path):

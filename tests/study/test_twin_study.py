@@ -14,12 +14,12 @@ import pytest
 from pydantic import ValidationError
 
 from realitygap.errors import StudyError
+from realitygap.platforms import TwinPlatform, close_twins, open_twin, trace_genome, try_genomes
 from realitygap.records import ResultsFolder
-from realitygap.robots import TwinPlatform
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.study import Study, parse_study, run_study
-from realitygap.trials import NoiseKey, close_twins, open_twin, trace_genome, try_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import paper_arena
 from tests.interrupted import INTERRUPTED
 
@@ -63,11 +63,11 @@ def results(file: Path, tmp_path_factory: pytest.TempPathFactory) -> ResultsFold
 def test_a_condition_is_known_by_the_hash_of_its_twin(file: Path, tmp_path: Path) -> None:
     (condition,) = study_on(file).conditions
     assert (condition.label, condition.platform, condition.noise) == ("TWIN", "twin", 0.0)
-    assert len(condition.twin.sha256) == 64
+    assert len(condition.on.sha256) == 64
     assert Condition.from_settings("same", condition.settings()) == condition
     other = tmp_path / "other.toml"
     other.write_text(file.read_text() + "\n# touched\n")
-    assert study_on(other).conditions[0].twin.sha256 != condition.twin.sha256
+    assert study_on(other).conditions[0].on.sha256 != condition.on.sha256
 
 
 def test_conditions_on_other_platforms_say_nothing_of_twins() -> None:
@@ -96,12 +96,12 @@ def test_trials_are_those_of_the_twin(file: Path, results: ResultsFolder) -> Non
     row = results.scan().collect().row(5, named=True)
     trajectory = replay(condition, row)  # which compares it with the row
     robot = open_twin(load_twin(file), paper_arena())
-    from realitygap.kernels._philox import PURPOSE_NOISE
-    from realitygap.trials._twin_trials import twin_number
+    from realitygap.kernels.math.philox import PURPOSE_NOISE
+    from realitygap.platforms._stepwise import trial_number
 
     individual, generation = row["individual"], row["generation"]
     counter = np.array([individual << 8 | int(PURPOSE_NOISE), generation << 12, row["replicate"]], np.uint32)
-    robot.number = twin_number(row["key"], counter)
+    robot.number = trial_number(row["key"], counter)
     robot.reset()
     for step, command in enumerate(trajectory.commands):
         assert max(robot.observe().readings) == trajectory.inputs[step, 0]
@@ -115,13 +115,13 @@ def test_other_random_numbers_are_another_trial(file: Path, results: ResultsFold
     (condition,) = study_on(file).conditions
     genome = genome_of(condition, results.scan().collect().row(5, named=True))
     traced = [
-        trace_genome(condition.twin, paper_arena(), genome, noise=0.0, noise_key=NoiseKey(1, repeat=repeat))
+        trace_genome(condition.on, paper_arena(), genome, noise=0.0, noise_key=NoiseKey(1, repeat=repeat))
         for repeat in (0, 0, 1)
     ]
     assert np.array_equal(traced[0].answers, traced[1].answers)
     assert not np.array_equal(traced[0].answers, traced[2].answers)
-    with pytest.raises(ValueError, match="expected none on platform 'twin'"):
-        try_genomes(condition.twin, paper_arena(), [genome], noise=0.1, noise_key=NoiseKey(1))
+    with pytest.raises(ValueError, match="expected none with platform 'twin'"):
+        try_genomes(condition.on, paper_arena(), [genome], noise=0.1, noise_key=NoiseKey(1))
 
 
 @pytest.mark.parametrize("processes", [1, 3])
@@ -132,7 +132,8 @@ def test_digest_does_not_depend_on_processes_or_interruptions(
     monkeypatch: pytest.MonkeyPatch,
     processes: int,
 ) -> None:
-    from realitygap.trials import _twin_pool, _twin_trials
+    from realitygap.platforms.twin import _pool as _twin_pool
+    from realitygap.platforms.twin import _trials as _twin_trials
 
     _twin_trials._last.clear()
     _twin_trials._pools.clear()
@@ -160,7 +161,7 @@ def test_a_twin_that_has_changed_is_refused(file: Path, results: ResultsFolder, 
     changed.write_text(file.read_text() + "\n# touched\n")
     with pytest.raises(StudyError, match=r"same: twin.sha256 is '\w+' there, '\w+' here"):
         run_study(study_on(changed), tmp_path / "r")
-    from realitygap.trials import _twin_trials
+    from realitygap.platforms.twin import _trials as _twin_trials
 
     _twin_trials._last.clear()
     _twin_trials._pools.clear()
@@ -197,7 +198,9 @@ def test_ctrl_c_ends_a_study_on_a_twin_in_the_middle_of_a_run(file: Path, tmp_pa
             time.sleep(0.2)
             found = Path(f"/proc/{process.pid}/task").glob("*/children")
             pids = [int(pid) for listed in found for pid in listed.read_text().split()]
-            children = [pid for pid in pids if "twin_worker" in Path(f"/proc/{pid}/cmdline").read_text()]
+            children = [
+                pid for pid in pids if "platforms.twin._worker" in Path(f"/proc/{pid}/cmdline").read_text()
+            ]
         time.sleep(5)  # the twin is up, and at work
         process.send_signal(signal.SIGINT)
         began = time.monotonic()

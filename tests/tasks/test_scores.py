@@ -13,8 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from realitygap.errors import TaskError
-from realitygap.tasks import AvoidTask, GoalTask, LightTask, Task, TraceArrays, Trajectories, WallTask
-from realitygap.tasks._wall import outlines
+from realitygap.tasks import (
+    AvoidTask,
+    GoalTask,
+    LightTask,
+    Task,
+    TraceArrays,
+    Trajectories,
+    WallTask,
+    wall_outlines,
+)
 from realitygap.world import Arena, Goal, Grid, Light, Obstacle, Pose
 from tests.reference import scores as reference
 from tests.reference.effort import cases
@@ -256,7 +264,7 @@ def test_obstacles_are_followed_as_walls_are() -> None:
     angles = np.linspace(0, 2 * math.pi, 200)
     found = trials([[(0.4 * math.cos(a), 0.4 * math.sin(a)) for a in angles]], arena)
     assert WallTask(side="left").fitness(found, arena)[0] == pytest.approx(0.8 * math.pi, rel=0.02)
-    assert outlines(arena).shape == (32, 4)
+    assert wall_outlines(arena).shape == (32, 4)
 
 
 def test_a_goal_counts_once_it_was_reached_else_by_what_is_left_of_the_way() -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from realitygap.errors import RobotError
+from realitygap.platforms import JyroRobot, SimRobot
 from realitygap.robots import Command, Observation
 from realitygap.robots.scribbler import Scribbler
 from realitygap.testing import RobotContractError, check_robot
-from realitygap.trials import JyroRobot
+from realitygap.world import load_arena
 
 from ..robots.peers import FakePort, FakeScribbler
 
@@ -40,6 +41,7 @@ BROKEN = [
         lambda self: Observation((0.0, 2.0, 0.0), False, (0.0, 0.0, 0.0)),
         r"readings after reset has \[2.0\], expected 0 to 1; scale and limit them",
     ),
+    ("channels", ("light.0",), "It has `channels` and no `select`"),
     ("drive", lambda self, command: None, r"drive\(Command\(move=1.01, turn=0.0\)\) was carried out; call"),
     ("__enter__", lambda self: None, "__enter__ returns something else; return self"),
     ("__exit__", lambda self, *_: True, "__exit__ swallows exceptions; return None"),
@@ -62,6 +64,20 @@ def test_a_broken_robot_is_told_what_to_repair(name, value, message):
         RobotContractError, match=f"Broken does not keep the contract of a robot:\n(.*\n)*.*{message}"
     ):
         check_robot(robot)
+
+
+def test_a_robot_that_reads_what_was_not_selected_is_told():
+    robot = SimRobot()
+    seen = Observation((0.0,) * 3, False, (0.0,) * 3, {"light.0": 2.0})
+    robot.observe = lambda: seen
+    with pytest.raises(
+        RobotContractError, match=r"channels after reset is \{'light.0': 2.0\}, expected a number"
+    ):
+        check_robot(robot)
+
+
+def test_the_robot_of_sim_keeps_the_contract_with_all_its_sensors():
+    check_robot(SimRobot(arena=load_arena("goal")))
 
 
 def test_a_thing_without_methods_is_told_which():

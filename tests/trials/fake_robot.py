@@ -10,7 +10,6 @@ import numpy as np
 
 from realitygap.errors import RobotError
 from realitygap.robots import Command, Observation, check_command
-from realitygap.trials import cell_at
 from realitygap.world import Arena, Pose, paper_arena
 
 SPEED = 0.14  # [m/s]
@@ -104,6 +103,9 @@ class FakeRobot:
     def now(self) -> float:
         return self.clock.now()
 
+    def identity(self) -> str:
+        return "fake"
+
     def arena(self) -> Arena:
         return paper_arena()
 
@@ -143,5 +145,5 @@ class FakeRobot:
 
 
 def cells_of(poses: Iterable[Pose]) -> tuple[int, ...]:
-    found = [cell_at(paper_arena().grid, pose.x, pose.y) for pose in poses]
+    found = [paper_arena().grid.cell_at(pose.x, pose.y) for pose in poses]
     return tuple(dict.fromkeys(cell for cell in found if cell is not None))

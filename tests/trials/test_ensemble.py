@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import NeatSettings, Population
-from realitygap.robots import SimPlatform
-from realitygap.trials import NoiseKey, Play, SimEnsemble, trace_genome
-from realitygap.trials import _ensemble as module
+from realitygap.platforms import Play, SimEnsemble, SimPlatform, trace_genome
+from realitygap.platforms.sim import _ensemble as module
+from realitygap.trials import NoiseKey
 from realitygap.world import paper_arena
 
 pytestmark = pytest.mark.slow

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import NeatSettings, Population
-from realitygap.robots import JyroPlatform
-from realitygap.trials import NoiseKey, retry_genomes, trace_genome, try_genomes
+from realitygap.platforms import JyroPlatform, retry_genomes, trace_genome, try_genomes
+from realitygap.trials import NoiseKey
 from realitygap.world import paper_arena
 
 SETTINGS = NeatSettings.named("rosenzweig-remy")

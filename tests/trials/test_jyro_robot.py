@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.robots import Command, JyroPlatform, Robot
-from realitygap.trials import JyroRobot, NoiseKey, trace_genome, try_genomes
+from realitygap.platforms import JyroPlatform, JyroRobot, trace_genome, try_genomes
+from realitygap.robots import Command, Robot
+from realitygap.trials import NoiseKey
 from realitygap.world import INCH, NAMED_STARTS, Pose, load_arena, paper_arena
 
 KEY = NoiseKey(0x9E3779B97F4A7C15, replicate=3, generation=2, individual=5, repeat=1)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 
 from realitygap.errors import StudyError
+from realitygap.platforms import SimPlatform, SimRobot
 from realitygap.records import ResultsFolder
-from realitygap.robots import Command, SimPlatform
+from realitygap.robots import Command
 from realitygap.runs import Condition, replay
 from realitygap.study import load_study, run_study
-from realitygap.trials import NoiseKey, SimRobot
+from realitygap.trials import NoiseKey
 from realitygap.world import Calibration
 
 pytestmark = pytest.mark.slow
@@ -146,8 +147,8 @@ def test_randomize_can_be_said_of_a_study(calibration, tmp_path):
     file = tmp_path / "study.toml"
     file.write_text(STUDY.replace('randomize = "posterior"\n', ""))
     plain, drawn = (load_study(file, randomize=how).conditions[0] for how in (None, "posterior"))
-    assert plain.sim.randomize == "no"
-    assert drawn.sim.randomize == "posterior"
+    assert plain.on.randomize == "no"
+    assert drawn.on.randomize == "posterior"
     assert set(drawn.drawn_names) == {"drive.track", "drive.gain_left"}
     assert drawn.hash() != plain.hash()
     with pytest.raises(StudyError, match="no condition of this study has one"):

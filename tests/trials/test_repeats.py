@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realitygap.platforms import retry_genomes, try_genomes
 from realitygap.runs import Condition, genome_of, run_replicates
-from realitygap.trials import NoiseKey, retry_genomes, try_genomes
+from realitygap.trials import NoiseKey
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def _retry(condition, rows, repeats):
     keys = [NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]) for row in rows]
     genomes = [genome_of(condition, row) for row in rows]
     return retry_genomes(
-        condition.jyro,
+        condition.on,
         condition.arena.arena(),
         genomes,
         noise=condition.noise,
@@ -40,7 +41,7 @@ def test_each_repeat_is_what_try_genomes_gives(rows):
     batch = _retry(condition, chosen, range(2, 5))
     expected = [
         try_genomes(
-            condition.jyro,
+            condition.on,
             condition.arena.arena(),
             [genome_of(condition, row)],
             noise=condition.noise,
@@ -66,10 +67,10 @@ def test_wrong_arguments_are_named(rows):
     genome = genome_of(condition, all_rows[0])
     arena = condition.arena.arena()
     with pytest.raises(ValueError, match="0 noise keys, expected 1"):
-        retry_genomes(condition.jyro, arena, [genome], noise=0.1, noise_keys=[], repeats=range(1))
+        retry_genomes(condition.on, arena, [genome], noise=0.1, noise_keys=[], repeats=range(1))
     with pytest.raises(ValueError, match="from 0 to 4095"):
         retry_genomes(
-            condition.jyro, arena, [genome], noise=0.1, noise_keys=[NoiseKey(1)], repeats=range(-1, 2)
+            condition.on, arena, [genome], noise=0.1, noise_keys=[NoiseKey(1)], repeats=range(-1, 2)
         )
     with pytest.raises(ValueError, match="No genome"):
-        retry_genomes(condition.jyro, arena, [], noise=0.1, noise_keys=[], repeats=range(1))
+        retry_genomes(condition.on, arena, [], noise=0.1, noise_keys=[], repeats=range(1))

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.kernels._sim_shape import sim_rows
-from realitygap.robots import Command, JyroPlatform, Robot, SimPlatform
-from realitygap.testing import check_robot
-from realitygap.trials import (
-    NoiseKey,
+from realitygap.kernels.sim.shape import sim_rows
+from realitygap.platforms import (
+    JyroPlatform,
+    SimPlatform,
     SimRobot,
     retry_genomes,
     sim_scene,
@@ -21,6 +20,9 @@ from realitygap.trials import (
     trace_genomes,
     try_genomes,
 )
+from realitygap.robots import Command, Robot
+from realitygap.testing import check_robot
+from realitygap.trials import NoiseKey
 from realitygap.world import (
     NAMED_STARTS,
     Distribution,

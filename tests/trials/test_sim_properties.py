@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,11 +15,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._sim import start_sim, step_sim
-from realitygap.kernels._sim_lanes import SimRules, make_sim_room
-from realitygap.robots import SimPlatform
-from realitygap.trials import sim_scene
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.sim.lanes import SimRules, make_sim_room
+from realitygap.kernels.sim.trial import start_sim, step_sim
+from realitygap.platforms import SimPlatform, sim_scene
 from realitygap.world import Arena, Obstacle, RobotModel, load_robot, paper_arena
 from tests.reference import contact as reference
 from tests.reference.effort import cases
@@ -196,6 +196,23 @@ def test_the_order_of_obstacles_changes_no_bit(model: str, name: str, order: lis
         driven(platform, arena, starts, commands), driven(platform, other, starts, commands), strict=True
     ):
         np.testing.assert_array_equal(one, two)
+
+
+def test_a_robot_goes_the_same_way_alone_and_in_company() -> None:
+    """A push beside a box took the box into account only if some robot of the block was near the box."""
+    rng = np.random.default_rng(6)
+    n, steps = cases(LANES, 8), cases(40, 6)
+    for model, divided in itertools.product(MODELS, (False, True)):
+        arena, platform = furnished(divided=divided), quiet("box", model)
+        starts = starts_in(arena, platform.model, n, rng)
+        commands = np.stack([rng.uniform(-0.6, 1, (steps, n)), rng.uniform(-0.8, 0.8, (steps, n))], 1)
+        company = driven(platform, arena, starts, commands)
+        for k in range(0, n, 4):
+            alone = driven(platform, arena, starts[k : k + 1], commands[:, :, k : k + 1])
+            for here, there in zip(company, alone, strict=True):
+                np.testing.assert_array_equal(
+                    here[:, k], there[:, 0], f"{model}, divided: {divided}, robot {k}"
+                )
 
 
 @pytest.mark.parametrize("model", MODELS)

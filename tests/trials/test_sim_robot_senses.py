@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError
-from realitygap.robots import Command, SimPlatform
-from realitygap.trials import SimRobot
+from realitygap.platforms import SimPlatform, SimRobot
+from realitygap.robots import Command
 from realitygap.world import Arena, Floor, Light, Obstacle, Pose, RobotModel, load_robot, paper_arena
 from tests.reference import senses as reference
 

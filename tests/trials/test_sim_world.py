@@ -10,10 +10,11 @@ import pytest
 
 from realitygap.errors import RobotError
 from realitygap.evolution import NeatSettings, Population
-from realitygap.robots import Robot, SimPlatform
+from realitygap.platforms import SimPlatform, SimWorld, trace_genomes
+from realitygap.platforms.sim._overlap import overlaps
+from realitygap.robots import Robot
 from realitygap.testing import check_robot
-from realitygap.trials import NoiseKey, SimWorld, trace_genomes
-from realitygap.trials._sim_overlap import overlaps
+from realitygap.trials import NoiseKey
 from realitygap.world import Distribution, Obstacle, Pose, paper_arena
 
 pytestmark = pytest.mark.slow

@@ -17,11 +17,12 @@ import pytest
 from realitygap.emulator import Emulator, serve_tcp
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.platforms import ScribblerPlatform
 from realitygap.records import ObservedTrial, read_observations, trial_to_dict
-from realitygap.robots import Command, ScribblerPlatform
+from realitygap.robots import Command
 from realitygap.robots.twin import sample_twin
 from realitygap.study import connect_robot, open_target, try_on
-from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessAttendant
+from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena
 
@@ -195,7 +196,7 @@ def failing(lost_at: list[int], on_lost: OnLost) -> tuple[RobotTarget, list[Any]
         opened.append(Failing(connect_robot(PORT)(ScribblerPlatform(reading_max=6400)), lost_at))
         return opened[-1]
 
-    target = RobotTarget(open_robot, ARENA, WitnessAttendant(), name="scribbler:test", on_lost=on_lost)
+    target = RobotTarget(open_robot, ARENA, WitnessObserver(), name="scribbler:test", on_lost=on_lost)
     return target, opened
 
 
@@ -241,7 +242,7 @@ def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
             self._robot.drive(command)
 
     robot = Impatient(connect_robot(PORT)(ScribblerPlatform(reading_max=6400)), [4])
-    target = RobotTarget(lambda: robot, ARENA, WitnessAttendant(), name="scribbler:test")
+    target = RobotTarget(lambda: robot, ARENA, WitnessObserver(), name="scribbler:test")
     with pytest.raises(KeyboardInterrupt):
         target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
     assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 3)]
@@ -250,7 +251,7 @@ def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
 
 
 def test_ctrl_c_while_somebody_is_asked_for_cells_tells_the_trial() -> None:
-    class Asked(WitnessAttendant):
+    class Asked(WitnessObserver):
         def cells(self) -> tuple[int, ...]:
             raise KeyboardInterrupt
 
@@ -265,9 +266,7 @@ def test_ctrl_c_while_somebody_is_asked_for_cells_tells_the_trial() -> None:
 def test_what_cannot_be_is_said_before_anything_moves() -> None:
     with pytest.raises(StudyError, match="Who places the robot at /dev/rfcomm0"):
         open_target("scribbler:/dev/rfcomm0", ARENA)
-    with pytest.raises(
-        StudyError, match=r"'scribler:x' is no platform for trials. Did you mean 'scribbler:PORT'"
-    ):
+    with pytest.raises(StudyError, match=r"'scribler:x' is no platform. Did you mean 'scribbler:PORT'"):
         open_target("scribler:x", ARENA)
     with pytest.raises(StudyError, match=r"no-such-robot"):
         open_target("sim:no-such-robot", ARENA)

@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.platforms import JyroPlatform, JyroRobot, SimPlatform, SimRobot, SimTarget, try_genomes
 from realitygap.records import ObservedTrial
-from realitygap.robots import JyroPlatform, SimPlatform
-from realitygap.trials import (
-    JyroRobot,
-    NoiseKey,
-    RobotOnlooker,
-    SimRobot,
-    SimTarget,
-    TrialPlan,
-    carry_out_on_robot,
-    try_genomes,
-)
+from realitygap.trials import NoiseKey, RobotObserver, TrialPlan, carry_out_on_robot
 from realitygap.world import Pose, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -41,7 +32,7 @@ def genomes() -> list[Genome]:
 def one_by_one(name: str, plan: TrialPlan) -> ObservedTrial:
     made = SimRobot if name == "sim" else JyroRobot
     robot = made(PLATFORMS[name], ARENA, noise=0.1, noise_key=NoiseKey(KEY, individual=plan.number))
-    trial, problem = carry_out_on_robot(robot, plan, "track", RobotOnlooker(robot), plan.start or ARENA.start)
+    trial, problem = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
     assert not problem
     return trial
 

@@ -17,9 +17,10 @@ import pytest
 
 from realitygap.errors import DescriptionError, RobotError
 from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.platforms import TwinTarget, open_twin
 from realitygap.records import ObservedTrial, trial_to_dict
 from realitygap.robots.twin import load_twin, sample_twin
-from realitygap.trials import RobotOnlooker, TrialPlan, TwinTarget, carry_out_on_robot, open_twin
+from realitygap.trials import RobotObserver, TrialPlan, carry_out_on_robot
 from realitygap.world import Pose, paper_arena
 
 pytestmark = pytest.mark.slow
@@ -61,7 +62,7 @@ def test_trials_are_those_of_the_twin_in_this_process(file: Path, target: TwinTa
     expected = []
     for plan in plans():
         robot.number = plan.number
-        trial, _ = carry_out_on_robot(robot, plan, "track", RobotOnlooker(robot), plan.start or ARENA.start)
+        trial, _ = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
         expected.append(trial)
     told: list[int] = []
     trials = target.carry_out(plans(), "track", lambda k, trial: told.append(k))

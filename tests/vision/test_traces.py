@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from realitygap.vision import (
     SheetError,
     SheetLayout,
+    SheetScore,
     overlay_png,
     read_photo,
     score_sheet,
@@ -22,6 +25,11 @@ def _ious(score):
     return [len(a & b) / len(a | b) for a, b in found]
 
 
+@cache
+def _score_of_one_pen() -> SheetScore:
+    return score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0])
+
+
 @pytest.mark.slow
 def test_eight_pens_on_a_clean_scan_are_read_without_a_mistake_of_more_than_a_cell():
     score = score_sheet(read_photo(photo(1, SCAN).jpeg), LAYOUT)
@@ -32,10 +40,9 @@ def test_eight_pens_on_a_clean_scan_are_read_without_a_mistake_of_more_than_a_ce
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [3, 5])
-def test_an_ordinary_photo_is_read_nearly_as_well(seed):
+def test_an_ordinary_photo_is_read_nearly_as_well():
     """Of 20 such photographs the worst had a mean of .93."""
-    assert np.mean(_ious(score_sheet(read_photo(photo(seed, ORDINARY).jpeg), LAYOUT))) > 0.9
+    assert np.mean(_ious(score_sheet(read_photo(photo(3, ORDINARY).jpeg), LAYOUT))) > 0.9
 
 
 @pytest.mark.slow
@@ -67,7 +74,7 @@ def test_a_pen_whose_name_is_no_color_must_be_tried():
 
 @pytest.mark.slow
 def test_the_path_goes_through_the_whole_trace_from_the_start():
-    (trace,) = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0]).traces
+    (trace,) = _score_of_one_pen().traces
     start = np.array([ARENA.start.x, ARENA.start.y])
     assert np.hypot(*(trace.path[0] - start)) < 0.006
     drawn = curve(0)
@@ -77,7 +84,7 @@ def test_the_path_goes_through_the_whole_trace_from_the_start():
 
 @pytest.mark.slow
 def test_probabilities_say_cells_and_doubt():
-    (trace,) = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0]).traces
+    (trace,) = _score_of_one_pen().traces
     assert trace.probability.shape == (72,)
     assert ((trace.probability >= 0) & (trace.probability <= 1)).all()
     assert set(trace.cells) == set(np.flatnonzero(trace.probability >= 0.5))
@@ -87,7 +94,6 @@ def test_probabilities_say_cells_and_doubt():
 
 @pytest.mark.slow
 def test_the_overlay_is_a_picture():
-    score = score_sheet(read_photo(photo(1, ORDINARY, n=1).jpeg), LAYOUT, [0])
-    data = overlay_png(score, {0: "black, trial 1"})
+    data = overlay_png(_score_of_one_pen(), {0: "black, trial 1"})
     assert data.startswith(b"\x89PNG")
     assert len(data) > 100_000

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError, StudyError, VisionError
+from realitygap.platforms import ScribblerPlatform
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.robots import ScribblerPlatform
-from realitygap.study import CameraAttendant, CameraOperator, connect_robot, run_study
+from realitygap.study import CameraObserver, connect_robot, drive_study
 from realitygap.testing import Film, FilmedCamera, path_through
-from realitygap.trials import RobotTarget, TrialPlan, WitnessAttendant, WitnessOperator
+from realitygap.trials import Operator, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.vision import LiveTrack, Marks, Track, Tracked
 from realitygap.world import paper_arena
 from tests.study.physical import small_study
@@ -73,16 +73,17 @@ class _AboveEmulator:
     """Sees an emulated robot as a camera would: at 30 pictures a second, with errors of half a millimeter."""
 
     def __init__(self, beside, late_s=0.0):
+        """`beside` gives the observer that has the emulator's witness."""
         self._beside, self._late_s, self.now = beside, late_s, None
 
     def begin(self):
-        witness = self._beside._witness
+        witness = self._beside().witness
         self.now = witness.now
         self._began = witness.now()
         self._start = witness.pose()
 
     def tracked(self, until_s=None):
-        path = self._beside._witness.path()
+        path = self._beside().witness.path()
         times = np.arange(self._began + self._late_s, until_s + 1 / 30, 1 / 30)
         start = np.array([[self._began, *self._start]])
         path = np.concatenate([start, path[path[:, 0] > self._began]])
@@ -94,12 +95,14 @@ class _AboveEmulator:
 
 
 def _drive(late_s=0.0, *, with_camera=True):
-    beside = WitnessAttendant()
-    attendant = CameraAttendant(beside, _AboveEmulator(beside, late_s)) if with_camera else beside
+    beside = WitnessObserver()
+    observer = (
+        CameraObserver(_AboveEmulator(lambda: beside, late_s), ARENA, beside) if with_camera else beside
+    )
     opened = connect_robot("emulator://s2?fluke=2&speed=off")
     plan = TrialPlan(commands=np.array([[1.0, 0.0]] * 4 + [[0.5, 0.5]] * 3), number=5)
     with RobotTarget(
-        lambda: opened(ScribblerPlatform(reading_max=6400.0)), ARENA, attendant, name="scribbler:emulated"
+        lambda: opened(ScribblerPlatform(reading_max=6400.0)), ARENA, observer, name="scribbler:emulated"
     ) as target:
         assert target.observes == "track"
         return target.carry_out([plan], "track")[0]
@@ -120,32 +123,18 @@ def test_a_trial_that_the_camera_saw_in_part_is_lost_and_said_to_be():
         _drive(late_s=1.0)
 
 
-class _Beside:
-    """A person, in place of whom a witness puts the robot down; counts nothing."""
-
-    def __init__(self, witness):
-        self._as = witness
-        self._as.drawn = lambda card, driven: None
-
-    def __getattr__(self, name):
-        return getattr(self._as, name)
-
-
-class _AboveStudy(_AboveEmulator):
-    """The same, where the witness is an operator's."""
-
-    def begin(self):
-        self._beside._witness = self._beside.witness
-        super().begin()
+def watched(say, late_s=0.0):
+    """An operator with a camera, for whom a witness puts the robot down."""
+    beside = WitnessObserver()
+    return Operator(CameraObserver(_AboveEmulator(lambda: beside, late_s), ARENA, beside, say))
 
 
 def test_a_study_is_scored_by_a_camera_as_by_the_witness_and_says_what_it_did_not_see(tmp_path):
     study = small_study("coverage", steps="6")
-    witness, said = WitnessOperator(), []
-    operator = CameraOperator(_Beside(witness), _AboveStudy(witness), ARENA.grid, said.append)
+    said = []
     port = "emulator://s2?fluke=1&speed=off"
-    run_study(study, tmp_path / "seen", port=port, operator=operator)
-    run_study(study, tmp_path / "true", port=port)
+    drive_study(study, port, tmp_path / "seen", operator=watched(said.append))
+    drive_study(study, port, tmp_path / "true")
     with (
         Ledger.open(tmp_path / "seen" / LEDGER_NAME, writable=False) as seen,
         Ledger.open(tmp_path / "true" / LEDGER_NAME, writable=False) as true,
@@ -158,9 +147,7 @@ def test_a_study_is_scored_by_a_camera_as_by_the_witness_and_says_what_it_did_no
         off = np.array(one["path"])[:, :2] - np.array(other["path"])[:, :2]
         assert np.hypot(*off.T).max() < 0.01
     assert said[0].startswith("The camera counts ")
-    late = WitnessOperator()
-    operator = CameraOperator(_Beside(late), _AboveStudy(late, late_s=1.0), ARENA.grid, said.append)
-    result = run_study(study, tmp_path / "late", port=port, operator=operator)
+    result = drive_study(study, port, tmp_path / "late", operator=watched(said.append, late_s=1.0))
     assert result.physical.waiting
     assert "Count its cells by hand" in said[-1]
 

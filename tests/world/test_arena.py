@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from realitygap.kernels._coverage import to_grid
-from realitygap.robots import JyroPlatform
+from realitygap.kernels.tasks.coverage import to_grid
+from realitygap.platforms import JyroPlatform
 from realitygap.world import (
     INCH,
     NAMED_STARTS,
@@ -59,6 +59,6 @@ def test_jyro_robot_is_the_paper_s():
     robot = JyroPlatform()
     assert robot.sensors.mounts == ((0.09, 0.05, 0.0), (0.09, 0.0, 0.0), (0.09, -0.05, 0.0))
     assert robot.sensors.max_range == 0.2
-    assert robot.body_radius == pytest.approx(math.hypot(0.09, 0.08))
+    assert max(math.hypot(*corner) for corner in robot.body.corners) == pytest.approx(math.hypot(0.09, 0.08))
     assert (robot.speed, robot.turn_rate, robot.steps) == (1.0, 1.0, 87)
     assert robot.label == "SIM"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import DescriptionError
-from realitygap.robots import SimPlatform
+from realitygap.platforms import SimPlatform
 from realitygap.world import Calibration, Distribution, Fitted, load_calibration, load_robot, read_calibration
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from realitygap.errors import CaseError
 from realitygap.world._case import Case
-from realitygap.world._jyro_stock import DEVICES, ROBOT_BODIES
+from realitygap.world.jyro_stock import DEVICES, ROBOT_BODIES
 
 DATA = Path(__file__).parent.parent / "data"
 CASES = sorted(DATA.glob("jyro*/*.json"))

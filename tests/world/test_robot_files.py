@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from realitygap.errors import DescriptionError
-from realitygap.kernels._sim_shape import make_sim_shape, sim_rows
-from realitygap.robots import JyroPlatform
+from realitygap.kernels.sim.shape import make_sim_shape, sim_rows
+from realitygap.platforms import JyroPlatform
 from realitygap.world import Distribution, RobotModel, load_robot, robot_names
 
 from .outcomes import made_or_told
@@ -52,7 +52,7 @@ def test_the_issue_s_robots_are_there():
         for board in ("", "-fluke1", "-fluke2")
         for box in ("", "-cardboard")
     }
-    assert set(robot_names()) == scribblers | {"jyro", "pioneer", "khepera", "e-puck"}
+    assert set(robot_names()) == scribblers | {"jyro", "pioneer", "khepera", "e-puck", "thymio"}
 
 
 def test_jyro_is_what_the_platform_jyro_drives():
@@ -262,3 +262,59 @@ def test_whatever_values_come_there_is_a_robot_or_a_message(values):
     assert robot, "a mistake is told in words"
     if not isinstance(robot, str):
         assert RobotModel.from_dict(robot.to_dict()).numbers() == robot.numbers()
+
+
+LORENTZ = """
+[[range]]
+x = 0.03
+y = 0
+reach = 0.14
+cone_deg = 15
+rays = 3
+response = "lorentz"
+half_width_mm = 85
+peak_mm = 0.3
+"""
+
+
+def test_a_lorentz_sensor_keeps_its_numbers_and_others_do_not_have_them(write):
+    robot = load_robot(write(SMALL + LORENTZ))
+    assert (robot.range[0].half_width, robot.range[0].peak) == (0.085, 0.0003)
+    assert RobotModel.from_dict(robot.to_dict()) == robot
+    assert robot.to_dict()["range"][0]["half_width"] == 0.085
+    fitted = robot.with_numbers({"range.0.half_width": 0.08, "range.0.peak": {"normal": [0.0, 0.001]}})
+    assert fitted.numbers()["range.0.half_width"] == 0.08
+    for name in ("khepera", "scribbler-s2-fluke2", "pioneer"):
+        assert "half_width" not in load_robot(name).to_dict()["range"][0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("rays = 3", "rays = 5", "rays is 5, expected 1 or 3 with response 'lorentz'"),
+        ("cone_deg = 15", "cone_deg = 90", "expected less than pi / 2"),
+        ("peak_mm = 0.3", "peak_mm = 85", "peak is 0.085, expected less than half_width, 0.085"),
+        ("half_width_mm = 85", "half_width_mm = 0", "more than 0"),
+    ],
+)
+def test_a_lorentz_sensor_that_cannot_be_is_refused(write, old, new, expected):
+    with pytest.raises(DescriptionError, match=expected.replace("(", r"\(")):
+        load_robot(write(SMALL + LORENTZ.replace(old, new)))
+
+
+def test_the_thymio_has_enkis_outline_and_sensors():
+    robot = load_robot("thymio")
+    corners = np.array(robot.body[0].corners)
+    assert corners.max(0) == pytest.approx([0.08, 0.055])
+    assert corners.min(0) == pytest.approx([-0.03, -0.055])
+    front = corners[corners[:, 0] > 0.05]
+    assert np.hypot(*front.T) == pytest.approx(np.full(len(front), 0.08), abs=1e-5)
+    assert (len(robot.range), len(robot.line), robot.encoder is not None) == (7, 2, True)
+    mirrored = [(s.x, -s.y, -s.direction % math.tau) for s in robot.range]
+    pairs = {0: 4, 1: 3, 2: 2, 5: 6}
+    for left, right in pairs.items():
+        sensor = robot.range[right]
+        assert mirrored[left] == pytest.approx((sensor.x, sensor.y, sensor.direction % math.tau))
+    assert {(s.response, s.rays, s.half_width) for s in robot.range} == {("lorentz", 3, 0.08544)}
+    assert robot.range[0].half_width ** 2 == pytest.approx(73e-4, abs=1e-6)
+    assert robot.drive.speed == pytest.approx(300 * 0.00033)

@@ -5,12 +5,8 @@ from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
 from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
-from ._excitation import excitation, random_controllers, random_start
+from ._excitation import excitation, random_controllers
 from ._handles import MOTION
-from ._ir_checks import Independence, independence, predictive_check
-from ._ir_fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
-from ._ir_plans import distance_of, placements_of, sensor_distances, sensor_plans
-from ._ir_readings import Placement
 from ._motion import MotionFit, fit_motion
 from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
@@ -20,6 +16,10 @@ from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 from ._step import of_one_length, step_of
+from .infrared._checks import Independence, independence
+from .infrared._fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
+from .infrared._plans import distance_of, placements_of, sensor_plans
+from .infrared._readings import Placement
 
 __all__ = [
     "LEAST_PLACEMENTS",
@@ -62,13 +62,10 @@ __all__ = [
     "of_one_length",
     "path_plans",
     "placements_of",
-    "predictive_check",
     "random_controllers",
-    "random_start",
     "ranges_of",
     "ruled",
     "scribbler_prior",
-    "sensor_distances",
     "sensor_plans",
     "standard_of",
     "step_of",

@@ -2,7 +2,7 @@
 
 With poses each command, each reading and each stall can be predicted by itself from where the robot was seen, so that
 likelihoods take the place of simulation alone (`fit_all`): of motion (`_single_commands.py`), of readings
-(`_ir_pulses.py`, `_ir_mixture.py`), and of stalls.
+(`infrared/_pulses.py`, `infrared/_mixture.py`), and of stalls.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from realitygap.platforms import SimEnsemble
 from realitygap.records import ObservedTrial
-from realitygap.trials import SimEnsemble
 from realitygap.world import Arena, Distribution, RobotModel
 
 from ._abc import Posterior
-from ._ir_mixture import MixtureReadings
-from ._ir_pulses import PulseReadings
-from ._ir_readings import Placement
 from ._prior import Floats, Parameter, standard_of
 from ._rays import rays_of
 from ._shots import Shooter, Shots, shots_of
 from ._single_commands import BLOCK, SLIP, MotionOfCommands, is_motion, place_of, values_at
 from ._tempering import sample_posterior
+from .infrared._mixture import MixtureReadings
+from .infrared._pulses import PulseReadings
+from .infrared._readings import Placement
 
 N_DRAWS = 500
 N_READINGS = 3000  # of all that were made

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome
+from realitygap.platforms import Play, Rehearsal
 from realitygap.records import Observe, ObservedTrial
-from realitygap.trials import Play, Rehearsal
 
 Vectors = NDArray[np.float32]
 
@@ -133,11 +133,13 @@ def evidence_of(
         if len(trial.commands) >= LEAST_STEPS
     ]
 
-    def alike(one: tuple[int, ObservedTrial, Genome | None]) -> tuple[int, str, bool]:
-        return len(one[1].commands), one[1].observe, one[2] is not None and one[1].observe != "track"
+    def alike(one: tuple[int, ObservedTrial, Genome | None]) -> tuple[int, str, bool, str]:
+        _, trial, genome = one
+        interface = "" if genome is None or trial.observe == "track" else repr(genome.interface)
+        return len(trial.commands), trial.observe, bool(interface), interface
 
     found: list[Evidence] = []
-    for (_, observe, is_driven), group in groupby(sorted(numbered, key=alike), key=alike):
+    for (_, observe, is_driven, _), group in groupby(sorted(numbered, key=alike), key=alike):
         found += _of_group(list(group), observe, is_driven, n_cells)  # type: ignore[arg-type]
     return found
 

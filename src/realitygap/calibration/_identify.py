@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap.records import OBSERVATIONS, Observe
+from realitygap.records import CALIBRATES, Observe
 
 from ._handles import Known, place_of
 from ._prior import Parameter
@@ -110,6 +110,6 @@ ADVICE: dict[str, tuple[str, str, str]] = {
 
 def advice_for(name: str, observe: Observe, partners: Sequence[str] = ()) -> str:
     """What to record so that a parameter can be told, where this was observed."""
-    what = ADVICE[name][OBSERVATIONS.index(observe)] if name in ADVICE else "record more trials"
+    what = ADVICE[name][CALIBRATES.index(observe)] if name in ADVICE else "record more trials"
     first = f"Known only together with {' and '.join(partners)}" if partners else "Not told from its prior"
     return f"{first}: {what}."

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.platforms import Play, Rehearsal, SimEnsemble
 from realitygap.records import ObservedTrial
-from realitygap.trials import Play, Rehearsal, SimEnsemble
 from realitygap.world import Arena, RobotModel
 
 from ._prior import Floats, Parameter, numbers_of

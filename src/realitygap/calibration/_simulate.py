@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.platforms import NOISE
 from realitygap.records import ObservedTrial
-from realitygap.robots import NOISE
 from realitygap.world import Distribution, RobotModel
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Rehearsed(Protocol):
 
 
 class Simulate(Protocol):
-    """Carries out trials with given commands: `trials.SimEnsemble.replay`."""
+    """Carries out trials with given commands: `platforms.SimEnsemble.replay`."""
 
     def __call__(
         self,

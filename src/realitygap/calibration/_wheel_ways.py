@@ -14,7 +14,7 @@ from ._simulate import Floats, Simulate, motor_noise, plain_numbers, starts_of
 from ._windows import Windows
 
 LEAST_LAG = 1e-6  # [s] what stands for none
-STANDS = 1e-3  # [m/s] of the wheels, below which no noise goes on, as in kernels/_sim_drive.py
+STANDS = 1e-3  # [m/s] of the wheels, below which no noise goes on, as in kernels/sim/drive.py
 N_DELAYS = 9  # between the least and the most that a command may be late
 
 
@@ -41,7 +41,7 @@ def wheel_ways(
 ) -> WheelWays:
     """With one set of parameters and a jitter [s], from what the wheels would drive without delay and lag.
 
-    A wheel keeps its old target until the command is heard, and nears each exponentially, as in `kernels._sim_drive`.
+    A wheel keeps its old target until the command is heard, and nears each exponentially, as in `kernels.sim.drive`.
     """
     prompt = {**values, "drive.delay": np.zeros(1), "drive.lag": np.zeros(1)}
     numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | robot_numbers(known, robot, prompt)

@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from realitygap._version import __version__
-from realitygap.kernels._compiling import report_compiling
+from realitygap.kernels.compile.progress import report_compiling
 
 from ._commands import COMMANDS, Command, root_help
 

@@ -52,8 +52,7 @@ def audit_distance(
     In Python: realitygap.report.audit_distance("jaccard", "results/paper")
     """
     from realitygap.report import audit_distance as audit_named
-    from realitygap.report import distance_notes, save_distance
-    from realitygap.report._formats import check_ending
+    from realitygap.report import check_ending, distance_notes, save_distance
 
     try:
         if out is not None:

@@ -13,6 +13,7 @@ import typer
 from realitygap.errors import DescriptionError, StudyError
 
 from ._camera import CAMERA_HELP, under_camera
+from ._code import AllowPlatforms
 
 if TYPE_CHECKING:
     from realitygap.trials import OnLost
@@ -78,6 +79,7 @@ def calibrate(
             metavar="FILE", help="Of sensors: also draw the readings (.svg, .pdf, .png), as Figure 3."
         ),
     ] = None,
+    allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Fit the simulator to a robot.
@@ -202,12 +204,12 @@ def _measured(
     quiet: bool,
 ) -> Calibration:
     """Carry out the trials, and fit."""
-    from realitygap.robots import DEFAULT_ROBOT
+    from realitygap.platforms import DEFAULT_ROBOT
     from realitygap.study import StoppedByPerson, calibrate, open_target
     from realitygap.world import load_arena, load_robot
 
-    from ._calibrate_attendant import TerminalAttendant
-    from ._calibrate_guide import TerminalGuide
+    from ._calibration_operator import CalibrationOperator
+    from ._sheet import sheet_observer
 
     kept = out.with_suffix(".trials.jsonl")
     base = base or DEFAULT_ROBOT
@@ -215,13 +217,13 @@ def _measured(
     is_led = _is_led(robot, witness)
     again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."
     try:
-        beside = TerminalAttendant(where) if is_led else None
-        guide = TerminalGuide(where, model) if is_led else None
+        sheet = sheet_observer(asks_for_start=False) if is_led else None
+        operator = CalibrationOperator(where, model) if is_led else None
         on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
         with (
-            under_camera(camera, where, beside) as attendant,
+            under_camera(camera, where, sheet) as observer,
             open_target(
-                robot, where, key=seed, witness=witness, attendant=attendant, on_lost=on_lost
+                robot, where, key=seed, witness=witness, observer=observer, on_lost=on_lost
             ) as target,
         ):
             return calibrate(
@@ -233,8 +235,8 @@ def _measured(
                 seed=seed,
                 trials_file=kept,
                 choose=choose,
-                guide=guide,
-                tell=None if quiet or guide is not None else _tell,
+                operator=operator,
+                tell=None if quiet or operator is not None else _tell,
             )
     except StoppedByPerson:
         typer.echo(again, err=True)
@@ -246,12 +248,9 @@ def _measured(
 
 def _is_led(robot: str, witness: str | None) -> bool:
     """Whether a person at the terminal has to put the robot where it is to stand."""
-    name, _, port = robot.partition(":")
-    if name != "scribbler" or witness is not None:
-        return False
-    from realitygap.robots.scribbler import is_in_this_program
+    from realitygap.platforms import platform_of
 
-    return not is_in_this_program(port)
+    return witness is None and platform_of(robot).needs_person
 
 
 def _tell(done: int, n: int) -> None:

@@ -12,7 +12,7 @@ from realitygap.errors import StudyError
 
 if TYPE_CHECKING:
     from realitygap.study import Study
-    from realitygap.trials import Attendant, Operator
+    from realitygap.trials import Operator, PortObserver
     from realitygap.vision import Marks
     from realitygap.world import Arena
 
@@ -22,32 +22,34 @@ CAMERA_HELP = (
 
 
 @contextlib.contextmanager
-def under_camera(spec: str | None, arena: Arena, attendant: Attendant | None) -> Iterator[Attendant | None]:
-    """Who stands beside a robot, with a camera where one is named.
+def under_camera(
+    spec: str | None, arena: Arena, observer: PortObserver | None
+) -> Iterator[PortObserver | None]:
+    """The observer of a robot, with a camera where one is named.
 
     Args:
         spec: Of the camera; None where there is none.
         arena: Where.
-        attendant: Who puts the robot at its start; None where nobody has to.
+        observer: Without a camera; None if nobody has to put the robot at its start.
 
     Raises:
         StudyError: The camera's options cannot be, or nobody stands beside the robot.
         VisionError: There is no such camera.
     """
     if spec is None:
-        yield attendant
+        yield observer
         return
-    if attendant is None:
+    if observer is None:
         raise StudyError(
             "--camera goes with a robot that somebody at a terminal puts at its start: simulators, twins and emulators "
             "tell where they are."
         )
-    from realitygap.study import CameraAttendant
+    from realitygap.study import CameraObserver
     from realitygap.vision import CameraDevice, LiveTrack
 
     number, marks = parse_camera(spec, arena)
     with LiveTrack(CameraDevice(number), marks) as live:
-        yield CameraAttendant(attendant, live)
+        yield CameraObserver(live, arena, observer)
 
 
 @contextlib.contextmanager
@@ -66,19 +68,18 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
     if spec is None:
         yield operator
         return
-    from realitygap.trials import WitnessOperator
-
-    if isinstance(operator, WitnessOperator):
+    if operator.observer is not None:
         raise StudyError(
             "--camera goes with a robot on the floor: an emulator's witness sees where it drives."
         )
-    from realitygap.study import CameraOperator, physical_conditions
+    from realitygap.study import CameraObserver, physical_conditions
     from realitygap.vision import CameraDevice, LiveTrack
 
     arena = physical_conditions(study)[0].arena.arena()
     number, marks = parse_camera(spec, arena)
     with LiveTrack(CameraDevice(number), marks) as live:
-        yield CameraOperator(operator, live, arena.grid, lambda text: typer.echo(text, err=True))
+        operator.observer = CameraObserver(live, arena, say=lambda text: typer.echo(text, err=True))
+        yield operator
 
 
 def parse_camera(spec: str, arena: Arena) -> tuple[int, Marks]:

@@ -1,12 +1,11 @@
-"""`realitygap run closing-the-gap`: the study of many twins, in which the gap is measured and shrunk."""
+"""`realitygap closing-the-gap`: the study of many twins, in which the gap is measured and shrunk."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,18 +18,52 @@ CLOSING = "closing-the-gap"
 """Known without loading what carries it out."""
 
 
-def refuse_options(study: str, options: Mapping[str, object]) -> None:
-    """Refuse options that mean nothing for a study.
+def closing(
+    twins: Annotated[
+        int | None, typer.Option(min=1, max=900, help="Number of twins of each family. [default: 10]")
+    ] = None,
+    families: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Families of twins. [default: close,worn,slippery,delayed]"),
+    ] = None,
+    budgets: Annotated[
+        str | None,
+        typer.Option(metavar="LIST", help="Numbers of trials to calibrate by. [default: 0,10,20,40]"),
+    ] = None,
+    observe: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Observation levels. [default: cells,track]")
+    ] = None,
+    small: Annotated[
+        bool, typer.Option("--small", help="Run a small version, which takes minutes and shows no result.")
+    ] = False,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the twins.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help=f"Folder for the results. [default: results/{CLOSING}]"),
+    ] = None,
+    processes: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number of twins to run in parallel. [default: all processors]"),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    open_page: Annotated[
+        bool, typer.Option("--open", help="When done, show the page in the browser.")
+    ] = False,
+) -> None:
+    """Measure and shrink the gap to many twins.
 
-    Raises:
-        StudyError: One of them is given.
+    Twins of several families are each calibrated by a few trials and transferred to (extra twin). Interrupt the command
+    at any moment: the same command resumes.
+
+    Example: realitygap closing-the-gap --small
+
+    In Python: realitygap.study.closing_the_gap("results/closing-the-gap")
     """
-    given = [f"--{name}" for name, value in options.items() if value not in (None, False)]
-    if given:
-        raise StudyError(f"Of no meaning for the study {study!r}: {', '.join(given)}. Leave that out.")
+    plan = _plan(small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed)
+    _run(plan, out or Path("results") / CLOSING, processes, as_json=as_json, open_page=open_page)
 
 
-def closing_plan(
+def _plan(
     *,
     small: bool,
     twins: int | None,
@@ -44,7 +77,7 @@ def closing_plan(
     Raises:
         StudyError: A family, budget or observation that there is not.
     """
-    from realitygap.records import OBSERVATIONS
+    from realitygap.records import CALIBRATES
     from realitygap.robots.twin import FAMILIES
     from realitygap.study import SMALL, ClosingPlan
 
@@ -56,7 +89,7 @@ def closing_plan(
     if families is not None:
         changes["families"] = _listed(families, "--families", FAMILIES)
     if observe is not None:
-        changes["observations"] = _listed(observe, "--observe", OBSERVATIONS)
+        changes["observations"] = _listed(observe, "--observe", CALIBRATES)
     if budgets is not None:
         try:
             numbers = sorted({0, *(int(word) for word in budgets.split(","))})
@@ -68,14 +101,11 @@ def closing_plan(
     return dataclasses.replace(SMALL if small else ClosingPlan(), **changes)
 
 
-def run_closing(
-    plan: ClosingPlan, out: Path | None, processes: int | None, *, as_json: bool, open_page: bool
-) -> None:
-    """Carry out the study, or what is missing of it, print its goals and write its page."""
+def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: bool, open_page: bool) -> None:
+    """Run the study, or what is missing of it, print its goals, and write its page."""
     from realitygap.report import write_closing_page
     from realitygap.study import closing_the_gap
 
-    folder = out or Path("results") / CLOSING
     told = [0.0, -1]
 
     def tell(progress: ClosingProgress) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,25 @@ if TYPE_CHECKING:
     from realitygap.tasks import PythonTask
 
 ALLOW_CODE_HELP = "Run the Python files of tasks without asking. The answer is not remembered."
+
+
+def _allow_platforms(wanted: bool) -> None:
+    if wanted:
+        from realitygap.platforms import allow_code
+
+        allow_code()
+
+
+AllowPlatforms = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        callback=_allow_platforms,
+        is_eager=True,
+        help="Run the Python file of a platform python:FILE:CLASS.",
+    ),
+]
+"""The option of commands that open platforms."""
 
 
 def code_permission(allow_code: bool) -> AllowCode:

@@ -33,6 +33,7 @@ class Command:
 SECTIONS: dict[str, tuple[Command, ...]] = {
     "Run a study": (
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
+        Command("drive", "Drive the conditions of a study that are on a robot.", "_drive", "drive"),
         Command(
             "new-study", "Write a template study file that documents every setting.", "_study", "new_study"
         ),
@@ -49,12 +50,14 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
         Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
+        Command("closing-the-gap", "Measure and shrink the gap to many twins.", "_closing", "closing"),
         Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
     "Use a robot": (
         Command("robot", "Connect to a Scribbler and send it commands.", "_robot", "robot"),
         Command("emulate", "Emulate a Scribbler on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
+        Command("platforms", "List the platforms that can run trials.", "_platforms", "platforms"),
         Command("trials", "List, score, and annotate physical trials.", "_trials", "trials"),
     ),
     "Score physical trials": (

@@ -104,7 +104,7 @@ def emulate(
         raise RobotError(
             "--link goes with a pseudo-terminal, and --tcp asks for a TCP port. Give one of them."
         )
-    from realitygap.emulator._port import make_emulator
+    from realitygap.emulator import make_emulator
 
     options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
     if fluke is not None:
@@ -127,8 +127,7 @@ def _serve(
     command: str | None,
     quiet: bool,
 ) -> None:
-    from realitygap.emulator._serve import PtyChannel, Server, TcpChannel
-    from realitygap.emulator._view import LiveView
+    from realitygap.emulator import LiveView, PtyChannel, Server, TcpChannel
 
     channel = PtyChannel(link) if tcp is None else TcpChannel(tcp)
     with ExitStack() as stack:
@@ -154,7 +153,7 @@ def _serve(
 
 def _run(server: Server, command: str) -> int:
     """Serve while a client program runs; its status."""
-    from realitygap.emulator._client import run_client
+    from realitygap.emulator import run_client
 
     server.start()
     return run_client(command, server.name)

@@ -13,11 +13,18 @@ import typer
 from realitygap.errors import StudyError
 
 from ._camera import CAMERA_HELP, under_camera
+from ._code import AllowPlatforms
 
 if TYPE_CHECKING:
     from realitygap.gap import Estimate, GapResult, ReplayError, Why
     from realitygap.study import GapPlan
-    from realitygap.trials import Attendant
+    from realitygap.trials import PortObserver
+
+
+TASK_HELP = (
+    "What scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function. [default: the task of the "
+    "controllers; coverage for random ones]"
+)
 
 
 class Randomize(StrEnum):
@@ -30,6 +37,7 @@ class Randomize(StrEnum):
 class Seen(StrEnum):
     """How much is seen of the target."""
 
+    readings = "readings"
     cells = "cells"
     encoders = "encoders"
     track = "track"
@@ -51,17 +59,22 @@ def gap(
         ),
     ] = "random",
     n_controllers: Annotated[int, typer.Option(min=2, max=1024, help="How many.")] = 30,
+    task: Annotated[str | None, typer.Option(metavar="KIND", help=TASK_HELP)] = None,
     trials: Annotated[int, typer.Option(min=1, max=4096, help="Of each controller on each platform.")] = 10,
     margin: Annotated[
         float | None,
         typer.Option(
-            metavar="M", help="Test equivalence in level at this margin, in coverage, such as 0.05."
+            metavar="M", help="Test equivalence in level at this margin, in units of the score, such as 0.05."
         ),
     ] = None,
     observe: Annotated[
-        Seen, typer.Option(help="What is seen of the target; track: replays, too.")
-    ] = Seen.cells,
-    arena: Annotated[str, typer.Option(metavar="NAME", help="An arena by name, or a file.")] = "paper",
+        Seen | None,
+        typer.Option(help="What is seen of the target; track: replays, too. [default: what the task needs]"),
+    ] = None,
+    arena: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="An arena by name, or a file. [default: the controllers' own]"),
+    ] = None,
     noise: Annotated[
         float | None,
         typer.Option(min=0, max=10, help="The paper's a on simulators. [default: 0.1 on jyro, else none]"),
@@ -84,6 +97,7 @@ def gap(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write figures and tables as one page (.html).")
     ] = None,
+    allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     out: Annotated[
         Path | None,
@@ -109,6 +123,8 @@ def gap(
 
     Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
 
+    Example: realitygap gap sim twin:worn-1.toml --controllers avoid
+
     Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
 
     Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
@@ -119,7 +135,7 @@ def gap(
     from realitygap.world import load_arena
 
     if margin is not None and not 0 < margin < float("inf"):
-        raise StudyError(f"--margin is {margin}, expected a coverage above 0, such as 0.05.")
+        raise StudyError(f"--margin is {margin}, expected a difference of scores above 0, such as 0.05.")
     if report is not None:
         from realitygap.report import refuse_gap_page
 
@@ -127,16 +143,17 @@ def gap(
     try:
         with (
             _TrialsBar(quiet=as_json) as bar,
-            under_camera(camera, load_arena(arena), _attendant(target, witness, arena)) as attendant,
+            under_camera(camera, load_arena(arena or "paper"), _observer(target, witness)) as observer,
         ):
             found = gap_between(
                 sim,
                 target,
                 controllers=controllers,
                 n_controllers=n_controllers,
+                task=task,
                 trials=trials,
                 margin=margin,
-                observe=observe.value,
+                observe=None if observe is None else observe.value,
                 arena=arena,
                 noise=noise,
                 randomize=randomize.value,
@@ -144,9 +161,10 @@ def gap(
                 why=why,
                 processes=processes,
                 witness=witness,
-                attendant=attendant,
+                observer=observer,
                 seed=seed,
                 results=out,
+                allow_code=allow_code,
                 tell=bar.show,
                 say=bar.say,
             )
@@ -175,42 +193,27 @@ def gap(
         _print_why(found.why)
 
 
-def _attendant(target: str, witness: str | None, arena: str) -> Attendant | None:
-    """Somebody at the terminal, where a robot has no witness and there is a terminal."""
+def _observer(target: str, witness: str | None) -> PortObserver | None:
+    """A person at the terminal, if there is one and the robot has no witness."""
     from ._calibrate import _is_led
 
     if not _is_led(target, witness) or not sys.stdin.isatty():
         return None
-    from realitygap.world import load_arena
+    from ._sheet import sheet_observer
 
-    from ._calibrate_attendant import PlacingAttendant
-
-    return PlacingAttendant(load_arena(arena))
-
-
-_ROWS = (
-    ("rms", "RMS gap, noise taken out"),
-    ("level", "level: target less simulator"),
-    ("a12", "A12: target above simulator"),
-    ("srcc", "correlation over controllers"),
-    ("noise_ceiling", "  noise allows at most"),
-    ("srcc_disattenuated", "  without noise"),
-    ("mmrv", "rank violation (MMRV)"),
-    ("mmrv_floor", "  of the target by itself"),
-    ("energy", "energy distance of cells"),
-    ("energy_ends", "energy distance of ends [m]"),
-    ("equivalence", "equivalence (interval of 90 %)"),
-)
+    return sheet_observer(asks_for_start=True)
 
 
 def _print(result: GapResult, replay: ReplayError | None) -> None:
+    from realitygap.gap import SHOWN
+
     one, other = result.trials
     typer.echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
-        f"{result.level.n} controllers, {one} and {other} trials each, coverage"
+        f"{result.level.n} controllers, {one} and {other} trials each, {result.score}"
     )
-    for name, title in _ROWS:
-        _print_row(title, getattr(result, name))
+    for measure in SHOWN:
+        _print_row(measure.row, getattr(result, measure.name))
     if replay is not None:
         _print_row("replays off at their end [m]", replay.at_end)
     typer.echo("Kept apart from it:")
@@ -288,10 +291,10 @@ class _TrialsBar:
 
 def plan(
     effect: Annotated[
-        float | None, typer.Option(metavar="D", help="Find a mean difference in coverage of so much.")
+        float | None, typer.Option(metavar="D", help="Find a mean difference in score of so much.")
     ] = None,
     margin: Annotated[
-        float | None, typer.Option(metavar="M", help="Show equivalence within a margin, in coverage.")
+        float | None, typer.Option(metavar="M", help="Show equivalence within a margin of scores.")
     ] = None,
     correlation: Annotated[
         float | None, typer.Option(metavar="R", help="Show that a correlation of so much is above --least.")
@@ -310,6 +313,9 @@ def plan(
             "--from", metavar="FILE", help="Trials that were observed (.jsonl). [default: a pilot on sim]"
         ),
     ] = None,
+    task: Annotated[str, typer.Option(metavar="KIND", help="The task that scores trials.")] = "coverage",
+    arena: Annotated[str, typer.Option(metavar="NAME", help="The arena of the pilot.")] = "paper",
+    allow_code: AllowPlatforms = False,
     seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of pilot and simulated studies.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
 ) -> None:
@@ -322,9 +328,11 @@ def plan(
 
     Example: realitygap plan --margin 0.05 --spread 0.03
 
+    Example: realitygap plan --effect 0.05 --task light --arena light
+
     In Python: realitygap.study.plan_gap("effect", 0.05)
     """
-    from realitygap.study import plan_gap, recorded_spreads
+    from realitygap.study import plan_gap, recorded_spreads, task_named
 
     asked = {"effect": effect, "margin": margin, "correlation": correlation}
     given = {name: value for name, value in asked.items() if value is not None}
@@ -334,10 +342,13 @@ def plan(
             "--correlation. For example: realitygap plan --effect 0.05"
         )
     ((question, value),) = given.items()
+    scored_by = task_named(task, allow_code=allow_code)
     found = plan_gap(
         question,  # type: ignore[arg-type]
         value,
-        spreads=None if data is None else recorded_spreads(str(data)),
+        spreads=None if data is None else recorded_spreads(str(data), scored_by),
+        task=scored_by,
+        arena=arena,
         spread=spread,
         least=least,
         power=power,
@@ -346,7 +357,7 @@ def plan(
     if as_json:
         typer.echo(json.dumps(_plan_json(found), indent=2))
     else:
-        _print_plan(found, least, power)
+        _print_plan(found, scored_by.score_name, least, power)
 
 
 def _plan_json(found: GapPlan) -> dict[str, Any]:
@@ -361,13 +372,13 @@ def _plan_json(found: GapPlan) -> dict[str, Any]:
     }
 
 
-def _print_plan(found: GapPlan, least: float, power: float) -> None:
+def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
     question = {
         "effect": f"to find a mean difference of {found.value:g}",
         "margin": f"to show equivalence within ±{found.value:g} where there is no difference",
         "correlation": f"to show that a correlation of {found.value:g} is above {least:g}",
     }[found.question]
-    typer.echo(f"Controllers {question} in {100 * power:g} of 100 studies, in coverage")
+    typer.echo(f"Controllers {question} in {100 * power:g} of 100 studies, in {score}")
     typer.echo(
         f"Trials of one controller vary by {found.spreads.noise:.3f}, controllers by "
         f"{found.spreads.controllers:.3f} (standard deviations of {found.spreads.origin})"

@@ -120,9 +120,7 @@ def edit_cells(
     Returns:
         The cells, or None for later.
     """
-    from realitygap.trials import cell_at
-
-    first = cell_at(grid, start.x, start.y)
+    first = grid.cell_at(start.x, start.y)
     marked = list(cells) or ([] if first is None else [first])
     edit = GridEdit(grid.columns, grid.rows, marked)
     edit.row, edit.column = divmod(first or 0, grid.columns)

@@ -1,4 +1,4 @@
-"""The operator of a physical study: a person at a terminal, or the options of a command."""
+"""The operator of a physical study: a person at a terminal, or nobody if the robot is emulated."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from realitygap.errors import StudyError
+from realitygap.trials import Operator, WitnessObserver
 
 from ._grid_editor import edit_cells
 from ._keys import read_line, single_keys
@@ -20,7 +21,7 @@ from ._keys import read_line, single_keys
 if TYPE_CHECKING:
     from realitygap.records import Score
     from realitygap.robots import Command, Observation, Robot
-    from realitygap.trials import Card, DrivenTrial, Operator, Preflight, Verdict
+    from realitygap.trials import Card, DrivenTrial, Preflight, Verdict
     from realitygap.world import Arena
 
 _ABORTING = ("space", "escape", "q")
@@ -69,7 +70,7 @@ class Answers:
 def choose_operator(
     port: str, witness: str | None, answers: Answers, folder: Path, *, quiet: bool = False
 ) -> Operator:
-    """The witness of an emulator, in this program or in another, or else a person.
+    """Nobody for an emulator with a witness, in this program or in another; else a person at the terminal.
 
     Args:
         port: Of the robot.
@@ -85,11 +86,14 @@ def choose_operator(
     if is_in_this_program(port) or witness is not None:
         from realitygap.emulator import connect_witness
 
-        from ._telling import telling_witness
+        from ._telling import TellingOperator
 
         remote = None if witness is None or is_in_this_program(port) else connect_witness(witness)
-        return telling_witness(
-            remote, answers.verdict or "void", despite_preflight=answers.despite_preflight, quiet=quiet
+        kind = Operator if quiet else TellingOperator
+        return kind(
+            WitnessObserver(remote),
+            in_flight=answers.verdict or "void",
+            despite_preflight=answers.despite_preflight,
         )
 
     def note(text: str, who: str, trial: int | None) -> None:
@@ -103,10 +107,11 @@ Note = Callable[[str, str, int | None], None]
 """Keeps a note: text, who, and the trial it is about."""
 
 
-class PersonOperator:
-    """Somebody who places the robot, watches it and counts cells; asked in the terminal what no option has answered."""
+class PersonOperator(Operator):
+    """A person who places the robot, watches it and counts cells; asked in the terminal what no option has answered."""
 
     def __init__(self, answers: Answers, note: Note, *, to_stderr: bool = False) -> None:
+        super().__init__()
         self._answers = answers
         self._note = note
         self._to_stderr = to_stderr
@@ -118,6 +123,7 @@ class PersonOperator:
 
     def meet(self, robot: Robot) -> None:
         """Say that the robot will turn."""
+        super().meet(robot)
         self._say(f"The robot answers ({robot.label}). For the pre-flight it turns on the spot for a moment.")
         if self._answers.wait:
             self._ask("Stand it free, then press Enter: ", "--no-wait drives without waiting")
@@ -155,24 +161,29 @@ class PersonOperator:
     def place(self, card: Card) -> None:
         """Ask for the robot at its start, with the pen."""
         self._say(f"\nTrial {card.trial.trial}: {card.title}. {card.n_left} left in this generation.")
-        self._say(f"Sheet {card.trial.sheet}, pen: {card.pen}.")
+        draws = card.observe == "cells"
+        if draws:
+            self._say(f"Sheet {card.trial.sheet}, pen: {card.pen}.")
         if self._is_first:
             self._say(sketch(card.arena))
             self._is_first = False
         if not self._answers.wait:
+            super().place(card)
             return
         while True:
             answer = self._ask(
-                "Robot at the start, pen in: Enter drives; n TEXT adds a note: ",
+                f"Robot at the start{', pen in' if draws else ''}: Enter drives; n TEXT adds a note: ",
                 "--no-wait drives without waiting",
             )
             if answer.startswith("n "):
                 self._note(answer[2:], self._answers.name, card.trial.trial)
             elif not answer:
+                super().place(card)
                 return
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
         """Show the step; whether a key that aborts was pressed."""
+        super().watch(card, step, seen, command)
         if not self._is_terminal:
             return False
         raw = " ".join(f"{value:5.0f}" for value in seen.raw)
@@ -184,9 +195,9 @@ class PersonOperator:
             return keys.read(0.0) in _ABORTING
 
     def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
-        """Nothing yet: somebody has to look first."""
+        """The score that a camera saw; None without one, because the person has to look first."""
         self._say("Done; the motors are stopped.")
-        return None
+        return super().drawn(card, driven)
 
     # a sheet
 

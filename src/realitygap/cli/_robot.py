@@ -6,14 +6,11 @@ import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from realitygap.errors import RobotError
-
-if TYPE_CHECKING:
-    from realitygap.robots.scribbler import Scribbler
 
 robot = typer.Typer(
     name="robot",
@@ -28,8 +25,8 @@ Port = Annotated[
     str,
     typer.Argument(
         metavar="PORT",
-        help="/dev/rfcomm0, /dev/ttyUSB0, COM3, socket://HOST:PORT or emulator://s2?fluke=2; `realitygap robot list` "
-        "names those that are there.",
+        help="/dev/rfcomm0, /dev/ttyUSB0, COM3, socket://HOST:PORT or emulator://s2?fluke=2; thymio:PORT for a Thymio. "
+        "`realitygap robot list` names those that are there.",
     ),
 ]
 Record = Annotated[
@@ -41,19 +38,31 @@ LONGEST_DRIVE_S = 3600.0
 
 
 @contextmanager
-def _opened(port: str, record: Path | None) -> Iterator[Scribbler]:
-    """The robot on a port, stopped and let go of in the end."""
-    from realitygap.robots.scribbler import Scribbler, is_in_this_program
+def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
+    """The functions of the robot's family and the robot on a port, stopped and let go of in the end."""
+    from realitygap.robots.scribbler import is_in_this_program
 
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
     if is_in_this_program(port):
         import realitygap.emulator  # noqa: F401  # its ports are known from then on
+    from realitygap.robots import open_on
+
     try:
-        with Scribbler(port, record=record) as opened:
-            yield opened
+        terminal, robot = open_on(port, record)
+        with robot as opened:
+            yield terminal, opened
     except ValueError as error:
         raise RobotError(str(error)) from error
+
+
+@contextmanager
+def _opened_with(part: str, port: str, record: Path | None) -> Iterator[Any]:
+    """The robot on a port, if it has a part that not every robot has."""
+    with _opened(port, record) as (_, opened):
+        if not hasattr(opened, part):
+            raise RobotError(f"The robot on {port} cannot do this: it has no {part}.")
+        yield opened
 
 
 @robot.command("list")
@@ -64,9 +73,9 @@ def list_ports(as_json: Json = False) -> None:
 
     In Python: realitygap.robots.scribbler.find_ports()
     """
-    from realitygap.robots.scribbler import find_ports
+    from realitygap.robots import list_ports as ports
 
-    found = find_ports()
+    found = ports()
     if as_json:
         typer.echo(json.dumps([guess._asdict() for guess in found], indent=2))
     elif found:
@@ -83,10 +92,8 @@ def info(port: Port, as_json: Json = False, record: Record = None) -> None:
 
     In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").info
     """
-    with _opened(port, record) as opened:
-        found = vars(opened.info) | {"name": opened.name if opened.info.model else None}
-        if opened.info.fluke != "none":
-            found["ahead"] = opened.forwardness
+    with _opened(port, record) as (terminal, opened):
+        found = terminal.info(opened)
     _print(found, as_json)
 
 
@@ -98,14 +105,8 @@ def sense(port: Port, as_json: Json = False, record: Record = None) -> None:
 
     In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").sensors()
     """
-    with _opened(port, record) as opened:
-        seen: dict[str, Any] = {}
-        if opened.info.model is not None:
-            seen |= opened.sensors()._asdict()
-        if opened.info.model == "s2":
-            seen |= {"distance": opened.distance(), "encoders": opened.encoders()}
-        if opened.info.fluke != "none":
-            seen |= {"obstacle": opened.obstacle(), "bright": opened.bright(), "battery_v": opened.battery()}
+    with _opened(port, record) as (terminal, opened):
+        seen = terminal.sense(opened)
     _print(seen, as_json)
 
 
@@ -129,15 +130,13 @@ def drive(
 
     if not 0 <= seconds <= LONGEST_DRIVE_S:
         raise RobotError(f"--seconds is {seconds:g}, expected 0 to {LONGEST_DRIVE_S:g}.")
-    with _opened(port, record) as opened:
+    with _opened(port, record) as (_, opened):
         opened.step_s = seconds
         opened.drive(Command(move, turn))
         opened.stop()
-        faults = opened.faults
-    if faults.recoveries:
-        typer.echo(
-            f"The link was disturbed {faults.recoveries} times; the robot stood still meanwhile.", err=True
-        )
+        recoveries = opened.faults.recoveries if hasattr(opened, "faults") else 0
+    if recoveries:
+        typer.echo(f"The link was disturbed {recoveries} times; the robot stood still meanwhile.", err=True)
 
 
 @robot.command("stop")
@@ -148,7 +147,7 @@ def stop(port: Port) -> None:
 
     In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").stop()
     """
-    with _opened(port, None) as opened:
+    with _opened(port, None) as (_, opened):
         opened.stop()
     typer.echo("The motors are off.")
 
@@ -161,9 +160,10 @@ def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
 
     In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").battery()
     """
-    with _opened(port, record) as opened:
-        volts = opened.battery()
-    typer.echo(json.dumps({"battery_v": round(volts, 3)}) if as_json else f"{volts:.2f} V")
+    with _opened(port, record) as (terminal, opened):
+        name, value = terminal.battery(opened)
+    text = f"{value:.2f} V" if name.endswith("_v") else f"{value:g}, without a unit"
+    typer.echo(json.dumps({name: round(value, 3)}) if as_json else text)
 
 
 @robot.command("picture")
@@ -188,8 +188,8 @@ def picture(
     """
     if out.suffix.lower() != ".png":
         raise RobotError(f"{out} does not end in .png: pictures are written as PNG.")
-    with _opened(port, record) as opened:
-        pixels = opened.picture(kind)  # type: ignore[arg-type]  # checked there
+    with _opened_with("picture", port, record) as opened:
+        pixels = opened.picture(kind)
     from PIL import Image
 
     Image.fromarray(pixels).save(out, "PNG")
@@ -210,7 +210,7 @@ def beep(
 
     In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").beep(0.5, 440)
     """
-    with _opened(port, record) as opened:
+    with _opened_with("beep", port, record) as opened:
         opened.beep(seconds, hz, hz2)
 
 

@@ -11,8 +11,7 @@ import typer
 from realitygap.errors import RealityGapError, StudyError
 
 if TYPE_CHECKING:
-    from realitygap.report import Each
-    from realitygap.report._show import Subject
+    from realitygap.report import Each, Subject
 
 
 def show(

@@ -22,7 +22,7 @@ def simulate(
 
     In Python: realitygap.trials.simulate_file(case, out)
     """
-    from realitygap.trials._scene import simulate_file
+    from realitygap.trials import simulate_file
 
     described, track = simulate_file(case, out)
     for i, robot in enumerate(described.robots):

@@ -13,10 +13,8 @@ import typer
 from realitygap.errors import StudyError
 
 from ._browser import show_page
-from ._camera import CAMERA_HELP, operated_under_camera
-from ._closing import CLOSING, closing_plan, refuse_options, run_closing
+from ._closing import CLOSING
 from ._code import ALLOW_CODE_HELP, code_permission
-from ._operator import Answers, choose_operator
 from ._results import written_report
 
 if TYPE_CHECKING:
@@ -33,7 +31,7 @@ def run(
         str,
         typer.Argument(
             metavar="STUDY",
-            help="paper, paper-choices, paper-robot, distances, closing-the-gap, or a study file (.toml).",
+            help="Name of a study, such as paper, paper-choices, or distances; or a study file (.toml).",
         ),
     ],
     replicates: Annotated[
@@ -68,61 +66,6 @@ def run(
             "slurm:20 asks for 20 jobs.",
         ),
     ] = None,
-    port: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PORT",
-            help="Of the robot that drives the conditions on the platform scribbler: /dev/rfcomm0, COM3, "
-            "socket://HOST:PORT, or an emulated one in this program, emulator://s2?speed=off.",
-        ),
-    ] = None,
-    witness: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HOST:PORT",
-            help="Of an emulator in another program: it places its robot and sees what it drew.",
-        ),
-    ] = None,
-    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
-    in_flight: Annotated[
-        str | None,
-        typer.Option(
-            metavar="VERDICT",
-            help="What becomes of a trial that was cut off: void or driven. [default: asks]",
-        ),
-    ] = None,
-    score: Annotated[
-        str, typer.Option(metavar="WHEN", help="When to ask for cells: after each trial or sheet, or later.")
-    ] = "sheet",
-    no_wait: Annotated[
-        bool, typer.Option("--no-wait", help="Drive each trial without waiting for Enter.")
-    ] = False,
-    despite_preflight: Annotated[
-        bool, typer.Option("--despite-preflight", help="Drive whatever the pre-flight finds.")
-    ] = False,
-    who: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Who counts cells. [default: your account's name]")
-    ] = None,
-    twins: Annotated[
-        int | None, typer.Option(min=1, max=900, help="Of closing-the-gap: of each family. [default: 10]")
-    ] = None,
-    families: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="Of closing-the-gap. [default: close,worn,slippery,delayed]"),
-    ] = None,
-    budgets: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LIST", help="Of closing-the-gap: trials to calibrate by. [default: 0,10,20,40]"
-        ),
-    ] = None,
-    observe: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="Of closing-the-gap: what of them is seen. [default: cells,track]"),
-    ] = None,
-    small: Annotated[
-        bool, typer.Option("--small", help="Of closing-the-gap: minutes, to see that all of it works.")
-    ] = False,
     allow_code: Annotated[bool, typer.Option("--allow-code", help=ALLOW_CODE_HELP)] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
@@ -137,61 +80,27 @@ def run(
     A study may have tasks in Python files. The first time that such a file is met, it is shown, and you are asked
     whether it may run. The answer is remembered until the file changes.
 
-    With --port, a robot drives the conditions on the platform scribbler: you are led through its trials, and nothing
-    that was scored is lost. Without it they are left as they are.
-
-    closing-the-gap is a study of its own: twins of several families, each calibrated by a few trials and transferred to
-    (extra twin). --threads says how many twins go on at once.
+    `realitygap drive` drives the conditions that are on a robot.
 
     Example: realitygap run paper --replicates 1000
 
-    Example: realitygap run closing-the-gap --small
-
-    Example: realitygap run paper-robot --port /dev/rfcomm0
-
-    Example: realitygap run paper-robot --port "emulator://s2?fluke=2&speed=off"
-
     In Python: realitygap.run_study("paper", replicates=1000)
-
-    In Python: realitygap.study.closing_the_gap("results/closing-the-gap")
     """
     if study == CLOSING:
-        others = {"replicates": replicates, "cluster": cluster, "chunk": chunk, "fresh": fresh, "port": port}
-        refuse_options(
-            study,
-            {
-                **others,
-                "randomize": randomize,
-                "witness": witness,
-                "camera": camera,
-                "in-flight": in_flight,
-                "allow-code": allow_code,
-            },
-        )
-        plan = closing_plan(
-            small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed
-        )
-        run_closing(plan, out, threads, as_json=as_json, open_page=open_page)
-        return
-    own = {"twins": twins, "families": families, "budgets": budgets, "observe": observe, "small": small}
-    refuse_options(study, own)
-    from realitygap.study import load_study, refuse_port_without_robot, run_study
+        raise StudyError(f"{CLOSING} is a command: realitygap {CLOSING}")
+    from realitygap.study import load_study, run_study
 
     if threads is not None and cluster is not None:
         raise StudyError(
             "--threads and --cluster exclude each other. How many threads a worker of a cluster has is said where it "
             "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
-    answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
-    if port is None and (witness is not None or camera is not None or answers != Answers()):
-        raise StudyError(
-            "--witness, --camera, --in-flight, --score, --no-wait, --despite-preflight and --who go with --port: they "
-            "are about the robot there."
-        )
     resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
-    if port is not None:
-        refuse_port_without_robot(resolved)
-    permission = code_permission(allow_code)
+    if resolved.n_physical == len(resolved.conditions):
+        raise StudyError(
+            f"Every condition of study {resolved.about.name!r} is on a robot. Drive it: "
+            f"realitygap drive {shlex.quote(study)} --port PORT"
+        )
     try:
         with RunsBar(quiet=as_json) as bar:
             result = run_study(
@@ -202,20 +111,14 @@ def run(
                 fresh=fresh,
                 cluster=cluster,
                 tell=bar.show,
-                allow_code=permission,
+                allow_code=code_permission(allow_code),
             )
-        if port is not None:
-            path = result.folder.path
-            operator = choose_operator(port, witness, answers, path, quiet=as_json)
-            with operated_under_camera(camera, resolved, operator) as looking:
-                driven = run_study(resolved, path, port=port, operator=looking, allow_code=permission)
-            result = dataclasses.replace(result, physical=driven.physical)
     except KeyboardInterrupt:
         typer.echo(
             "Interrupted. What was published is safe; the same command goes on where it stopped.", err=True
         )
         raise typer.Exit(130) from None
-    _print_result(result, as_json=as_json)
+    print_result(result, as_json=as_json)
     if open_page:
         show_page(written_report(result.folder.path, to_stderr=as_json))
 
@@ -293,7 +196,9 @@ class RunsBar:
             return
         if not self._progress.live.is_started:
             if not self._console.is_terminal:
-                self._console.print("Compiling or loading the kernels (the first time takes some 20 s) ...")
+                self._console.print(
+                    "Compiling or loading the kernels (compiling takes up to a minute, once per version) ..."
+                )
             self._progress.start()
         if progress.waiting_for and not self._console.is_terminal:
             self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
@@ -315,7 +220,8 @@ class RunsBar:
         )
 
 
-def _print_result(result: StudyResult, *, as_json: bool) -> None:
+def print_result(result: StudyResult, *, as_json: bool) -> None:
+    """Print the summary of a study, and how many runs are complete."""
     from realitygap.report import summarize, summarize_tasks
 
     there = result.n_runs or (result.physical is not None and result.physical.n_complete)
@@ -392,4 +298,4 @@ def _print_physical(result: StudyResult, *, to_stderr: bool = False) -> None:
     if physical.waiting:
         typer.echo(physical.waiting, err=to_stderr)
     elif left:
-        typer.echo("The same command with --port PORT drives what is left.", err=to_stderr)
+        typer.echo("`realitygap drive` drives the others.", err=to_stderr)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-import typer
-
-from ._calibrate_attendant import TerminalAttendant
+from ._sheet import sheet_observer
 
 if TYPE_CHECKING:
-    from realitygap.trials import Target, TrialPlan
-    from realitygap.world import Arena, Pose
+    from realitygap.trials import Target
+    from realitygap.world import Arena
 
 
 def opened_target(
@@ -23,27 +21,8 @@ def opened_target(
         StudyError: There is no such platform, or nobody attends to the robot.
         RobotError: It cannot be reached.
     """
-    from realitygap.study import open_target
+    from realitygap.platforms import open_target, platform_of
 
-    name, _, port = spec.partition(":")
-    is_led = (
-        name == "scribbler" and witness is None and not port.startswith("emulator:") and sys.stdin.isatty()
-    )
-    attendant = _Placing(arena) if is_led else None
-    return open_target(spec, arena, witness=witness, attendant=attendant, processes=processes, key=seed)
-
-
-class _Placing(TerminalAttendant):
-    """Asks for the robot to be put at the start of each trial."""
-
-    def place(self, plan: TrialPlan, start: Pose) -> None:
-        """It stands there when Enter is pressed."""
-        x, y, degrees = start.x / 0.0254, start.y / 0.0254, start.heading * 180 / 3.141592653589793
-        typer.prompt(
-            f"Trial {plan.number}, {plan.purpose}: put the robot {x:.1f} in from the left wall and {y:.1f} in from the "
-            f"lower one, facing {degrees:.0f} degrees, with a fresh sheet and pen. Enter",
-            default="",
-            show_default=False,
-            err=True,
-        )
-        super().place(plan, start)
+    is_led = witness is None and sys.stdin.isatty() and platform_of(spec).needs_person
+    observer = sheet_observer(asks_for_start=True) if is_led else None
+    return open_target(spec, arena, witness=witness, observer=observer, processes=processes, key=seed)

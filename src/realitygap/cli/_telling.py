@@ -9,25 +9,16 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from realitygap.trials import Card, DrivenTrial, Preflight, Verdict, WitnessOperator
+from realitygap.trials import Card, DrivenTrial, Operator, Preflight
 
 if TYPE_CHECKING:
-    from realitygap.emulator import Witness
     from realitygap.records import Score, Trial
 
 _SILENCE_S = 10.0
 """After so long a silence the next trial is told of, too."""
 
 
-def telling_witness(
-    witness: Witness | None, in_flight: Verdict, *, despite_preflight: bool, quiet: bool
-) -> WitnessOperator:
-    """Return the witness of an emulated robot, which reports each generation unless it is to be quiet."""
-    kind = WitnessOperator if quiet else _TellingWitness
-    return kind(witness, in_flight=in_flight, despite_preflight=despite_preflight)
-
-
-class _TellingWitness(WitnessOperator):
+class TellingOperator(Operator):
     """Tells of each generation that is closed, and of a trial where that takes long."""
 
     _told = 0.0
@@ -44,10 +35,10 @@ class _TellingWitness(WitnessOperator):
         self._told = self._told or time.monotonic()
         super().place(card)
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score:
+    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
         """The cells along the driven line."""
         score = super().drawn(card, driven)
-        if time.monotonic() - self._told > _SILENCE_S:
+        if score is not None and time.monotonic() - self._told > _SILENCE_S:
             self._say(f"Trial {card.trial.trial}, {card.title}: {len(set(score.cells))} cells.")
         return score
 

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ._code import AllowPlatforms
+
 if TYPE_CHECKING:
-    from realitygap.study import Estimate, TransferResult
+    from realitygap.gap import Estimate
+    from realitygap.study import TransferResult
 
 
 def transfer(
@@ -34,7 +37,8 @@ def transfer(
         ),
     ] = None,
     condition: Annotated[
-        str | None, typer.Option(help="Of the study. [default: its first for coverage, best on sim]")
+        str | None,
+        typer.Option(help="Of the study. [default: its first that selects for the score, best on sim]"),
     ] = None,
     calibration: Annotated[
         Path | None,
@@ -66,6 +70,7 @@ def transfer(
     witness: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Of an emulator in another program.")
     ] = None,
+    allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Compare strategies that transfer controllers.
@@ -81,6 +86,8 @@ def transfer(
     evolved on the target.
 
     Example: realitygap transfer sim-paper --to twin:worn-1.toml --budget 20
+
+    Example: realitygap transfer light --to sim:khepera --budget 10 --strategy select
 
     Example: realitygap transfer sim-paper --to jyro --budget 10 --strategy plain --strategy select --json
 
@@ -110,6 +117,7 @@ def transfer(
                 observe=observe,  # type: ignore[arg-type]  # checked there
                 calibration=calibration,
                 seed=seed,
+                allow_code=allow_code,
                 tell=lambda text: typer.echo(text, err=True),
             )
     except KeyboardInterrupt:
@@ -130,7 +138,8 @@ def _with_interval(found: Estimate) -> str:
 def _print(result: TransferResult) -> None:
     typer.echo(
         f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
-        f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials each"
+        f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials "
+        f"each, {result.score}"
     )
     typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:

@@ -11,6 +11,8 @@ import typer
 
 from realitygap.errors import StudyError
 
+from ._code import AllowPlatforms
+
 
 def try_genome(
     genome: Annotated[
@@ -30,6 +32,10 @@ def try_genome(
             help="Names of the controller's inputs, such as range.0,range.1,bias, if its file has none.",
         ),
     ] = None,
+    outputs: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="Names of its outputs: move,turn or left,right."),
+    ] = None,
     arena: Annotated[str, typer.Option(metavar="NAME", help="Name or file of an arena.")] = "paper",
     witness: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="The witness of an emulator in another program.")
@@ -39,6 +45,7 @@ def try_genome(
         Path | None,
         typer.Option("-o", "--out", metavar="FILE", help="Keep the trials, one a line, as they come."),
     ] = None,
+    allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the coverage as JSON.")] = False,
 ) -> None:
     """Drive one exported controller on any platform.
@@ -56,7 +63,7 @@ def try_genome(
     In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
     """
     from realitygap.errors import did_you_mean
-    from realitygap.evolution import ControllerInterface, Genome
+    from realitygap.evolution import OUTPUTS, ControllerInterface, Genome
     from realitygap.records import OBSERVATIONS
     from realitygap.study import try_on
     from realitygap.world import load_arena
@@ -66,9 +73,10 @@ def try_genome(
     if observe not in OBSERVATIONS:
         raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
     controller = Genome.load(genome)
-    if inputs is not None:
-        names = ControllerInterface(tuple(name.strip() for name in inputs.split(",")))
-        controller = controller.with_interface(names)
+    if inputs is not None or outputs is not None:
+        seen = controller.interface.inputs if inputs is None else _names(inputs)
+        answered = OUTPUTS if outputs is None else _names(outputs)
+        controller = controller.with_interface(ControllerInterface(seen, answered))
     with opened_target(on, load_arena(arena), witness=witness, seed=seed) as target:
         tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
         n_cells = target.arena.grid.n_cells
@@ -81,3 +89,7 @@ def try_genome(
             f"{target.name} ({target.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
             f"{mean:.3f} of {n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"
         )
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(","))

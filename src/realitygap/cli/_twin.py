@@ -64,6 +64,21 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
         typer.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
 
 
+@twin.command("build-enki")
+def build() -> None:
+    """Compile the program in which Enki simulates a Thymio.
+
+    The platform enki needs it. It needs g++ and libenki-dev.
+
+    Example: realitygap twin build-enki
+
+    In Python: realitygap.platforms.build_enki()
+    """
+    from realitygap.platforms import build_enki
+
+    typer.echo(f"Built: {build_enki()}")
+
+
 @twin.command("sample")
 def sample(
     family: Annotated[

@@ -8,6 +8,7 @@ same shapes into its figures, and matplotlib is imported only there.
 from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
+from ._shown import picture_of
 from ._x11 import hex_of, rgb_of
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Shape",
     "Text",
     "hex_of",
+    "picture_of",
     "rgb_of",
     "to_image",
     "to_png",

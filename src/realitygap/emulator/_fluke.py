@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
-from realitygap.robots.scribbler._opcodes import FLUKE_2_COMMANDS, FLUKE_COMMANDS, PACKET, FlukeLengths, Op
+from realitygap.robots.scribbler.opcodes import FLUKE_2_COMMANDS, FLUKE_COMMANDS, PACKET, FlukeLengths, Op
 
 from ._camera import Camera, Window
 from ._memory import SCRIBBLER_AHEAD, Memory

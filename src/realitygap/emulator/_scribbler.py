@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Literal, Protocol
 
-from realitygap.robots.scribbler._opcodes import PACKET, Op
+from realitygap.robots.scribbler.opcodes import PACKET, Op
 
 from ._memory import Memory
 from ._motors import S2Motors, Segment

@@ -116,11 +116,11 @@ class CellsOnLine:
 
     def follow(self, points: array[float]) -> None:
         """Go on along points of time, x, y and heading each."""
-        from realitygap.kernels._coverage import (
+        from realitygap.kernels.tasks.coverage import (  # compiled code takes a while to import
             to_grid,
             visit,
             visit_line,
-        )  # compiled code takes a while to import
+        )
 
         grid = self._grid
         size = (grid.columns, grid.rows)

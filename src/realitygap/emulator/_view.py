@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realitygap.robots.scribbler._opcodes import Op
+from realitygap.robots.scribbler.opcodes import Op
 
 from ._emulator import Emulator
 

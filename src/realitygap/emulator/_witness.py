@@ -142,7 +142,7 @@ class DirectWitness:
 
 
 def _cells_at(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
-    from realitygap.kernels._coverage import to_grid  # compiled code takes a while to import
+    from realitygap.kernels.tasks.coverage import to_grid  # compiled code takes a while to import
 
     found = np.searchsorted(path[:, 0], np.asarray(times, dtype=float) + 1e-9, side="right") - 1
     cells: dict[int, None] = {}

@@ -2,10 +2,30 @@
 
 from ._archive import NoveltyArchive
 from ._archive_members import Member, archive_members
-from ._distances import DISTANCES, BehaviorDistance, behavior_distance, distance_kind
+from ._c import to_c
+from ._distances import (
+    DISTANCES,
+    BehaviorDistance,
+    CellOrder,
+    behavior_distance,
+    distance_kind,
+    measure_of,
+    pack_behaviors,
+)
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
 from ._graph import to_networkx
-from ._interface import PAPER_INPUTS, ControllerInterface, Sense, inputs_of_ranges, paper_interface
+from ._interface import (
+    OUTPUTS,
+    PAPER_INPUTS,
+    WHEELS,
+    Channels,
+    ControllerInterface,
+    Sense,
+    inputs_of_robot,
+    listed,
+    paper_interface,
+)
+from ._json import interface_to_dict, to_text
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -23,8 +43,12 @@ from ._settings import NAMED_SETTINGS, NeatSettings
 __all__ = [
     "DISTANCES",
     "NAMED_SETTINGS",
+    "OUTPUTS",
     "PAPER_INPUTS",
+    "WHEELS",
     "BehaviorDistance",
+    "CellOrder",
+    "Channels",
     "ConnectionGene",
     "ControllerInterface",
     "Genome",
@@ -45,12 +69,18 @@ __all__ = [
     "euclidean",
     "genome_from_record",
     "genome_record",
-    "inputs_of_ranges",
+    "inputs_of_robot",
+    "interface_to_dict",
     "largest_cell_distance",
+    "listed",
+    "measure_of",
     "network_picture",
+    "pack_behaviors",
     "paper_interface",
     "random_key",
     "sorted_cells_distance",
+    "to_c",
     "to_networkx",
     "to_onnx",
+    "to_text",
 ]

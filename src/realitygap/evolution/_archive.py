@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.kernels import _distances, _novelty
+from realitygap.kernels.neat import distances
+from realitygap.kernels.neat import novelty as novelty_kernels
 
 from ._distances import Cells, measure_of, pack_behaviors
 from ._novelty import NoveltySettings, PaperArchive
@@ -32,7 +33,7 @@ class NoveltyArchive:
         self._rows = rows
         is_paper = self.settings.kind == "paper"
         self._paper = PaperArchive(self.settings, columns=columns, rows=rows) if is_paper else None
-        self._archived: _distances.Behaviors = _distances.make_behaviors(0, columns * rows)
+        self._archived: distances.Behaviors = distances.make_behaviors(0, columns * rows)
         self._state = np.zeros(1, np.int64)
         self._counters = np.zeros(2, np.int64)
         self._threshold = np.array([self.settings.threshold], np.float64)
@@ -41,7 +42,7 @@ class NoveltyArchive:
         return int(self._state[0]) if self._paper is None else len(self._paper)
 
     @property
-    def packed(self) -> _distances.Behaviors:
+    def packed(self) -> distances.Behaviors:
         """The behaviors as kernels read them; the first `len(self)` of them count."""
         return self._archived if self._paper is None else self._paper._archive.behaviors
 
@@ -65,11 +66,11 @@ class NoveltyArchive:
         packed = pack_behaviors(measure, behaviors, self._columns, self._rows)
         n = len(packed.n_cells)
         self._make_room(n)
-        room = _novelty.NearestRoom(
+        room = novelty_kernels.NearestRoom(
             np.empty(n + len(self._archived.n_cells)), np.empty(settings.neighbors), np.empty(n, np.bool_)
         )
         novelty = np.empty(n)
-        _novelty.nearest_archive_step(
+        novelty_kernels.nearest_archive_step(
             packed,
             measure,
             settings.patience,
@@ -86,7 +87,7 @@ class NoveltyArchive:
         """Let all of n individuals enter, should they be novel; room grows by half at least."""
         held = len(self._archived.n_cells)
         if self._state[0] + n > held:
-            more = _distances.make_behaviors(max(n, held // 2), self._columns * self._rows)
-            self._archived = _distances.Behaviors(
+            more = distances.make_behaviors(max(n, held // 2), self._columns * self._rows)
+            self._archived = distances.Behaviors(
                 *(np.concatenate([old, new]) for old, new in zip(self._archived, more, strict=True))
             )

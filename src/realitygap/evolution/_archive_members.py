@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from realitygap.kernels._distances import Behaviors
+from realitygap.kernels.neat.distances import Behaviors
 
 from ._archive import NoveltyArchive
 from ._distances import Cells, measure_of, pack_behaviors

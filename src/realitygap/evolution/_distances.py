@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import did_you_mean
-from realitygap.kernels import _distances
-from realitygap.kernels._distances import Behaviors, Measure
+from realitygap.kernels.neat import distances as distances_kernels
+from realitygap.kernels.neat.distances import Behaviors, Measure
 
 Cells = Sequence[int] | NDArray[np.integer]
-Sort = Literal["x-then-y", "y-then-x"]
+CellOrder = Literal["x-then-y", "y-then-x"]
 DistanceName = Literal["paper", "ordered", "jaccard", "hamming", "final", "edit", "alignment"]
 
 
@@ -53,7 +53,7 @@ class BehaviorDistance:
         *,
         columns: int = 12,
         rows: int = 6,
-        sort: Sort = "x-then-y",
+        sort: CellOrder = "x-then-y",
     ) -> NDArray[np.float64]:
         """Of each behavior to each of some others.
 
@@ -75,7 +75,7 @@ class BehaviorDistance:
         one = pack_behaviors(measure, behaviors, columns, rows)
         other = one if others is None else pack_behaviors(measure, others, columns, rows)
         found = np.empty((len(one.n_cells), len(other.n_cells)))
-        _distances.distances_between(measure, one, other, found)
+        distances_kernels.distances_between(measure, one, other, found)
         return found
 
 
@@ -163,13 +163,13 @@ DISTANCES: dict[str, BehaviorDistance] = {
 """The distances that `novelty.distance` names."""
 
 _KINDS = {
-    "paper": _distances.PAPER,
-    "ordered": _distances.ORDERED,
-    "jaccard": _distances.JACCARD,
-    "hamming": _distances.HAMMING,
-    "final": _distances.FINAL,
-    "edit": _distances.EDIT,
-    "alignment": _distances.ALIGNMENT,
+    "paper": distances_kernels.PAPER,
+    "ordered": distances_kernels.ORDERED,
+    "jaccard": distances_kernels.JACCARD,
+    "hamming": distances_kernels.HAMMING,
+    "final": distances_kernels.FINAL,
+    "edit": distances_kernels.EDIT,
+    "alignment": distances_kernels.ALIGNMENT,
 }
 
 
@@ -190,12 +190,12 @@ def distance_kind(name: str) -> int:
 
 
 @functools.cache
-def _made(name: str, columns: int, rows: int, sort: Sort) -> Measure:
-    measure: Measure = _distances.make_measure(_KINDS[name], columns, rows, sort == "x-then-y")
+def _made(name: str, columns: int, rows: int, sort: CellOrder) -> Measure:
+    measure: Measure = distances_kernels.make_measure(_KINDS[name], columns, rows, sort == "x-then-y")
     return measure
 
 
-def measure_of(name: str, columns: int, rows: int, sort: Sort) -> Measure:
+def measure_of(name: str, columns: int, rows: int, sort: CellOrder) -> Measure:
     """The distance in the form that kernels read, with room of its own: threads may have one each."""
     return _made(name, columns, rows, sort)._replace(room=np.zeros(columns * rows + 1))
 
@@ -209,13 +209,13 @@ def pack_behaviors(
         TypeError: A cell that is not a whole number.
         ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
     """
-    if measure.kind == _distances.FINAL:
+    if measure.kind == distances_kernels.FINAL:
         return _pack_positions(behaviors)
     lists: list[Any] = list(behaviors)  # type: ignore[arg-type]  # one number alone is no list, as Python says
-    packed: Behaviors = _distances.make_behaviors(len(lists), columns * rows)
+    packed: Behaviors = distances_kernels.make_behaviors(len(lists), columns * rows)
     for row, cells in enumerate(lists):
         visited = first_visits(cells, columns, rows)
-        _distances.describe(measure, visited, len(visited), 0.0, 0.0, packed, row)
+        distances_kernels.describe(measure, visited, len(visited), 0.0, 0.0, packed, row)
     return packed
 
 

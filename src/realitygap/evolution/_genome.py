@@ -11,9 +11,10 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.drawing import picture_of
 from realitygap.errors import ControllerError, RecordError
-from realitygap.kernels._genome import Genomes, NeatRules, make_genomes
-from realitygap.kernels._network import Networks, activate, decode_rows, make_networks
+from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
+from realitygap.kernels.neat.network import Networks, activate, decode_rows, make_networks
 from realitygap.records import write_whole
 
 from . import _json
@@ -221,6 +222,8 @@ class Genome:
                 f"The names are {', '.join(inputs)} and {', '.join(interface.outputs)}, and the controller has {n} "
                 f"inputs, of which {at}, and {m} outputs. Name each of them."
             )
+        if rules.drives_wheels != interface.drives_wheels:
+            rules = rules._replace(drives_wheels=interface.drives_wheels)
         named = type(self)(self._genomes, self._row, rules, self.bias_value)
         named._interface = None if interface == self._paper else interface
         return named
@@ -359,9 +362,7 @@ class Genome:
             raise RecordError(f"{where} is not a whole genome: {error}") from error
 
     def _repr_svg_(self) -> str:
-        from ._picture import network_picture
-
-        return network_picture(self).to_svg(300.0)
+        return picture_of(self).to_svg(300.0)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Genome):

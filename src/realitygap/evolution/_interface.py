@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import ControllerError
 
 PAPER_INPUTS: tuple[str, ...] = ("obstacle", "stall", "time")
 OUTPUTS = ("move", "turn")
+WHEELS = ("left", "right")
 CONSTANT = "bias"
+COMPUTED = frozenset((*PAPER_INPUTS, CONSTANT, "last_move", "last_turn"))
+"""Inputs that every robot with range sensors has: they are computed from readings, step, and the last command."""
 
-Sense = Callable[[Sequence[float], bool, int], list[float]]
-"""The inputs of a network, without the constant one, from range readings, stall, and the number of the step."""
+Channels = Mapping[str, float]
+"""Values of sensors by name, such as `light.0`, each scaled as a network sees it."""
+
+Sense = Callable[[Sequence[float], bool, int, Channels], list[float]]
+"""The inputs of a network, without the constant one, from range readings, stall, the number of the step, and the values
+of other inputs by name."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +32,7 @@ class ControllerInterface:
     Attributes:
         inputs: As a task names them: `obstacle` (the largest range reading), `stall`, `time` (step / steps), `range.K`
             and other sensors of the robot, and `bias` for the constant input.
-        outputs: `move` and `turn`, each -1..1.
+        outputs: `move` and `turn`, or the wheels `left` and `right`, each -1..1.
 
     Raises:
         ControllerError: An input has no name, or the outputs are others.
@@ -38,15 +47,42 @@ class ControllerInterface:
                 f"The inputs of a controller are {list(self.inputs)}, expected a name for each, and {CONSTANT!r} at "
                 "most once."
             )
-        if self.outputs != OUTPUTS:
+        if self.outputs not in (OUTPUTS, WHEELS):
             raise ControllerError(
-                f"The outputs of a controller are {', '.join(self.outputs)}, expected {', '.join(OUTPUTS)}."
+                f"The outputs of a controller are {', '.join(self.outputs)}, expected {', '.join(OUTPUTS)}, or "
+                f"{', '.join(WHEELS)}."
             )
 
     @property
     def sensed(self) -> tuple[str, ...]:
         """The inputs without the constant one, which the network has by itself."""
         return tuple(name for name in self.inputs if name != CONSTANT)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The inputs that a robot reads from sensors other than its range sensors."""
+        return tuple(name for name in self.inputs if name not in COMPUTED and not name.startswith("range."))
+
+    @property
+    def drives_wheels(self) -> bool:
+        """Whether the outputs are the speeds of two wheels."""
+        return self.outputs == WHEELS
+
+    def commands(self, outputs: ArrayLike) -> NDArray[np.float64]:
+        """Return the commands that outputs are.
+
+        Args:
+            outputs: (..., 2) of networks; limited to -1..1, and 0 where they are no number.
+
+        Returns:
+            (..., 2) move and turn, -1..1. Wheels drive move = (left + right) / 2 and turn = (right - left) / 2.
+        """
+        limited = np.asarray(outputs, np.float64)
+        limited = np.clip(np.where(np.isnan(limited), 0.0, limited), -1.0, 1.0)
+        if not self.drives_wheels:
+            return limited
+        left, right = limited[..., 0], limited[..., 1]
+        return np.stack([(left + right) / 2, (right - left) / 2], axis=-1)
 
     def check(self, there: Sequence[str], who: str, where: str) -> None:
         """Refuse a platform that lacks an input.
@@ -69,16 +105,15 @@ class ControllerInterface:
             )
 
     def bind(self, steps: int) -> Sense:
-        """Return what computes the inputs on a robot with range sensors.
+        """Return what computes the inputs on a robot.
 
         Args:
             steps: Commands in the whole trial, of which `time` is the share that is over.
-
-        Raises:
-            ControllerError: An input is not computed from range readings, stall and time.
         """
         parts = [_part(name, steps) for name in self.sensed]
-        return lambda readings, stalled, step: [part(readings, stalled, step) for part in parts]
+        return lambda readings, stalled, step, channels: [
+            part(readings, stalled, step, channels) for part in parts
+        ]
 
 
 def paper_interface(*, constant: bool) -> ControllerInterface:
@@ -92,9 +127,14 @@ def paper_interface(*, constant: bool) -> ControllerInterface:
     return ControllerInterface((*PAPER_INPUTS, CONSTANT) if constant else PAPER_INPUTS)
 
 
-def inputs_of_ranges(n: int) -> tuple[str, ...]:
-    """Return what networks can see on a robot of which n range readings and stalls are known."""
-    return (*PAPER_INPUTS, *(f"range.{k}" for k in range(n)))
+def inputs_of_robot(n: int, channels: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return what networks can see on a robot.
+
+    Args:
+        n: Number of its range readings.
+        channels: Names of what else it can read, such as `light.0`.
+    """
+    return (*PAPER_INPUTS, "last_move", "last_turn", *(f"range.{k}" for k in range(n)), *channels)
 
 
 def listed(names: Iterable[str]) -> str:
@@ -110,20 +150,14 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(word[0] if len(word) == 1 else f"{word[0]} to {word[-1]}" for word in words)
 
 
-def _part(name: str, steps: int) -> Callable[[Sequence[float], bool, int], float]:
+def _part(name: str, steps: int) -> Callable[[Sequence[float], bool, int, Channels], float]:
     if name == "obstacle":
-        return lambda readings, stalled, step: max(readings)
+        return lambda readings, stalled, step, channels: max(readings)
     if name == "stall":
-        return lambda readings, stalled, step: float(stalled)
+        return lambda readings, stalled, step, channels: float(stalled)
     if name == "time":
-        return lambda readings, stalled, step: step / steps
+        return lambda readings, stalled, step, channels: step / steps
     kind, _, index = name.partition(".")
     if kind == "range" and index.isdecimal():
-        return partial(_reading, int(index))
-    raise ControllerError(
-        f"A controller sees {name}, expected obstacle, stall, time or range.K on a robot outside of 'sim'."
-    )
-
-
-def _reading(index: int, readings: Sequence[float], stalled: bool, step: int) -> float:
-    return readings[index]
+        return lambda readings, stalled, step, channels: readings[int(index)]
+    return lambda readings, stalled, step, channels: channels[name]

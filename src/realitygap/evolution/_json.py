@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.errors import RecordError, RecordVersionError
-from realitygap.kernels._genome import NeatRules
+from realitygap.kernels.neat.genome import NeatRules
 
 from ._interface import ControllerInterface
 from ._settings import ACTIVATIONS, NeatSettings

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from realitygap.kernels import _novelty
+from realitygap.kernels.neat import novelty as novelty_kernels
 from realitygap.settings import Settings
 
-from ._distances import DISTANCES, Cells, DistanceName, Sort, measure_of, pack_behaviors
+from ._distances import DISTANCES, CellOrder, Cells, DistanceName, measure_of, pack_behaviors
 
 
 class NoveltySettings(Settings):
@@ -30,7 +30,7 @@ class NoveltySettings(Settings):
         description="How different two behaviors are: the paper's distance of sorted cells, or another of those that "
         "realitygap audit-distance draws. ordered, edit and alignment need the order in which cells were visited.",
     )
-    sort: Sort = Field(
+    sort: CellOrder = Field(
         "x-then-y",
         description="paper's distance: how the cells of a behavior are sorted. The paper does not say; it names cells "
         "(0,0) and (11,5), pairs that Python sorts by x first.",
@@ -88,7 +88,7 @@ def sorted_cells_distance(
     *,
     columns: int = 12,
     rows: int = 6,
-    sort: Sort = "x-then-y",
+    sort: CellOrder = "x-then-y",
 ) -> float:
     """The paper's distance of two behaviors [cells].
 
@@ -123,7 +123,7 @@ class PaperArchive:
         self.settings = settings or NoveltySettings()
         self._columns = columns
         self._rows = rows
-        self._archive = _novelty.make_archive(0, self.settings.archive_size, columns * rows)
+        self._archive = novelty_kernels.make_archive(0, self.settings.archive_size, columns * rows)
 
     def __len__(self) -> int:
         return int(self._archive.state[0])
@@ -147,7 +147,7 @@ class PaperArchive:
         n = len(packed.n_cells)
         novelty = np.empty(n)
         room = {"place_of": np.zeros(n, np.int64), "distance": np.zeros((n, self.settings.archive_size))}
-        _novelty.paper_archive_step(
+        novelty_kernels.paper_archive_step(
             packed, measure, self._archive._replace(**room), self.settings.enter == "above-all", novelty
         )
         return novelty
@@ -230,8 +230,8 @@ class NearestArchive:
             for j, other in enumerate(others):
                 distances[i, j] = -1.0 if i == j else self._distance(rows[i], other)
         nearest = np.empty(self._k)
-        novelty = np.array([_novelty.mean_of_nearest(row, len(others), nearest) for row in distances])
+        novelty = np.array([novelty_kernels.mean_of_nearest(row, len(others), nearest) for row in distances])
         entered = np.empty(n, np.bool_)
-        _novelty.admit(novelty, self._counters, self._threshold, self._patience, entered)
+        novelty_kernels.admit(novelty, self._counters, self._threshold, self._patience, entered)
         self.behaviors.extend(rows[k].copy() for k in np.flatnonzero(entered))
         return novelty

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
+from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
-if TYPE_CHECKING:
-    from ._genome import ConnectionGene, Genome
+from ._genome import ConnectionGene, Genome
 
 NODE = 5.5  # radius of a node [pt]
 _ACROSS, _HEIGHT = (
@@ -19,6 +17,7 @@ _ACROSS, _HEIGHT = (
 _RADIUS = 0.15  # of a node, in the same unit where the picture is 280 pt wide
 
 
+@picture_of.register(Genome)
 def network_picture(
     genome: Genome,
     input_names: Sequence[str] | None = None,

@@ -8,8 +8,8 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from realitygap.errors import did_you_mean
-from realitygap.kernels._genome import NeatRules
-from realitygap.kernels._network import IDENTITY, SIGMOID, TANH
+from realitygap.kernels.neat.genome import NeatRules
+from realitygap.kernels.neat.network import IDENTITY, SIGMOID, TANH
 from realitygap.settings import Settings
 
 _NEVER = 2**31 - 1
@@ -286,60 +286,41 @@ class NeatSettings(Settings):
             raise ValueError(f"Unknown NEAT settings {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}")
         return cls(settings=name, **changes)
 
-    def rules(self, n_inputs: int, n_outputs: int, *, bias_input: int = -1) -> NeatRules:
+    def rules(
+        self, n_inputs: int, n_outputs: int, *, bias_input: int = -1, drives_wheels: bool = False
+    ) -> NeatRules:
         """The settings in the form that the kernels read.
 
         Args:
             n_inputs, n_outputs: Nodes, the constant input counted.
             bias_input: Which input is constant; -1 where none is.
+            drives_wheels: Whether the outputs are wheel speeds, left and right, instead of move and turn.
         """
+        # a whole number that was given for one with a fraction would compile the kernels a second time
+        same: dict[str, Any] = {
+            name: float(getattr(self, name)) if field.annotation is float else getattr(self, name)
+            for name, field in type(self).model_fields.items()
+            if name in NeatRules._fields
+        }
         return NeatRules(
-            n_inputs=n_inputs,
-            n_outputs=n_outputs,
-            recurrent=self.recurrent,
-            node_bias=self.node_bias,
-            bias_input=bias_input,
-            activation=ACTIVATIONS[self.activation],
-            activation_slope=float(self.activation_slope),
-            start_hidden=self.start_hidden,
-            start_random=self.start_topology == "random",
-            start_layer=self.start_topology == "layer",
-            initial_weight=float(self.initial_weight),
-            weight_limit=float(self.weight_limit),
-            mutate_weights=float(self.mutate_weights),
-            replace_weight=float(self.replace_weight),
-            weight_step=float(self.weight_step),
-            replaced_weight=float(self.replaced_weight),
-            add_node=float(self.add_node),
-            add_link=float(self.add_link),
-            add_link_tries=self.add_link_tries,
-            reenable=float(self.reenable),
-            one_structural_mutation=self.structural_mutations == "one",
-            split_bias_links=self.split_bias_links,
-            crossover=float(self.crossover),
-            crossover_only=float(self.crossover_only),
-            average_weights=float(self.average_weights),
-            interspecies=float(self.interspecies),
-            stay_disabled=float(self.stay_disabled),
-            disabled_bit_inherited=self.disabled_rule == "inherit",
-            equal_parents_mix=self.equal_parents == "mix",
-            excess_coefficient=float(self.excess_coefficient),
-            disjoint_coefficient=float(self.disjoint_coefficient),
-            weight_coefficient=float(self.weight_coefficient),
-            normalize_from={"never": _NEVER, "large": 20, "always": 1}[self.normalize_genes],
-            threshold=float(self.threshold),
-            nearest_species=self.assign == "nearest",
-            champion_represents=self.representative == "champion",
-            target_species=self.target_species,
-            threshold_step=float(self.threshold_step),
-            survival=float(self.survival),
-            champion_from=self.champion_from,
-            champion_by_members=self.champion_counts == "members",
-            stagnation=self.stagnation,
-            stagnation_factor=float(self.stagnation_factor),
-            best_species_spared=self.best_species_spared,
-            population_stagnation=self.population_stagnation,
-            clip_negative=self.negative_fitness == "clip",
+            **same
+            | {
+                "n_inputs": n_inputs,
+                "n_outputs": n_outputs,
+                "bias_input": bias_input,
+                "activation": ACTIVATIONS[self.activation],
+                "start_random": self.start_topology == "random",
+                "start_layer": self.start_topology == "layer",
+                "one_structural_mutation": self.structural_mutations == "one",
+                "disabled_bit_inherited": self.disabled_rule == "inherit",
+                "equal_parents_mix": self.equal_parents == "mix",
+                "normalize_from": {"never": _NEVER, "large": 20, "always": 1}[self.normalize_genes],
+                "nearest_species": self.assign == "nearest",
+                "champion_represents": self.representative == "champion",
+                "champion_by_members": self.champion_counts == "members",
+                "clip_negative": self.negative_fitness == "clip",
+                "drives_wheels": drives_wheels,
+            }
         )
 
 

@@ -23,11 +23,10 @@ from ._plan import (
 )
 from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor, rank_violation_interval
 from ._replay_error import ReplayError, replay_error
-from ._result import MEASURES, GapResult
+from ._result import COVERAGE, MEASURES, SHOWN, GapResult, Measure
 from ._rms_interval import rms_interval
 from ._shapley import coalitions, shapley_values
 from ._side import GapSide
-from ._verdict import verdict_of
 from ._why import Why, explain_gap
 
 __all__ = [  # noqa: RUF022 - grouped by subject
@@ -36,9 +35,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "GapSide",
     "GapResult",
     "Estimate",
+    "COVERAGE",
     "MEASURES",
+    "SHOWN",
+    "Measure",
     "CONFIDENCE",
-    "verdict_of",
     # level
     "mean_difference",
     "square_differences",

@@ -4,15 +4,96 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from ._estimate import Estimate
 
-MEASURES = (
-    *("rms", "level", "srcc", "srcc_disattenuated", "noise_ceiling", "mmrv", "mmrv_floor", "energy"),
-    "equivalence",
+COVERAGE = "coverage"
+"""The score of the paper's task."""
+
+
+class Measure(NamedTuple):
+    """A measure of a gap, as tables show it.
+
+    Attributes:
+        name: The attribute of `GapResult`.
+        row: What a terminal calls it, in at most 32 letters.
+        title: What a page calls it.
+        meaning: In words; `{score}` is what trials were scored by.
+    """
+
+    name: str
+    row: str
+    title: str
+    meaning: str
+
+
+SHOWN: tuple[Measure, ...] = (
+    Measure(
+        "rms",
+        "RMS gap, noise taken out",
+        "RMS gap",
+        "root mean square over controllers of the difference in {score}, noise taken out",
+    ),
+    Measure(
+        "level", "level: target less simulator", "Level", "mean difference in {score}, target less simulator"
+    ),
+    Measure(
+        "a12",
+        "A12: target above simulator",
+        "A₁₂",
+        "how likely a trial on the target is above one of the same controller in simulation",
+    ),
+    Measure(
+        "srcc",
+        "correlation over controllers",
+        "Correlation",
+        "Spearman’s, over controllers, of the mean {score}",
+    ),
+    Measure(
+        "noise_ceiling",
+        "  noise allows at most",
+        "Noise ceiling",
+        "the correlation that noise leaves of a perfect one, by split halves",
+    ),
+    Measure(
+        "srcc_disattenuated",
+        "  without noise",
+        "Without noise",
+        "the correlation over its ceiling, at most 1",
+    ),
+    Measure("mmrv", "rank violation (MMRV)", "MMRV", "mean maximum rank violation, in {score} on the target"),
+    Measure(
+        "mmrv_floor",
+        "  of the target by itself",
+        "MMRV floor",
+        "that of one half of the target’s trials by the other half",
+    ),
+    Measure(
+        "energy",
+        "energy distance of cells",
+        "Energy distance, cells",
+        "of visited cells, mean over controllers [√cells]",
+    ),
+    Measure(
+        "energy_ends",
+        "energy distance of ends [m]",
+        "Energy distance, ends",
+        "of the places where trials end, mean over controllers [m]",
+    ),
+    Measure(
+        "equivalence",
+        "equivalence (interval of 90 %)",
+        "Equivalence",
+        "the level with the 90 % interval of two one-sided tests",
+    ),
 )
-"""What `--json` gives, each with estimate, low, high and n."""
+"""All measures of a gap, in the order of tables."""
+
+_LATE = ("a12", "energy_ends")  # after the others in JSON
+
+MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
+"""The names of measures that come first in JSON, each with estimate, low, high and n."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +123,7 @@ class GapResult:
         reevolved: Champions evolved and tried on the target less champions evolved and tried in simulation; refused
             where none were.
         notes: What else there is to say.
+        score: What trials were scored by, with its unit, such as `way along walls [m]`.
     """
 
     source: str
@@ -63,6 +145,7 @@ class GapResult:
     luck: Estimate = field(default_factory=lambda: Estimate.refusal(0, "No controller was selected."))
     reevolved: Estimate = field(default_factory=lambda: Estimate.refusal(0, "Nothing was evolved apart."))
     notes: tuple[str, ...] = ()
+    score: str = COVERAGE
 
     @property
     def excludes_no_gap(self) -> bool:
@@ -72,12 +155,10 @@ class GapResult:
     @property
     def verdict(self) -> str:
         """The whole in one sentence."""
-        from ._verdict import verdict_of
-
-        return verdict_of(self)
+        return _verdict_of(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """The measures, `misspecified` and `verdict`; beside them, what they are of."""
+        """The measures, `misspecified`, `verdict`, and what they are of; `score` if that is not coverage."""
         named = {name: getattr(self, name).to_dict() for name in MEASURES}
         about = {
             "source": self.source,
@@ -85,15 +166,71 @@ class GapResult:
             "labels": list(self.labels),
             "trials": list(self.trials),
         }
-        others = {name: getattr(self, name).to_dict() for name in ("a12", "energy_ends", "luck", "reevolved")}
+        others = {name: getattr(self, name).to_dict() for name in (*_LATE, "luck", "reevolved")}
         return (
             named
             | {"misspecified": self.misspecified, "verdict": self.verdict}
             | others
             | {"notes": list(self.notes)}
             | about
+            | ({} if self.score == COVERAGE else {"score": self.score})
         )
 
     def to_json(self) -> str:
         """As text."""
         return json.dumps(self.to_dict(), indent=2)
+
+
+def _verdict_of(result: GapResult) -> str:
+    """Return the result in one sentence, without what n controllers cannot support."""
+    parts = [_size(result), _order(result), _equivalence(result.equivalence)]
+    if result.misspecified:
+        parts.append("the simulator cannot make what was observed, whatever its numbers")
+    where = f"Between {result.labels[0]} {result.source} and {result.labels[1]} {result.target}"
+    return f"{where}, " + "; ".join(part for part in parts if part) + "."
+
+
+def _size(result: GapResult) -> str:
+    rms, level = result.rms, result.level
+    if rms.estimate is None:
+        return "the size of the gap cannot be told" + _side_if_any(level)
+    if rms.high is None:
+        return f"the transfer gap is {rms.estimate:.3f} RMS, of too few controllers to say how sure that is"
+    if not result.excludes_no_gap:
+        return f"no gap is shown (RMS at most {rms.high:.3f})"
+    side = _side(level)
+    return f"the transfer gap is {rms} RMS over {rms.n} controllers{side}"
+
+
+def _side_if_any(level: Estimate) -> str:
+    side = _side(level)
+    return "" if side.endswith("both sides") else side
+
+
+def _side(level: Estimate) -> str:
+    if level.estimate is None or level.low is None or level.high is None:
+        return ""
+    if level.high < 0:
+        return f", and the target does worse by {-level.estimate:.3f}"
+    if level.low > 0:
+        return f", and the target does better by {level.estimate:.3f}"
+    return ", to both sides"
+
+
+def _order(result: GapResult) -> str:
+    raw, ceiling = result.srcc, result.noise_ceiling
+    if raw.estimate is None:
+        return ""
+    if ceiling.estimate is None or result.srcc_disattenuated.estimate is None:
+        return f"the correlation over controllers is {raw.estimate:.2f}"
+    return f"the correlation over controllers is {raw.estimate:.2f} where noise allows {ceiling.estimate:.2f}"
+
+
+def _equivalence(found: Estimate) -> str:
+    margin = found.more.get("margin")
+    if margin is None or found.more.get("equivalent") is None:
+        return ""
+    shown = (
+        "are equivalent in level" if found.more["equivalent"] else "are not shown to be equivalent in level"
+    )
+    return f"they {shown} at a margin of {margin:g}"

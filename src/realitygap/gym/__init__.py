@@ -7,7 +7,7 @@
     envs = gymnasium.make_vec("realitygap/ScribblerCoverage-v1", num_envs=4096)
 
 Importing this package registers the environments of `ENV_IDS`. It needs the extra `gym`. The commands of a network
-give, through either kind of environment, the trial that `realitygap.trials.trace_genome` and `try_genomes` give for the
+give, through either kind of environment, the trial that `platforms.trace_genome` and `try_genomes` give for the
 same `NoiseKey`.
 """
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
-from ._robots import Platform, RealType, Robots, maze_robots, task_robots
+from ._robots import GivenController, GivenPlatform, RealType, Robots, maze_robots, task_robots
 
 Array = NDArray[np.floating]
 RenderMode = Literal["rgb_array"] | None
@@ -100,9 +100,13 @@ class RobotEnv(_OneRobot):
     | move | -1 | 1 | 1: 0.1 m in a step, forward; on `sim` and twins the robot's full speed |
     | turn | -1 | 1 | 1: `platform.turn_per_step` in a step, to the left; on `sim` and twins both wheels at full speed |
 
+    With `outputs` left and right, an action is the speeds of two wheels, each -1 to 1: move = (left + right) / 2, turn
+    = (right - left) / 2.
+
     Observations are the inputs of the task's networks without the constant one. On `jyro` and twins these are obstacle
-    (largest noisy reading), stall and time for every task. A trial is truncated after `platform.steps` steps and never
-    terminated. Actions beyond -1..1 are limited to it, and what is no number counts as 0, as in a trial.
+    (largest noisy reading), stall and time for every task, unless `controller` names others. A trial is truncated after
+    `platform.steps` steps and never terminated. Actions beyond -1..1 are limited to it, and what is no number counts as
+    0, as in a trial.
 
     `info` has `pose` (3,) x [m], y [m], heading [rad, counter-clockwise from +x], `readings` (s,) [m] without noise (on
     a twin, distances that noisy readings tell), `coverage_line` and `coverage_ends` [0..1].
@@ -112,7 +116,9 @@ class RobotEnv(_OneRobot):
 
     Args:
         kind: coverage, avoid, light, wall or goal.
-        task: Settings of the task, as `[task]` of a study has them: `{"cells": "ends"}`, `{"side": "left"}`, `inputs`.
+        task: Settings of the task, as `[task]` of a study has them: `{"cells": "ends"}`, `{"side": "left"}`.
+        controller: What is observed and what actions are, as `[controller]` of a study has it: `{"inputs": ["range.0",
+            "time"], "outputs": ["left", "right"]}`. The actions are move and turn when not given.
         noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10. 0.1 on `jyro` and none elsewhere when not given.
         platform: The robot: `jyro`, `sim`, `sim:FILE` or `twin:FILE`, a platform, or settings of the default one. That
             is `jyro` for coverage, and for other tasks the Khepera on `sim` of the study of that name.
@@ -132,13 +138,23 @@ class RobotEnv(_OneRobot):
         kind: str = "coverage",
         *,
         task: Mapping[str, Any] | None = None,
+        controller: GivenController = None,
         noise: float | None = None,
-        platform: Platform = None,
+        platform: GivenPlatform = None,
         arena: ArenaSettings | Mapping[str, Any] | None = None,
         dtype: RealType = "float32",
         render_mode: RenderMode = None,
     ) -> None:
-        robots = task_robots(1, kind, task=task, noise=noise, platform=platform, arena=arena, dtype=dtype)
+        robots = task_robots(
+            1,
+            kind,
+            task=task,
+            controller=controller,
+            noise=noise,
+            platform=platform,
+            arena=arena,
+            dtype=dtype,
+        )
         super().__init__(robots, render_mode)
 
 

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import NeatSettings
-from realitygap.kernels import _maze
-from realitygap.kernels._lanes import LANES
+from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.tasks import maze
+from realitygap.platforms import Array, Outline, limited_commands
 from realitygap.tasks import MazeAgent
 from realitygap.trials import NoiseKey, maze_rules, maze_scene
 from realitygap.world import Arena
-
-from ._fleet import Array, Outline, limited
 
 CORNERS = 24
 """Corners of the polygon that a picture shows for a disc."""
@@ -45,7 +44,7 @@ class MazeFleet:
         neat = NeatSettings.named("default", activation="tanh")
         self._neat = neat.rules(len(self.input_names), 2)
         n_blocks = -(-n // LANES)
-        self._blocks = [_maze.make_maze_block(self._scene, self._neat, 0)[0] for _ in range(n_blocks)]
+        self._blocks = [maze.make_maze_block(self._scene, self._neat, 0)[0] for _ in range(n_blocks)]
         self.cells = np.zeros((n, 0), np.uint8)
         self.counts = np.zeros((n, 2), np.int32)
 
@@ -76,22 +75,22 @@ class MazeFleet:
         """As `Fleet.start`; nothing is random here."""
         self._step = 0
         for lanes in self._blocks:
-            _maze._start(self._scene, lanes)
+            maze._start(self._scene, lanes)
         self._look()
 
     def step(self, commands: Array) -> None:
         """As `Fleet.step`; a robot at the exit stays there."""
-        commands = limited(commands)
+        commands = limited_commands(commands)
         for block, lanes in enumerate(self._blocks):
             part = commands[block * LANES : (block + 1) * LANES]
             lanes.values[self._neat.n_inputs : self._neat.n_inputs + 2, : len(part)] = part.T
-            _maze.drive_maze(self._scene, self._rules, self._neat, lanes, self._step)
+            maze.drive_maze(self._scene, self._rules, self._neat, lanes, self._step)
         self._step += 1
         self._look()
 
     def _look(self) -> None:
         for lanes in self._blocks:
-            _maze.observe_maze(self._scene, self._rules, self._neat, lanes)
+            maze.observe_maze(self._scene, self._rules, self._neat, lanes)
         self._seen = self._gathered([lanes.values[: self._neat.n_inputs] for lanes in self._blocks])
 
     def observe(self) -> Array:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Picture, Shape, to_image
+from realitygap.platforms import Array, Outline, Points
 from realitygap.world import Arena, floor_shapes, goal_shapes, light_shapes, obstacle_shapes
-
-from ._fleet import Array, Outline, Points
 
 WIDTH = 480
 """Width of a picture [pixels]."""

@@ -7,12 +7,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels._scores import avoid_scores, wall_scores
-from realitygap.tasks import AvoidTask, CoverageTask, GoalTask, LightTask, WallTask
-from realitygap.tasks._wall import SIDES, outlines
+from realitygap.kernels.tasks.scores import avoid_scores, wall_scores
+from realitygap.platforms import Array, Fleet
+from realitygap.tasks import WALL_SIDES, AvoidTask, CoverageTask, GoalTask, LightTask, WallTask, wall_outlines
 from realitygap.trials import maze_exit
-
-from ._fleet import Array, Fleet
 
 
 class Reward(Protocol):
@@ -74,8 +72,8 @@ class WallReward:
 
     def __init__(self, task: WallTask, fleet: Fleet) -> None:
         task.check_arena(fleet.arena, tuple(fleet.arena.vary))
-        self._side, self._within = SIDES[task.side], float(task.within)
-        self._walls = outlines(fleet.arena)
+        self._side, self._within = WALL_SIDES[task.side], float(task.within)
+        self._walls = wall_outlines(fleet.arena)
 
     def start(self, fleet: Fleet) -> None:
         """As `Reward.start`."""

@@ -10,30 +10,22 @@ from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import did_you_mean, real_number, whole_number
+from realitygap.errors import StudyError, did_you_mean, real_number, whole_number
 from realitygap.evolution import PAPER_INPUTS, ControllerInterface
-from realitygap.kernels._philox import MAX_INDIVIDUALS
-from realitygap.robots import JyroPlatform, SimPlatform, TwinPlatform
-from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, CoverageTask
+from realitygap.kernels.math.philox import MAX_INDIVIDUALS
+from realitygap.platforms import Fleet, JyroPlatform, Platform, SimPlatform, class_of, platform_of
+from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, ControllerSettings, CoverageTask
 from realitygap.trials import NoiseKey
-from realitygap.world import Arena, ArenaSettings
+from realitygap.world import ArenaSettings
 
-from ._fleet import Array, Fleet
-from ._jyro_fleet import JyroFleet
 from ._maze_fleet import MazeFleet
 from ._picture import draw_robot
 from ._rewards import ExitReward, Reward, reward_of
-from ._sim_fleet import SimFleet
-from ._twin_fleet import TwinFleet
 
-Platform = JyroPlatform | SimPlatform | TwinPlatform | str | Mapping[str, Any] | None
+GivenPlatform = Platform | str | Mapping[str, Any] | None
+GivenController = ControllerSettings | Mapping[str, Any] | None
 RealType = Literal["float32", "float64"]
 T = TypeVar("T")
-
-PAPERS_NOISE = 0.1
-"""The paper's a on `jyro`, whose sensors are without noise otherwise."""
-
-PLATFORMS = ("jyro", "sim", "sim:FILE", "twin:FILE")
 
 _KHEPERA_RANGES = tuple(f"range.{k}" for k in range(8))
 INPUTS: Mapping[str, tuple[str, ...]] = {
@@ -68,14 +60,21 @@ class Robots:
         step_s: Duration of a command [s].
     """
 
-    def __init__(self, fleet: Fleet, reward: Reward, n: int, dtype: RealType) -> None:
+    def __init__(
+        self,
+        fleet: Fleet,
+        reward: Reward,
+        n: int,
+        dtype: RealType,
+        interface: ControllerInterface | None = None,
+    ) -> None:
         if dtype not in ("float32", "float64"):
             raise ValueError(f"dtype is {dtype!r}, expected 'float32' or 'float64'.")
         self.n = n
-        self._fleet, self._reward = fleet, reward
+        self._fleet, self._reward, self._interface = fleet, reward, interface
         self._dtype: Any = np.dtype(dtype)
         self._step: int | None = None
-        self._paths: list[Array] | None = None
+        self._paths: list[NDArray[np.float64]] | None = None
         self.noise_key = NoiseKey(0)
         self.step_s = fleet.step_s
 
@@ -90,7 +89,7 @@ class Robots:
         return spaces.Box(low, high, dtype=self._dtype.type)
 
     def action_space(self) -> Any:
-        """The Box of what it answers: two commands."""
+        """The Box of what it answers: move and turn, or two wheel speeds."""
         return spaces.Box(-1.0, 1.0, (2,), self._dtype.type)
 
     def keep_paths(self) -> None:
@@ -128,11 +127,11 @@ class Robots:
             self._paths = [self._fleet.facts()["pose"]]
         return self._observe()
 
-    def drive(self, commands: ArrayLike) -> tuple[NDArray[Any], Array]:
+    def drive(self, actions: ArrayLike) -> tuple[NDArray[Any], NDArray[np.float64]]:
         """Carry out one command of each robot.
 
         Args:
-            commands: (n, 2) limited to -1..1, and 0 where they are no number, as in a trial.
+            actions: (n, 2) outputs of controllers, limited to -1..1, and 0 where they are no number, as in a trial.
 
         Returns:
             (n, i) observations and (n,) rewards.
@@ -143,9 +142,11 @@ class Robots:
         """
         if self._step is None or self.is_over:
             raise ResetNeeded("No trial is under way: call reset() first, and again when all steps are done.")
-        given = np.ascontiguousarray(commands, np.float64)
+        given = np.ascontiguousarray(actions, np.float64)
         if given.shape != (self.n, 2):
             raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2).")
+        if self._interface is not None and self._interface.drives_wheels:
+            given = self._interface.commands(given)
         self._fleet.step(given)
         self._step += 1
         rewards = self._reward.step(self._fleet, given)
@@ -156,7 +157,7 @@ class Robots:
     def _observe(self) -> NDArray[Any]:
         return self._fleet.observe().astype(self._dtype)
 
-    def facts(self) -> dict[str, Array]:
+    def facts(self) -> dict[str, NDArray[np.float64]]:
         """What is so, whatever the controller sees: pose (n, 3), readings (n, s), and both coverages (n,)."""
         facts, n_cells = self._fleet.facts(), self._fleet.cells.shape[1]
         if not n_cells:
@@ -192,8 +193,9 @@ def task_robots(
     kind: str,
     *,
     task: Mapping[str, Any] | None,
+    controller: GivenController,
     noise: float | None,
-    platform: Platform,
+    platform: GivenPlatform,
     arena: ArenaSettings | Mapping[str, Any] | None,
     dtype: RealType,
 ) -> Robots:
@@ -203,30 +205,35 @@ def task_robots(
     own = _task(kind, settings)
     made = _platform(platform, kind)
     if noise is None:
-        noise = PAPERS_NOISE if isinstance(made, JyroPlatform) else 0.0
+        noise = made.default_noise
     noise = real_number("noise", noise, 0, 10)
     preset = ARENAS.get(kind, kind)
     if arena is None and kind != "coverage":
         arena = {"preset": preset}
     place = _made("arena", ArenaSettings, arena).arena()
-    inputs = PAPER_INPUTS
-    if isinstance(made, SimPlatform) and kind != "coverage":
-        default = INPUTS[kind] if platform is None else own.inputs
-        inputs = ControllerInterface(tuple(settings.get("inputs", default))).sensed
-    elif isinstance(made, TwinPlatform) and kind != "coverage":
-        inputs = ControllerInterface(tuple(settings.get("inputs", inputs))).sensed
-    elif tuple(settings.get("inputs", inputs)) != inputs:
+    if place.others:
+        raise ValueError(f"arena.robots is {place.n_robots}, expected 1: an environment has one robot.")
+    declared = _made("controller", ControllerSettings, controller)
+    if declared.inputs and "inputs" in settings:
         raise ValueError(
-            f"task.inputs is {', '.join(settings['inputs'])}, expected {', '.join(inputs)} on platform "
-            f"{_name_of(made)!r}. Choose another platform, or leave the inputs out."
+            "task.inputs and controller.inputs both say what is observed. Leave task.inputs out."
         )
-    fleet = _fleet(made, place, inputs, noise, n)
+    names: tuple[str, ...] = PAPER_INPUTS
+    if declared.inputs:
+        names = declared.inputs
+    elif kind != "coverage":
+        default = (
+            INPUTS[kind] if platform is None else PAPER_INPUTS if made.robot_model is None else own.inputs
+        )
+        names = tuple(settings.get("inputs", default))
+    interface = ControllerInterface(names, declared.outputs)
+    fleet = made.fleet(place, interface.sensed, noise, n)
     try:
         reward = reward_of(own, fleet)
     except BaseException:
         fleet.close()
         raise
-    return Robots(fleet, reward, n, dtype)
+    return Robots(fleet, reward, n, dtype, interface)
 
 
 def maze_robots(n: int, maze: str, dtype: RealType) -> Robots:
@@ -253,27 +260,9 @@ def _task(kind: str, settings: Mapping[str, Any]) -> Any:
     return _made("task", TASKS[kind], {**WITHIN.get(kind, {}), **settings})
 
 
-def _fleet(
-    platform: JyroPlatform | SimPlatform | TwinPlatform,
-    arena: Arena,
-    inputs: tuple[str, ...],
-    noise: float,
-    n: int,
-) -> Fleet:
-    if isinstance(platform, SimPlatform):
-        return SimFleet(platform, arena, inputs, noise, n)
-    if isinstance(platform, JyroPlatform):
-        return JyroFleet(platform, arena, noise, n)
-    if noise:
-        raise ValueError(
-            f"noise is {noise:g}, expected none on platform 'twin': its readings are noisy already."
-        )
-    return TwinFleet(platform, arena, inputs, n)
-
-
-def _platform(given: Platform, kind: str) -> JyroPlatform | SimPlatform | TwinPlatform:
-    """The platform that was given, or that a name stands for; settings without a name are those of the default."""
-    if isinstance(given, SimPlatform | JyroPlatform | TwinPlatform):
+def _platform(given: GivenPlatform, kind: str) -> Platform:
+    """Return the platform that was given, or that a name stands for; settings without a name are the default's."""
+    if isinstance(given, Platform):
         return given
     if not isinstance(given, str):
         if kind == "coverage":
@@ -282,23 +271,16 @@ def _platform(given: Platform, kind: str) -> JyroPlatform | SimPlatform | TwinPl
         return _made(
             "platform", SimPlatform, {**base, **given} if isinstance(given, Mapping) else given or base
         )
-    name, colon, file = given.partition(":")
-    if name == "sim" and bool(colon) == bool(file):
-        return SimPlatform(**({"robot": file} if file else {}))
-    if name == "twin" and file:
-        return TwinPlatform(file=file)
-    if given == "jyro":
-        return JyroPlatform()
-    if name == "scribbler":
-        raise ValueError(
-            f"platform is {given!r}, expected one of {', '.join(PLATFORMS)}: a robot on a port, emulated or not, is "
-            "driven by `realitygap run --port`, not step by step from Gymnasium."
-        )
-    raise ValueError(f"platform is {given!r}. {did_you_mean(given, PLATFORMS)}")
-
-
-def _name_of(platform: JyroPlatform | TwinPlatform | SimPlatform) -> str:
-    return "jyro" if isinstance(platform, JyroPlatform) else "twin"
+    try:
+        model = class_of(given)
+        if model.is_physical or not model.is_for_studies:
+            raise ValueError(
+                f"platform is {given!r}, expected a simulated robot or a twin: a robot on a port, emulated or not, is "
+                "driven by `realitygap drive`, not step by step from Gymnasium."
+            )
+        return platform_of(given)
+    except StudyError as error:
+        raise ValueError(f"platform: {error}") from None
 
 
 def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
@@ -310,4 +292,12 @@ def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
     return kind(**(given or {}))
 
 
-__all__ = ["CoverageTask", "Platform", "RealType", "Robots", "maze_robots", "task_robots"]
+__all__ = [
+    "CoverageTask",
+    "GivenController",
+    "GivenPlatform",
+    "RealType",
+    "Robots",
+    "maze_robots",
+    "task_robots",
+]

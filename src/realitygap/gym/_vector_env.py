@@ -14,7 +14,7 @@ from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
 from ._env import RENDER_FPS, Array, RenderMode, checked_render_mode, fps_of
-from ._robots import Platform, RealType, Robots, maze_robots, task_robots
+from ._robots import GivenController, GivenPlatform, RealType, Robots, maze_robots, task_robots
 
 
 class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
@@ -101,7 +101,7 @@ class RobotVectorEnv(_ManyRobots):
 
     Args:
         num_envs: Number of robots, >= 1.
-        kind, task, noise, platform, arena, dtype, render_mode: As of `RobotEnv`.
+        kind, task, controller, noise, platform, arena, dtype, render_mode: As of `RobotEnv`.
 
     Raises:
         TypeError: Something else than such settings.
@@ -115,14 +115,22 @@ class RobotVectorEnv(_ManyRobots):
         kind: str = "coverage",
         *,
         task: Mapping[str, Any] | None = None,
+        controller: GivenController = None,
         noise: float | None = None,
-        platform: Platform = None,
+        platform: GivenPlatform = None,
         arena: ArenaSettings | Mapping[str, Any] | None = None,
         dtype: RealType = "float32",
         render_mode: RenderMode = None,
     ) -> None:
         robots = task_robots(
-            num_envs, kind, task=task, noise=noise, platform=platform, arena=arena, dtype=dtype
+            num_envs,
+            kind,
+            task=task,
+            controller=controller,
+            noise=noise,
+            platform=platform,
+            arena=arena,
+            dtype=dtype,
         )
         super().__init__(robots, render_mode)
 

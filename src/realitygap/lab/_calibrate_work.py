@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from realitygap.records import Observe, ObservedTrial, read_observations
+from realitygap.platforms import platform_of
+from realitygap.records import ObservedTrial, read_observations
 from realitygap.report import save_sensor_figure
-from realitygap.robots import Clock, Robot
-from realitygap.robots.scribbler import is_in_this_program
 from realitygap.study import (
     NO_LINE,
     StoppedByPerson,
@@ -22,12 +20,11 @@ from realitygap.study import (
     save_calibration,
     with_ruled_end,
 )
-from realitygap.trials import OnLost, RobotsOwnSenses, TrialPlan, those_that_count
-from realitygap.world import INCH, Arena, Calibration, Pose, RobotModel, load_arena, load_robot
+from realitygap.trials import Led, OnLost, Operator, SheetObserver, TrialPlan, those_that_count
+from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
 
-ROBOT = "scribbler:"
 _QUESTIONS = {
     "ahead": "How far ahead of its start does it stand [in]?",
     "left": "How far to the left of it [in]?",
@@ -46,19 +43,15 @@ def work(channel: Channel, order: Message) -> None:
     kept = out.with_suffix(".trials.jsonl")
     arena, robot = load_arena("paper"), load_robot(order["base"])
     platform, witness = str(order["platform"]), order.get("witness") or None
-    is_led = (
-        platform.startswith(ROBOT)
-        and witness is None
-        and not is_in_this_program(platform.removeprefix(ROBOT))
-    )
+    is_led = witness is None and platform_of(platform).needs_person
     growing = _Growing(channel, kept, arena, robot)
-    attendant = _Attendant(channel, arena) if is_led else None
-    guide = _Guide(channel, arena, robot, growing) if is_led else None
+    observer = _sheet_observer(channel) if is_led else None
+    operator = _PageOperator(channel, arena, robot, growing) if is_led else None
     seed = int(order.get("seed") or 0)
     on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
     try:
         with open_target(
-            platform, arena, key=seed, witness=witness, attendant=attendant, on_lost=on_lost
+            platform, arena, key=seed, witness=witness, observer=observer, on_lost=on_lost
         ) as target:
             made = calibrate(
                 order["kind"],
@@ -68,7 +61,7 @@ def work(channel: Channel, order: Message) -> None:
                 budget=order.get("budget"),
                 seed=seed,
                 trials_file=kept,
-                guide=guide,
+                operator=operator,
                 tell=growing.tell,
             )
     except StoppedByPerson:
@@ -111,13 +104,14 @@ class _Growing:
         return {"at": at, "purpose": trial.purpose, "means": [round(float(mean), 4) for mean in means]}
 
 
-class _Guide:
+class _PageOperator(Operator):
     """Asks at a page for the robot at its place, and what a ruler says."""
 
     def __init__(self, channel: Channel, arena: Arena, robot: RobotModel, growing: _Growing) -> None:
+        super().__init__()
         self._channel, self._arena, self._robot, self._growing = channel, arena, robot, growing
 
-    def place(self, plan: TrialPlan, number: int, n: int) -> Literal["go", "redo", "stop"]:
+    def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
         """Say where the robot has to stand, and wait."""
         self._growing.tell(number, n)
         words = placing_words(plan, self._arena, self._robot)
@@ -145,40 +139,12 @@ class _Guide:
             said = "Expected numbers such as 13.75, 13 3/4 or -2."
 
 
-class _Attendant(RobotsOwnSenses):
-    """Somebody at a page, who counts the cells of trials that are drawn."""
+def _sheet_observer(channel: Channel) -> SheetObserver:
+    """A person at a page, who taps the cells of trials that are drawn; the robot stands at its start already."""
 
-    observes: Observe = "cells"
+    def pick(arena: Arena) -> list[int] | None:
+        given = channel.ask("cells").get("cells") or []
+        cells = {each for each in given if type(each) is int and 0 <= each < arena.grid.n_cells}
+        return sorted(cells) or None
 
-    def __init__(self, channel: Channel, arena: Arena) -> None:
-        super().__init__()
-        self._channel, self._n_cells = channel, arena.grid.n_cells
-        self._purpose = ""
-
-    def meet(self, robot: Robot, arena: Arena) -> Clock:
-        """A robot was opened; an S2 tells what its encoders count."""
-        self._met(robot)
-        self.observes = "encoders" if self.has_encoders else "cells"
-        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
-        return clock
-
-    def place(self, plan: TrialPlan, start: Pose) -> None:
-        """It stands there: the guide has asked."""
-        self.begin()
-        self._purpose = plan.purpose
-
-    def look(self) -> None:
-        """Nobody sees where it is."""
-
-    def poses(self) -> NDArray[np.float64]:
-        """None."""
-        return np.empty((0, 3))
-
-    def cells(self) -> tuple[int, ...]:
-        """Those that its line crosses, as they are tapped."""
-        while self._purpose not in NO_LINE:
-            given = self._channel.ask("cells").get("cells") or []
-            cells = sorted({each for each in given if type(each) is int and 0 <= each < self._n_cells})
-            if cells:
-                return tuple(cells)
-        return ()
+    return SheetObserver(pick, NO_LINE)

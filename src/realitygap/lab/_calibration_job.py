@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from realitygap.platforms import names_a_port
+
 from ._job import Job
 
 
@@ -25,7 +27,7 @@ class CalibrationJob(Job):
     def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = Path(order["out"]).stem
         self.kind = str(order["kind"])
-        self._uses_robot = str(order["platform"]).startswith("scribbler:")
+        self._uses_robot = names_a_port(str(order["platform"]))
         self.n_done = self.n_trials = 0
         self.readings: list[dict[str, Any]] = []
         self.made: dict[str, Any] | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -212,10 +212,10 @@ class Counts:
             return Draft(found[0].cells, found[0].mark)
         return Draft([])
 
-    def keep(self, number: int, who: str, role: ScoreRole, draft: Draft) -> None:
-        """Keep what somebody has tapped so far."""
+    def keep(self, number: int, who: str, role: ScoreRole, draft: Draft) -> Future[None]:
+        """Save the cells that a person has tapped so far; the result is there when they are on the disk."""
         self._drafts[number, who, role] = draft
-        self._keeper.submit(keep_draft, self._folder, number, who, role, draft)
+        return self._keeper.submit(keep_draft, self._folder, number, who, role, draft)
 
     def card(self, number: int, who: str, role: ScoreRole) -> CountCard:
         """Everything that is shown while a trial is counted."""

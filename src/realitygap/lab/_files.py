@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl
 
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
+from realitygap.platforms import names_a_port
 from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
 
@@ -114,7 +115,7 @@ def refuse_platform(root: Path, platform: str) -> None:
     Raises:
         StudyError: It would.
     """
-    if platform.startswith("scribbler:"):
+    if names_a_port(platform):
         refuse_port(root, platform)
     else:
         refuse_outside(root, platform)

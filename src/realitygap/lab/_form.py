@@ -18,24 +18,29 @@ from pydantic.fields import FieldInfo
 
 from realitygap._limits import parse_toml
 from realitygap.evolution import NAMED_SETTINGS
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
 from realitygap.runs import Condition
 from realitygap.settings import is_hidden
-from realitygap.study import DEFAULT_NEAT, SECTIONS, ReportSection, StudySection, TrialsSection
+from realitygap.study import (
+    DEFAULT_NEAT,
+    SECTIONS,
+    ReportSection,
+    StudySection,
+    TrialsSection,
+    platform_sections,
+)
 
 Kind = Literal["yes-no", "choice", "whole", "number", "text", "toml"]
-PLATFORMS = {"jyro": JyroPlatform, "sim": SimPlatform, "twin": TwinPlatform, "scribbler": ScribblerPlatform}
-
 TITLES = {
     "study": "The study",
     "arena": "Arena",
     "task": "Task",
+    "controller": "Controller",
     "neat": "NEAT",
     "novelty": "Novelty search",
-    "platform.jyro": "Platform jyro: the paper's simulation",
-    "platform.sim": "Platform sim: a simulated robot",
-    "platform.twin": "Platform twin: pseudo-reality",
-    "platform.scribbler": "Platform scribbler: the robot",
+    **{
+        f"platform.{model.name}": f"Platform {model.name}: {model.summary.partition(':')[0]}"
+        for model in platform_sections().values()
+    },
     "trials": "Trials on a robot",
     "report": "Report",
 }
@@ -63,10 +68,10 @@ class Field:
 def form_sections() -> dict[str, list[Field]]:
     """The settings of all sections, by the section's place."""
     sections = {"study": _fields("study", StudySection)}
-    for name, model in SECTIONS.items():
-        place = f"platform.{name}" if name in PLATFORMS else name
+    tables = SECTIONS | {f"platform.{name}": model for name, model in platform_sections().items()}
+    for name, model in tables.items():
         defaults = NAMED_SETTINGS[DEFAULT_NEAT] if name == "neat" else {}
-        sections[place] = _fields(place, model, defaults)
+        sections[name] = _fields(name, model, defaults)
     sections["trials"] = _fields("trials", TrialsSection)
     sections["report"] = _fields("report", ReportSection)
     return sections

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ._job import Job
+from realitygap.platforms import names_a_port
 
-ROBOT = "scribbler:"
+from ._job import Job
 
 
 class GapJob(Job):
@@ -27,7 +27,7 @@ class GapJob(Job):
 
     def __init__(self, name: str, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = name
-        self._uses_robot = str(order.get("measure", {}).get("target", "")).startswith(ROBOT)
+        self._uses_robot = names_a_port(str(order.get("measure", {}).get("target", "")))
         self.trials: dict[str, tuple[int, int]] = {}
         self.verdict = ""
         self.n_reports = 0

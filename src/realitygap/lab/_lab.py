@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import StudyError
+from realitygap.platforms import names_a_port
 from realitygap.records import refuse_links
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
@@ -18,7 +19,7 @@ from ._calibration_job import CalibrationJob
 from ._checks import Checks
 from ._counts import Counts
 from ._files import refuse_camera, refuse_outside, refuse_platform, refuse_port
-from ._gap_job import ROBOT, GapJob
+from ._gap_job import GapJob
 from ._hand import Hand
 from ._job import Job
 from ._live_job import LiveJob
@@ -251,7 +252,7 @@ class Lab:
         for key in ("sim", "target", "controllers"):
             refuse_platform(self.root, values[key])
         with self._lock:
-            if values["target"].startswith(ROBOT):
+            if names_a_port(values["target"]):
                 self.refuse_second_robot()
             kept = page.with_suffix(".jsonl")
             refuse_links(self.root, page, kept)
@@ -303,7 +304,7 @@ class Lab:
         refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
         refuse_outside(self.root, values["base"])
         refuse_platform(self.root, values["platform"])
-        is_robot = values["platform"].startswith(ROBOT)
+        is_robot = names_a_port(values["platform"])
         with self._lock:
             if self.calibration is not None and not self.calibration.is_over:
                 raise StudyError("A calibration goes on already. Wait until it is done, or stop it.")

@@ -12,7 +12,7 @@ from realitygap.runs import genome_of
 from realitygap.trials import drive_trial
 
 from ._channel import Channel, Message
-from ._live_robot import open_robot, own_platform
+from ._live_robot import open_robot
 
 NUMBERS = ("condition", "replicate", "generation", "individual")
 
@@ -47,13 +47,15 @@ def work(channel: Channel, order: Message) -> None:
     numbers = {key: order[key] for key in NUMBERS if key in order}
     chosen = choose_trial(read_tally(Path(order["folder"])), **numbers)
     row, condition = chosen.row, chosen.condition
-    robot, n_steps = open_robot(condition, order.get("platform") or own_platform(condition))
+    robot, n_steps = open_robot(condition, order.get("platform") or "")
     page, problem = _FarPage(channel), "Stopped."
     which = ", ".join(f"{name} {row[key]}" for key, name in _NAMES.items())
     try:
         with WatchedRobot(robot, arena=condition.placed_arena, page=page) as watched:
             scene = {**page.scene, "title": f"{condition.name}, {which}"}
             channel.say("begun", scene=scene, trials=page.trials)
-            problem = drive_trial(watched, genome_of(condition, row).network(), n_steps).problem
+            genome = genome_of(condition, row)
+            driven = drive_trial(watched, genome.network(), n_steps, interface=genome.interface)
+            problem = driven.problem
     finally:
         channel.say("played", trials=page.trials, problem=problem)

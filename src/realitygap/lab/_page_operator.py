@@ -1,4 +1,4 @@
-"""The operator of a physical study at a page: asked there, through the channel, and scored in the ledger directly."""
+"""Operators of a physical study whose trials are shown on a page."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from typing import Any
 from realitygap.emulator import Witness
 from realitygap.records import LEDGER_NAME, Ledger, Score
 from realitygap.robots import Command, Observation, Robot
-from realitygap.trials import Card, DrivenTrial, Preflight, Verdict, WitnessOperator
+from realitygap.study import CameraObserver
+from realitygap.trials import Card, DrivenTrial, Operator, Preflight, Verdict, WitnessObserver, own_witness
 
 from ._channel import Channel, Message
 from ._drawn import keep_drawn
+from ._proposals import keep_proposal, track_proposal
 
 LIVE_S = 0.05
 """Between two messages on where an emulated robot is [s]."""
@@ -59,18 +61,28 @@ class _Live:
             self._channel.say("pose", pose=list(witness.pose()))
 
 
-class _Watched:
-    """What all operators tell the page."""
+class _Shown:
+    """Tells the page about trials, and hears whether a person there pressed stop."""
 
-    def __init__(self, channel: Channel, folder: Path) -> None:
+    def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        self._folder = folder
-        self._stops = _Stops(channel)
+        self.stops = _Stops(channel)
         self._live = _Live(channel)
-        self._began = 0.0
 
-    def _tell_step(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """Tell of a step; whether somebody pressed stop."""
+    def met(self, robot: Robot) -> None:
+        """This robot is in use."""
+        self.stops.met(robot)
+        self._channel.say("met", label=robot.label)
+
+    def begun(self, card: Card, observer: WitnessObserver | None) -> None:
+        """The robot stands at the start of a trial."""
+        if observer is not None:
+            self._live.begin(observer.witness)
+        self.stops.is_asked = False
+        self._channel.say("driving", card=card_values(card))
+
+    def step(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
+        """A step begins; whether a person pressed stop."""
         self._channel.say(
             "step",
             step=step,
@@ -81,31 +93,37 @@ class _Watched:
             move=command.move,
             turn=command.turn,
         )
-        return self._stops.is_asked
+        return self.stops.is_asked
 
-    def _tell_begun(self, card: Card) -> None:
-        self._stops.is_asked = False
-        self._channel.say("driving", card=card_values(card))
+    def cut_off(self) -> None:
+        """The trial does not go on."""
+        self._live.end()
 
-    def _tell_driven(self, card: Card) -> None:
+    def driven(self, card: Card) -> None:
+        """The trial has ended."""
         self._live.end()
         self._channel.say("driven", trial=card.trial.trial)
 
 
-class WatchedWitness(WitnessOperator):
-    """The witness of an emulated robot, which the page may watch and stop."""
+class WatchedOperator(Operator):
+    """Nobody beside an emulated robot; the page may watch and stop it.
 
-    def __init__(self, channel: Channel, folder: Path, witness: Witness | None = None) -> None:
-        super().__init__(witness)
-        self._said = _Watched(channel, folder)
+    Args:
+        channel: To the server.
+        witness: Of an emulator in another program.
+    """
+
+    def __init__(self, channel: Channel, witness: Witness | None = None) -> None:
+        self._witness = WitnessObserver(witness)
+        super().__init__(self._witness)
         self._channel = channel
+        self._page = _Shown(channel)
         self._is_stopped = False
 
     def meet(self, robot: Robot) -> None:
         """It is the one to stop."""
         super().meet(robot)
-        self._said._stops.met(robot)
-        self._channel.say("met", label=robot.label)
+        self._page.met(robot)
 
     def accept(self, preflight: Preflight) -> bool:
         """Whether nothing was found; the page shows what."""
@@ -113,7 +131,7 @@ class WatchedWitness(WitnessOperator):
         return super().accept(preflight)
 
     def settle(self, card: Card, problem: str) -> Verdict:
-        """Void, once somebody has said that it may go on after a stop."""
+        """Void, once a person has said that it may go on after a stop."""
         if self._is_stopped:
             self._is_stopped = False
             self._channel.ask("go on", card=card_values(card), problem=problem)
@@ -122,25 +140,24 @@ class WatchedWitness(WitnessOperator):
     def place(self, card: Card) -> None:
         """Put the robot at the start."""
         super().place(card)
-        self._said._tell_begun(card)
-        self._said._live.begin(self.witness)
+        self._page.begun(card, self._witness)
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
         """Tell of the step, and whether it was stopped."""
         super().watch(card, step, seen, command)
-        self._is_stopped = self._said._tell_step(card, step, seen, command)
+        self._is_stopped = self._page.step(card, step, seen, command)
         if self._is_stopped:
-            self._said._live.end()
+            self._page.cut_off()
         return self._is_stopped
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score:
+    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
         """The cells along the driven line."""
-        self._said._tell_driven(card)
+        self._page.driven(card)
         return super().drawn(card, driven)
 
 
-class PageOperator(_Watched):
-    """Somebody at a page, who places the robot and watches it; the cells are entered at any page, into the ledger.
+class PageOperator(Operator):
+    """A person at a page, who places the robot and watches it; the cells are entered at any page, into the ledger.
 
     An emulated robot is placed by its witness, and the line that it drew is kept beside the ledger for whoever counts,
     as a sheet of paper is.
@@ -150,31 +167,37 @@ class PageOperator(_Watched):
         folder: Of the study's results.
         when: Whether to wait for cells after each trial, or when the sheet is full: trial or sheet.
         witness: Of an emulator in another program.
+
+    Attributes:
+        proposer: Name of the camera whose cells wait for a person to look at them; empty if they are entered.
     """
 
     def __init__(
         self, channel: Channel, folder: Path, *, when: str = "sheet", witness: Witness | None = None
     ) -> None:
-        super().__init__(channel, folder)
-        self._when = when
-        self._remote = witness
-        self._witness: WitnessOperator | None = None
+        super().__init__()
+        self._channel, self._folder, self._when, self._remote = channel, folder, when, witness
+        self._page = _Shown(channel)
+        self._witness: WitnessObserver | None = None
+        self.proposer = ""
 
     # the robot
 
     def meet(self, robot: Robot) -> None:
         """Have the robot stood free for its pre-flight."""
-        self._stops.met(robot)
-        self._channel.say("met", label=robot.label)
-        own = getattr(getattr(robot, "port", None), "witness", None) or getattr(robot, "witness", None)
-        if robot.label == "EMULATED" and (own or self._remote) is not None:
-            self._witness = WitnessOperator(self._remote)
-            self._witness.meet(robot)
+        self._page.met(robot)
+        if robot.label == "EMULATED" and (own_witness(robot) or self._remote) is not None:
+            self._witness = WitnessObserver(self._remote)
+            if isinstance(self.observer, CameraObserver):
+                self.observer.beside = self._witness
+            else:
+                self.observer = self._witness
         else:
             self._channel.ask("meet", label=robot.label)
+        super().meet(robot)
 
     def accept(self, preflight: Preflight) -> bool:
-        """Show what was found; go on where somebody says so."""
+        """Show what was found; go on if a person says so."""
         found: dict[str, Any] = {"facts": preflight.facts, "problems": list(preflight.problems)}
         self._channel.say("preflight", **found)
         if not preflight.problems:
@@ -185,30 +208,34 @@ class PageOperator(_Watched):
 
     def settle(self, card: Card, problem: str) -> Verdict:
         """Ask whether a trial that was cut off counts."""
-        self._live.end()
+        self._page.cut_off()
         answer = self._channel.ask("settle", card=card_values(card), problem=problem)
         return "driven" if answer.get("verdict") == "driven" else "void"
 
     def place(self, card: Card) -> None:
         """Ask for the robot at its start, with the pen."""
         self._channel.ask("place", card=card_values(card), is_placed=self._witness is not None)
-        if self._witness is not None:
-            self._witness.place(card)
-            self._live.begin(self._witness.witness)
-        self._tell_begun(card)
+        super().place(card)
+        self._page.begun(card, self._witness)
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """Tell of the step; whether somebody pressed stop."""
-        if self._witness is not None:
-            self._witness.watch(card, step, seen, command)
-        return self._tell_step(card, step, seen, command)
+        """Tell of the step; whether a person pressed stop."""
+        super().watch(card, step, seen, command)
+        return self._page.step(card, step, seen, command)
 
     def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
-        """Nothing yet: somebody has to look; of an emulated robot the line is kept for them."""
-        self._tell_driven(card)
+        """None if a person has to look at the cells first; then what was seen is kept for them."""
+        self._page.driven(card)
+        seen, number = super().drawn(card, driven), card.trial.trial
+        if card.observe != "cells" or (
+            seen is not None and seen.who == CameraObserver.who and not self.proposer
+        ):
+            return seen
+        if seen is not None and seen.who == CameraObserver.who:
+            told = f"Cells and path by {self.proposer}, looked at by who entered them."
+            keep_proposal(self._folder, number, track_proposal(seen, self.proposer, self.proposer, told))
         if self._witness is not None:
-            path = self._witness.drawn(card, driven).path or ()
-            keep_drawn(self._folder, card.trial.trial, path)
+            keep_drawn(self._folder, number, self._witness.score(card.arena).path or ())
         return None
 
     # a sheet

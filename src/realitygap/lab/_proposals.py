@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -94,3 +95,28 @@ def _of_kind(folder: Path, trial: int, kind: Kind) -> list[Proposal]:
 
 def _place(folder: Path, trial: int, kind: Kind) -> Path:
     return folder / FOLDER / f"{kind}-{trial}.json"
+
+
+def track_proposal(seen: Score, mark: str, source: str, told: str, said: str = "") -> Proposal:
+    """The proposal of a camera for a trial.
+
+    Args:
+        seen: Its cells and path.
+        mark: By which it is known.
+        source: The video's file, or the camera.
+        told: The note for the ledger.
+        said: What has to be said of it.
+    """
+    path = [[round(float(part), 5) for part in row] for row in seen.path or ()]
+    return Proposal(
+        kind="track",
+        mark=mark,
+        source=source,
+        time=time.time(),
+        cells=sorted(seen.cells),
+        lines=[[row[:2] for row in path]],
+        n_ends=seen.n_ends,
+        path=path,
+        said=said,
+        told=told,
+    )

@@ -15,6 +15,7 @@ from typing import Any
 
 from realitygap._limits import read_file
 from realitygap.errors import RealityGapError, StudyError
+from realitygap.platforms import is_physical
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
@@ -182,7 +183,7 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
 
 
 def _is_driven(condition: dict[str, Any]) -> bool:
-    return bool(condition["settings"]["platform"] == "scribbler")
+    return is_physical(condition["settings"])
 
 
 def _of_ledger(path: Path, conditions: list[str], replicates: int) -> tuple[int, dict[str, int]]:

@@ -10,13 +10,13 @@ from typing import Any
 
 from realitygap.errors import StudyError
 from realitygap.records import ResultsFolder
-from realitygap.study import Progress, Study, check_files, parse_study, run_study
+from realitygap.study import Progress, Study, check_files, drive_study, parse_study, run_study
 from realitygap.trials import Operator
 
 from ._channel import Channel, Message
 from ._described import study_of
 from ._files import refuse_code
-from ._page_operator import PageOperator, WatchedWitness
+from ._page_operator import PageOperator, WatchedOperator
 
 _TOLD_S = 0.5
 """Between two messages on how far a study is [s]."""
@@ -39,7 +39,7 @@ def work(channel: Channel, order: Message) -> None:
     result = run_study(study, folder, tell=told.show, threads=order.get("threads"), allow_code=allow_code)
     if port is not None:
         with _operated(channel, order, study, folder) as operator:
-            result = run_study(study, folder, port=port, operator=operator, allow_code=allow_code)
+            result = drive_study(study, port, folder, operator=operator, allow_code=allow_code)
     physical = result.physical
     channel.say("done", waiting="" if physical is None else physical.waiting)
 
@@ -54,35 +54,29 @@ def _study(order: Message, folder: Path) -> Study:
 
 @contextlib.contextmanager
 def _operated(channel: Channel, order: Message, study: Study, folder: Path) -> Iterator[Operator]:
-    """Who stands beside the robot, with a camera where one is named."""
-    operator = _operator(channel, order, folder)
-    camera = order.get("camera") or None
+    """Who stands beside the robot, with a camera if one is named."""
+    from realitygap.emulator import connect_witness
+
+    address, camera, counts = order.get("witness") or None, order.get("camera") or None, order.get("counts")
+    remote = None if address is None else connect_witness(address)
+    if counts == "witness":
+        if camera is not None:
+            raise StudyError(
+                "A camera goes with a robot on the floor: an emulator's witness sees where it drives."
+            )
+        yield WatchedOperator(channel, remote)
+        return
+    operator = PageOperator(channel, folder, when=order.get("when", "sheet"), witness=remote)
     if camera is None:
         yield operator
         return
     from ._camera import under_camera
 
-    if order.get("counts") == "witness":
-        raise StudyError(
-            "A camera goes with a robot on the floor: an emulator's witness sees where it drives."
-        )
-
     def say(text: str) -> None:
         channel.say("said", text=text)
 
-    asks = order.get("counts") != "camera"
-    with under_camera(camera, study, folder, operator, say, asks=asks) as looking:
+    with under_camera(camera, study, operator, say, asks=counts != "camera") as looking:
         yield looking
-
-
-def _operator(channel: Channel, order: Message, folder: Path) -> Operator:
-    from realitygap.emulator import connect_witness
-
-    address = order.get("witness") or None
-    remote = None if address is None else connect_witness(address)
-    if order.get("counts") == "witness":
-        return WatchedWitness(channel, folder, remote)
-    return PageOperator(channel, folder, when=order.get("when", "sheet"), witness=remote)
 
 
 class _Telling:

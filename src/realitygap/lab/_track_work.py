@@ -16,9 +16,8 @@ from realitygap.study import (
 )
 from realitygap.vision import Marks, Tracked, Tracker, VideoFile
 
-from ._camera import track_proposal
 from ._channel import Channel, Message
-from ._proposals import keep_proposal
+from ._proposals import keep_proposal, track_proposal
 
 _TOLD_S = 0.3
 """Between two messages on how far it is [s]."""

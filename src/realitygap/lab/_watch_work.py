@@ -21,13 +21,15 @@ from realitygap.report import (
     draw_coverage,
     draw_networks,
     draw_paths,
+    draw_scores,
     draw_species,
     write_report,
 )
 
 from ._channel import Channel, Message
 
-FIGURES: dict[str, Callable[..., Drawing]] = {
+FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
+    "scores": draw_scores,
     "coverage": draw_coverage,
     "paths": draw_paths,
     "networks": draw_networks,
@@ -82,14 +84,20 @@ def _draw_all(channel: Channel, folder: Path) -> None:
     began = time.process_time()
     for name, draw in FIGURES.items():
         try:
-            drawn = {key: draw(folder, width=width) for key, width in WIDTHS.items()}
+            drawn = [draw(folder, width=width) for width in WIDTHS.values()]
         except (RealityGapError, ValueError) as error:
             channel.say("figure", name=name, text=str(error))
             continue
-        caption, alt = drawn["wide"].caption, drawn["wide"].alt
-        channel.say(
-            "figure", name=name, caption=caption, alt=alt, **{key: each.svg for key, each in drawn.items()}
-        )
+        lists = [each if isinstance(each, list) else [each] for each in drawn]
+        for number, (wide, narrow) in enumerate(zip(*lists, strict=True)):
+            channel.say(
+                "figure",
+                name=f"{name}-{number}" if number else name,
+                caption=wide.caption,
+                alt=wide.alt,
+                wide=wide.svg,
+                narrow=narrow.svg,
+            )
     channel.say("drawn", seconds=time.process_time() - began)
 
 

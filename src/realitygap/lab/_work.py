@@ -34,14 +34,21 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # also where a shell has it ignored
     channel = Channel(sys.stdin, wire)
     try:
+        return _work(channel)
+    except KeyboardInterrupt:  # also one that comes while a failure is reported
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one that comes once more is the same one
+        channel.say("interrupted")
+        return 130
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Python does not catch one while it ends
+
+
+def _work(channel: Channel) -> int:
+    try:
         order = channel.begin()
         work: Callable[[Channel, Message], None] = import_module(f"{__package__}.{_WORK[order['work']]}").work
         with kept_interrupts():
             work(channel, order)
-    except KeyboardInterrupt:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # one that comes once more is the same one
-        channel.say("interrupted")
-        return 130
     except (RealityGapError, OSError, ValueError) as error:
         channel.say("error", text=str(error))
         return 1

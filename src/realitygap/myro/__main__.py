@@ -23,6 +23,7 @@ from ._base import TimeUp
 from ._mistakes import explanation
 from ._ports import force_port
 from ._simulation import is_simulation
+from ._time import currentTime, wait
 
 _EXAMPLE = """example:
   python -m realitygap.myro dance.py --port sim
@@ -201,12 +202,12 @@ def _on_the_robots_clock() -> Iterator[None]:
 
     def on_clock(seconds: float) -> None:
         if _is_untimed():
-            myro.wait(seconds)
+            wait(seconds)
         else:
             sleep(seconds)
 
     time.sleep = on_clock  # type: ignore[assignment]  # takes what sleep takes
-    time.time = lambda: myro.currentTime() if _is_untimed() else now()
+    time.time = lambda: currentTime() if _is_untimed() else now()
     try:
         yield
     finally:

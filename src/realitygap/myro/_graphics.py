@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from ._mistakes import MyroError, number, whole
 from ._pictures import Picture
-from ._show import png, show_markup
+from ._show import show_markup
 
 _LARGEST = 10_000  # [pixels] along a side of a window
 
@@ -412,7 +412,7 @@ class Image(GraphicsObject):
     def _svg(self, window: GraphWin) -> str:
         ((x, y),) = self._on(window)
         width, height = self.picture.width, self.picture.height
-        source = b64encode(png(self.picture)).decode()
+        source = b64encode(self.picture.png()).decode()
         return (
             f'<image x="{x - width / 2:g}" y="{y - height / 2:g}" width="{width}" height="{height}" '
             f'href="data:image/png;base64,{source}"/>'

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
+import PIL.Image
 
 from realitygap._limits import open_image
 
@@ -25,13 +26,13 @@ class Picture:
         filename: Where it comes from.
     """
 
-    def __init__(self, original: Picture | Image.Image | str | None = None) -> None:
+    def __init__(self, original: Picture | PIL.Image.Image | str | None = None) -> None:
         if isinstance(original, str):
             self.image, self.filename = _opened(original), original
         elif isinstance(original, Picture):
             self.image, self.filename = original.image.copy(), original.filename
         else:
-            self.image = Image.new("RGBA", (0, 0)) if original is None else original.convert("RGBA")
+            self.image = PIL.Image.new("RGBA", (0, 0)) if original is None else original.convert("RGBA")
             self.filename = "Camera Image"
         self._reload()
 
@@ -46,15 +47,19 @@ class Picture:
         Args:
             array: (h, w, 3) uint8 colors, or (h, w) uint8 grays.
         """
-        return cls(Image.fromarray(np.ascontiguousarray(array)))
+        return cls(PIL.Image.fromarray(np.ascontiguousarray(array)))
 
     def __repr__(self) -> str:
         return f"<Picture instance ({self.width} x {self.height})>"
 
     def _repr_png_(self) -> bytes | None:
-        from ._show import png
+        return self.png() if self.width and self.height else None
 
-        return png(self) if self.width and self.height else None
+    def png(self) -> bytes:
+        """Return the picture as the bytes of a PNG file."""
+        buffer = io.BytesIO()
+        self.image.save(buffer, "png")
+        return buffer.getvalue()
 
     def load(self, filename: str) -> None:
         """Become the picture in a file.
@@ -217,7 +222,7 @@ class Pixel:
         self.setRGB(darker(self.getRGB()))
 
 
-def _opened(filename: str) -> Image.Image:
+def _opened(filename: str) -> PIL.Image.Image:
     try:
         with open_image(Path(filename).expanduser(), _LARGEST) as image:
             return image.convert("RGBA")
@@ -269,7 +274,7 @@ def _from_file_or_web(filename: str) -> Picture:
 
 
 def _filled(width: object, height: object, rgba: tuple[int, int, int, int]) -> Picture:
-    return Picture(Image.new("RGBA", (_side("width", width), _side("height", height)), rgba))
+    return Picture(PIL.Image.new("RGBA", (_side("width", width), _side("height", height)), rgba))
 
 
 def _from_bytes(width: object, height: object, data: Any, mode: str = "color") -> Picture:
@@ -281,7 +286,7 @@ def _from_bytes(width: object, height: object, data: Any, mode: str = "color") -
             f"makePicture: the data has {len(raw)} bytes, expected {size[0]} x {size[1]} x {per_pixel} "
             f"for mode {mode!r}."
         )
-    return Picture(Image.frombytes(form, size, raw))
+    return Picture(PIL.Image.frombytes(form, size, raw))
 
 
 def loadPicture(filename: str) -> Picture:
@@ -332,7 +337,7 @@ def _as_picture(item: object) -> Picture:
     return Picture(item) if isinstance(item, str) else _a_picture("savePicture", item)
 
 
-def _flat(image: Image.Image, filename: str) -> Image.Image:
+def _flat(image: PIL.Image.Image, filename: str) -> PIL.Image.Image:
     """Without alpha where the kind of file has none, or nothing is see-through: a GIF's colors then stay exact."""
     is_opaque = image.getchannel("A").getextrema() == (255, 255)
     return (

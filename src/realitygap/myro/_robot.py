@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 
 from . import _current
@@ -25,7 +25,7 @@ _HELLO = (784, 880, 698, 349, 523)
 """The tones of a robot that was just opened [Hz], each of 30 ms: Myro's."""
 
 
-class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, Base):
+class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, Base, ClosedOnExit):
     """A Scribbler on a port, in the terms of Myro; Myro's functions speak to the one that was opened last.
 
     As a context manager it stops and lets go of the robot at the end.
@@ -80,14 +80,6 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         finally:
             if _current.robot_or_none() is self:
                 _current.use(None)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def restart(self) -> None:
         """Stop the robot, switch its lights off, let it play its five tones and greet."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 import sys
 import tempfile
 import webbrowser
@@ -39,7 +38,7 @@ def show(picture: Picture, name: str = "default") -> None:
     _shown[name] = picture
     longest = max(picture.width, picture.height)
     scale = _SMALL / longest if longest < _SMALL else min(1.0, _LARGE / longest)
-    source = b64encode(png(picture)).decode()
+    source = b64encode(picture.png()).decode()
     show_markup(
         name,
         f'<img src="data:image/png;base64,{source}" width="{round(picture.width * scale)}" '
@@ -60,13 +59,6 @@ def repaint(picture: Picture | None = None, name: str = "default") -> None:
     if picture is None and name not in _shown:
         raise MyroError(f"repaint: nothing was shown as {name!r}. Call show(picture, {name!r}) first.")
     show(picture or _shown[name], name)
-
-
-def png(picture: Picture) -> bytes:
-    """A picture as the bytes of a PNG file."""
-    buffer = io.BytesIO()
-    picture.image.save(buffer, "png")
-    return buffer.getvalue()
 
 
 def show_markup(name: str, markup: str) -> None:

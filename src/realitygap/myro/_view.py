@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape
 from realitygap.errors import RealityGapError
-from realitygap.world import Pose, obstacle_shapes
+from realitygap.world import Arena, Pose, obstacle_shapes
 
 from ._mistakes import choice, notebook_shell
-
-if TYPE_CHECKING:
-    from ._simulation import Simulation
 
 _PERIOD_S = 0.1  # between two pictures
 _APART = 0.01  # [m] between points of the line that are drawn
@@ -33,6 +30,19 @@ export default {
 """
 
 
+class Watched(Protocol):
+    """The members of a simulation that a view reads."""
+
+    arena: Arena
+
+    @property
+    def is_timed(self) -> bool: ...
+    def catch_up(self) -> None: ...
+    def pose(self) -> Pose: ...
+    def cells(self) -> tuple[int, ...]: ...
+    def path(self) -> Any: ...
+
+
 class View(Protocol):
     """Shows a simulated robot."""
 
@@ -45,7 +55,7 @@ class View(Protocol):
         ...
 
 
-def best_view(simulation: Simulation, wanted: Any = None) -> View | None:
+def best_view(simulation: Watched, wanted: Any = None) -> View | None:
     """The view that fits where the program runs: live in a notebook, none elsewhere.
 
     Args:
@@ -71,7 +81,7 @@ class NotebookView:
     A thread looks ten times a second where time passes by itself; otherwise the program's own waiting does.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Watched) -> None:
         self._simulation = simulation
         self._screen = _screen(to_svg(simulation))
         self._last = time.monotonic()
@@ -129,7 +139,7 @@ def _screen(svg: str) -> Any:
     return lambda picture: widget.set_trait("svg", picture)
 
 
-def to_svg(simulation: Simulation) -> str:
+def to_svg(simulation: Watched) -> str:
     """The arena, the line that the pen drew, and the robot, as SVG."""
     from realitygap.emulator import SCRIBBLER_BODY
 
@@ -176,7 +186,7 @@ def thinned(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return kept if not points or kept[-1] == points[-1] else [*kept, points[-1]]
 
 
-def text_map(simulation: Simulation) -> str:
+def text_map(simulation: Watched) -> str:
     """The arena as lines of letters: # walls, · where the pen went, an arrow where the robot is."""
     left, bottom, right, top = _bounds(simulation)
     step = (right - left) / _COLUMNS
@@ -200,7 +210,7 @@ def text_map(simulation: Simulation) -> str:
     return "\n".join(["".join(row).rstrip() for row in page] + [cells])
 
 
-def _bounds(simulation: Simulation) -> tuple[float, float, float, float]:
+def _bounds(simulation: Watched) -> tuple[float, float, float, float]:
     xs = [x for wall in simulation.arena.walls for x in wall[::2]]
     ys = [y for wall in simulation.arena.walls for y in wall[1::2]]
     return min(xs) - _MARGIN, min(ys) - _MARGIN, max(xs) + _MARGIN, max(ys) + _MARGIN

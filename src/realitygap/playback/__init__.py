@@ -6,7 +6,7 @@ A `MovingTrial` is what a trial looks like whatever platform it was on; `in_moti
 from ._divergence import Divergence, measure_divergence, own_divergence
 from ._live import Page, WatchedRobot
 from ._movie import WIDTH, save_movie
-from ._moving import MovingTrial, RobotShape, first_visits, in_motion
+from ._moving import MovingTrial, RobotShape, first_visits, in_motion, placed, ray_ends
 from ._player import pack_scene, pack_trials, play
 from ._twin import TwinDrive, save_twin_trial, wander
 
@@ -24,7 +24,9 @@ __all__ = [
     "own_divergence",
     "pack_scene",
     "pack_trials",
+    "placed",
     "play",
+    "ray_ends",
     "save_movie",
     "save_twin_trial",
     "wander",

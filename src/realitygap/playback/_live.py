@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RealityGapError
-from realitygap.kernels._coverage import to_grid, visit, visit_line
-from realitygap.robots import Command, Label, Observation, Robot, ScribblerPlatform
+from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
+from realitygap.platforms import ScribblerPlatform
+from realitygap.robots import Command, Label, Observation, Robot, channels_of, select_channels
 from realitygap.world import Arena, Grid, Pose
 
 from ._moving import MovingTrial, RobotShape
@@ -108,6 +109,15 @@ class WatchedRobot:
         self.widget.on_msg(self._asked)
 
     # the contract
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the sensors that the robot has besides range sensors."""
+        return channels_of(self.robot)
+
+    def select(self, names: Sequence[str]) -> None:
+        """Choose those that it reads; see `Robot`."""
+        select_channels(self.robot, names)
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial; see `Robot`."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Shape
-from realitygap.kernels._coverage import to_grid, visit, visit_line
+from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
 from realitygap.world import (
     Arena,
     Body,
@@ -264,7 +264,8 @@ def first_visits(
     """When a trial comes to its cells, counted as the trial itself counts them.
 
     Args:
-        poses: (t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start.
+        poses: (t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start. Of r robots (r, t + 1, 3), which move one
+            after the other in each step.
         grid: The reachable cells.
 
     Returns:
@@ -274,19 +275,23 @@ def first_visits(
     shape = (grid.columns, grid.rows)
     along, at_ends = np.zeros((2, grid.n_cells), np.bool_)
     order, order_ends = np.zeros((2, grid.n_cells), np.uint8)
-    at = [(to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell)) for x, y, _ in poses.tolist()]
-    n, n_ends = [0] * len(at), [0] * len(at)
-    for step, (u, v) in enumerate(at):
-        column, row = int(np.floor(u)), int(np.floor(v))
-        if step == 0:
-            n[0] = visit(column, row, *shape, along, order, 0)
-            n_ends[0] = visit(column, row, *shape, at_ends, order_ends, 0)
-        elif at[step] == at[step - 1]:
-            n[step], n_ends[step] = n[step - 1], n_ends[step - 1]
-        else:
-            u0, v0 = at[step - 1]
-            n[step] = visit_line(u0, v0, u, v, *shape, along, order, n[step - 1])
-            n_ends[step] = visit(column, row, *shape, at_ends, order_ends, n_ends[step - 1])
+    robots = [
+        [(to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell)) for x, y, _ in robot]
+        for robot in np.reshape(poses, (-1, *poses.shape[-2:])).tolist()
+    ]
+    n, n_ends = [], []
+    so_far = so_far_ends = 0
+    for step in range(poses.shape[-2]):
+        for at in robots:
+            u, v = at[step]
+            column, row = int(np.floor(u)), int(np.floor(v))
+            if step == 0:
+                so_far = visit(column, row, *shape, along, order, so_far)
+            elif at[step] != at[step - 1]:
+                so_far = visit_line(*at[step - 1], u, v, *shape, along, order, so_far)
+            so_far_ends = visit(column, row, *shape, at_ends, order_ends, so_far_ends)
+        n.append(so_far)
+        n_ends.append(so_far_ends)
     steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))
     return order[: n[-1]].astype(np.int64), steps, end_steps
 

@@ -11,10 +11,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from realitygap.errors import RobotError, did_you_mean, whole_number
+from realitygap.platforms import SimTwin, open_twin
 from realitygap.records import write_whole
 from realitygap.robots import Command, Observation
 from realitygap.robots.twin import TwinCamera, TwinModel, TwinRobot, outline_of, places_of
-from realitygap.trials import SimTwin, open_twin
 from realitygap.world import Arena, Pose
 
 from ._movie import VIDEO_RATE, WIDTH, find_ffmpeg, gif_of, picture_period, save_movie, video_of

@@ -10,7 +10,6 @@ from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import (
     COLUMNS,
-    EXTRA,
     EXTRA_SCHEMA,
     KEYS,
     SCHEMA,
@@ -26,8 +25,9 @@ from realitygap.records._inbox import Delivery, MissingInboxError, deliver
 from realitygap.records._inside import refuse_links, refuse_links_in
 from realitygap.records._json_file import read_object
 from realitygap.records._ledger import Ledger
-from realitygap.records._ledger_file import LEDGER_FORMAT, ledger_tables
+from realitygap.records._ledger_file import ledger_tables
 from realitygap.records._ledger_kinds import (
+    ROBOT,
     Generation,
     Individual,
     PhotoCount,
@@ -42,7 +42,6 @@ from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._observations_file import (
-    OBSERVATIONS_FORMAT,
     Observations,
     ObservationsFile,
     ObservationsHead,
@@ -52,7 +51,7 @@ from realitygap.records._observations_file import (
     trial_to_dict,
     write_observations,
 )
-from realitygap.records._observed import OBSERVATIONS, Observe, ObservedTrial
+from realitygap.records._observed import CALIBRATES, OBSERVATIONS, Observe, ObservedTrial, sees
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._published_results import PublishedResults
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
@@ -70,7 +69,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "RESULTS_VERSION",
     "RecordWarning",
     # the columns of its frames
-    "EXTRA",
     "EXTRA_SCHEMA",
     "SCHEMA",
     "schema_with",
@@ -96,13 +94,14 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "complete_runs",
     "ledger_frame",
     "LEDGER_NAME",
-    "LEDGER_FORMAT",
     "ledger_tables",
     # what an observer sees of trials one by one
     "ObservedTrial",
     "Observe",
+    "CALIBRATES",
     "OBSERVATIONS",
-    "OBSERVATIONS_FORMAT",
+    "ROBOT",
+    "sees",
     "Observations",
     "ObservationsFile",
     "ObservationsHead",

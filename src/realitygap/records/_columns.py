@@ -53,7 +53,10 @@ COLUMNS: tuple[Column, ...] = (
         nullable=True,
     ),
     Column(
-        "coverage_line", pl.Float64(), "Visited share of the reachable cells, along the line driven [0..1]."
+        "coverage_line",
+        pl.Float64(),
+        "Visited share of the reachable cells, along the line driven [0..1]; null where a robot drove for another task "
+        "and nobody counted.",
     ),
     Column(
         "coverage_ends",
@@ -96,6 +99,12 @@ EXTRA: tuple[Column, ...] = (
         pl.List(pl.Float64()),
         "Of a distance that compares other things than cells: the behavior, such as the final x and y [m].",
     ),
+    Column(
+        "partners",
+        pl.List(pl.Struct({column.name: column.dtype for column in _GENOME})),
+        'With `networks = "each"`: genomes of the other robots in the trial, in order, with the fields of `genome`.',
+        fields=_GENOME,
+    ),
 )
 """Columns that only some conditions have; null in rows of others where rows of several are read together."""
 
@@ -119,6 +128,9 @@ def column_table() -> list[tuple[str, str, str]]:
     """Name, type and description (with unit) of each column in order; a struct's fields as `column.field`."""
     rows: list[tuple[str, str, str]] = []
     for column in (*COLUMNS, *EXTRA):
+        if column.fields and isinstance(column.dtype, pl.List):
+            rows.append((column.name, "List(Struct)", column.description))
+            continue
         rows.append((column.name, "Struct" if column.fields else str(column.dtype), column.description))
         rows += [
             (f"{column.name}.{field.name}", str(field.dtype), field.description) for field in column.fields
@@ -217,7 +229,9 @@ def _check_nulls(frame: pl.DataFrame, columns: Iterable[Column]) -> None:
     for column in columns:
         series = frame[column.name]
         parts = [(column, series)]
-        parts += [(field, series.struct.field(field.name)) for field in column.fields]
+        is_list = bool(column.fields) and isinstance(column.dtype, pl.List)
+        structs = series.explode().drop_nulls() if is_list else series
+        parts += [(field, structs.struct.field(field.name)) for field in column.fields]
         for part, values in parts:
             # explode() would put a null where a list is empty
             inner = (

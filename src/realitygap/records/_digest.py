@@ -68,15 +68,18 @@ def row_streams(frame: pl.DataFrame) -> Iterator[Stream]:
 
 
 def _streams(name: str, column: Column, series: pl.Series) -> Iterator[Stream]:
-    if column.fields:
-        for field in column.fields:
-            yield from _streams(f"{name}.{field.name}", field, series.struct.field(field.name))
-    elif isinstance(column.dtype, pl.List):
+    is_list = isinstance(column.dtype, pl.List)
+    if is_list:
         lengths = series.list.len()
         yield _stream(f"{name}.length", lengths)
         occupied = lengths > 0
         # explode() would put a null where a list is empty
-        yield _stream(name, (series if occupied.all() else series.filter(occupied)).explode())
+        series = (series if occupied.all() else series.filter(occupied)).explode()
+    if column.fields:
+        for field in column.fields:
+            yield from _streams(f"{name}.{field.name}", field, series.struct.field(field.name))
+    elif is_list:
+        yield _stream(name, series)
     else:
         if column.nullable:
             yield _stream(f"{name}.null", series.is_null())

@@ -7,6 +7,7 @@ after `--fresh`.
 
 from __future__ import annotations
 
+import contextlib
 import re
 import secrets
 import shutil
@@ -80,15 +81,26 @@ def make_inbox(folder: Path) -> Path:
     Raises:
         RecordError: the folder cannot be written.
     """
-    inbox = folder / f".inbox-{secrets.token_hex(8)}"
+    inbox = _fresh_name(folder)
     with writing(inbox):
         inbox.mkdir()
     return inbox
 
 
 def remove_inbox(inbox: Path) -> None:
-    """Remove an inbox and what is in it; what a network file system keeps for a moment goes the next time."""
+    """Remove an inbox and what is in it; what a network file system keeps for a moment goes the next time.
+
+    It gets a name that no worker knows first. A chunk that a worker delivers while the files are removed would
+    otherwise stay, and with it the inbox.
+    """
+    unknown = _fresh_name(inbox.parent)
+    with contextlib.suppress(OSError):
+        inbox = inbox.rename(unknown)
     shutil.rmtree(inbox, ignore_errors=True)
+
+
+def _fresh_name(folder: Path) -> Path:
+    return folder / f".inbox-{secrets.token_hex(8)}"
 
 
 def is_inbox(name: str) -> bool:

@@ -14,6 +14,7 @@ from typing import Any, Literal, Self
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import create_file, speaking
 from realitygap.records._ledger_kinds import (
+    ROBOT,
     Generation,
     Score,
     ScoreRole,
@@ -205,10 +206,14 @@ class Ledger(LedgerReader):
         stalls: int,
         problem: str = "",
         score: Score | None = None,
+        last: Step | None = None,
     ) -> None:
-        """A running trial has ended, and counts; with a score it is scored at once."""
+        """A running trial has ended, and counts; with a score it is scored at once.
+
+        `last` is what the robot observed after its last command, if it looked.
+        """
         with self._writing():
-            self._keep_steps(number, end, steps, stalls=stalls, problem=problem)
+            self._keep_steps(number, end, steps, stalls=stalls, problem=problem, last=last)
             self._drive(number, {"end": end})
             if score is not None:
                 self._score(number, score, "score")
@@ -306,7 +311,16 @@ class Ledger(LedgerReader):
             *(turn.sheet, turn.pen, turn.code),
         )
 
-    def _keep_steps(self, number: int, end: str, steps: Sequence[Step], *, stalls: int, problem: str) -> None:
+    def _keep_steps(
+        self,
+        number: int,
+        end: str,
+        steps: Sequence[Step],
+        *,
+        stalls: int,
+        problem: str,
+        last: Step | None = None,
+    ) -> None:
         self._require(number, "running")
         self._connection.executemany(
             "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
@@ -321,7 +335,7 @@ class Ledger(LedgerReader):
                     step.move,
                     step.turn,
                 )
-                for k, step in enumerate(steps)
+                for k, step in enumerate(steps if last is None else (*steps, last))
             ],
         )
         self._run(
@@ -338,7 +352,7 @@ class Ledger(LedgerReader):
         self._note_event(number, "driven", details)
 
     def _score(self, number: int, score: Score, role: ScoreRole) -> None:
-        cells = self._checked(number, score.cells)
+        cells = [] if score.who == ROBOT else self._checked(number, score.cells)
         if role == "score":
             self._refuse_closed(self._require(number, "driven"))
             self._run("UPDATE trials SET state = 'scored' WHERE id = ?", number)

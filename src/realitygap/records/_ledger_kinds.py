@@ -131,12 +131,16 @@ class PhotoCount:
     is_confirmed: bool
 
 
+ROBOT = "robot"
+"""Who scores a trial of which nobody counted the cells, because its task is scored by the robot's own readings."""
+
+
 @dataclass(frozen=True)
 class Score:
     """Cells as somebody entered them, or as an emulator's witness saw them.
 
     Attributes:
-        cells: crossed by the line, columns * row + column.
+        cells: crossed by the line, columns * row + column; none if `who` is `ROBOT`.
         who: entered them.
         n_ends: cells in which steps end; None where nobody saw it.
         path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
+from realitygap._closing import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
+    Score,
     Step,
     Trial,
     TrialState,
@@ -26,7 +27,7 @@ FROM trials JOIN generations USING (condition, replicate, generation)
 """
 
 
-class LedgerReader:
+class LedgerReader(ClosedOnExit):
     """What a ledger of physical trials says.
 
     Raises:
@@ -45,14 +46,6 @@ class LedgerReader:
     def close(self) -> None:
         """Let go of the file."""
         self._connection.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     # conditions and sittings
 
@@ -132,7 +125,29 @@ class LedgerReader:
         return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
 
     def steps(self, number: int) -> list[Step]:
-        """What a trial's robot saw and was told, step by step."""
+        """What a trial's robot saw and was told, step by step; without the look after its last command."""
+        n_steps = self.trial(number).n_steps
+        steps = self._steps(number)
+        return steps if n_steps is None else steps[:n_steps]
+
+    def last_look(self, number: int) -> Step | None:
+        """The robot's readings after the last command of a trial; None if it did not look."""
+        n_steps = self.trial(number).n_steps
+        steps = self._steps(number)
+        return steps[-1] if n_steps is not None and len(steps) > n_steps else None
+
+    def counted_score(self, number: int) -> Score | None:
+        """The score of a trial that counts for selection, with the driven path if it is known."""
+        row = self._one(
+            "SELECT * FROM scores WHERE trial = ? AND role = 'score' AND undone IS NULL ORDER BY id DESC LIMIT 1",
+            number,
+        )
+        if row is None:
+            return None
+        values = self._decoded(row, "cells", "path")
+        return Score(tuple(values["cells"]), values["who"], n_ends=values["n_ends"], path=values["path"])
+
+    def _steps(self, number: int) -> list[Step]:
         rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
         return [
             Step(

@@ -8,7 +8,7 @@ import polars as pl
 
 from realitygap._limits import parse_json
 from realitygap.errors import LedgerError
-from realitygap.records._columns import SCHEMA
+from realitygap.records._columns import schema_with
 from realitygap.records._ledger import Ledger
 
 _ROWS = """
@@ -39,13 +39,17 @@ def ledger_frame(ledger: Ledger, condition: str) -> pl.DataFrame:
     """One row an individual of the complete runs of a condition, with the columns of the records, in key order.
 
     Cells and coverage are those of the last correction, where there is one; `fitness` and `novelty` stay what selection
-    used. `coverage_ends` is null where nobody saw in which cells steps end.
+    used. `coverage_ends` is null where nobody saw in which cells steps end, and `coverage_line` where nobody counted
+    cells. Of another task than coverage, `task_fitness` is what the trial is worth by it.
     """
     runs = complete_runs(ledger, condition)
+    settings = ledger._one("SELECT settings FROM conditions WHERE name = ?", condition)
+    task = {} if settings is None else parse_json(settings["settings"]).get("task", {})
+    schema = schema_with(["task_fitness"] if "kind" in task else [])
     query = _ROWS.format(runs=", ".join(map(str, runs)))
     rows = ledger._all(query, condition)
     try:
-        return pl.DataFrame([_row(dict(row)) for row in rows], schema=SCHEMA)
+        return pl.DataFrame([_row(dict(row)) for row in rows], schema=schema)
     except (
         ArithmeticError,
         AttributeError,
@@ -69,7 +73,8 @@ def _row(row: dict[str, Any]) -> dict[str, Any]:
         "parents": parse_json(row["parents"]),
         "fitness": row["fitness"],
         "novelty": row["novelty"],
-        "coverage_line": len(cells) / row["n_cells"],
+        "task_fitness": row["fitness"],
+        "coverage_line": len(cells) / row["n_cells"] if cells else None,
         "coverage_ends": None if n_ends is None else n_ends / row["n_cells"],
         "cells": cells,
         "stalls": row["stalls"],

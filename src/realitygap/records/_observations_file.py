@@ -12,12 +12,12 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._closing import ClosedOnExit
 from realitygap._limits import MOST_LINES_BYTES, LimitError, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError
@@ -85,6 +85,8 @@ def trial_to_dict(trial: ObservedTrial) -> dict[str, Any]:
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in vars(trial).items()
     }
+    if not len(trial.last_readings):
+        del values["last_readings"], values["last_stalled"]
     return {**values, "battery_v": None if math.isnan(trial.battery_v) else trial.battery_v}
 
 
@@ -111,6 +113,8 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
             battery_v=math.nan if battery_v is None else float(battery_v),
             end=str(values["end"]),
             end_pose=None if measured is None else _pose(measured),
+            last_readings=np.array(values.get("last_readings", []), np.float64),
+            last_stalled=bool(values.get("last_stalled", False)),
         )
     except KeyError as error:
         raise ValueError(f"a trial without {error}") from None
@@ -144,7 +148,7 @@ def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
     return table
 
 
-class ObservationsFile:
+class ObservationsFile(ClosedOnExit):
     """A file to which trials are added as they end.
 
     One that is there is taken up where it ends: a torn last line is cut off, and what it was is told in `problem`. A
@@ -233,14 +237,6 @@ class ObservationsFile:
     def close(self) -> None:
         """Let go of it; safe to call twice."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[ObservedTrial]) -> None:

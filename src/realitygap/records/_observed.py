@@ -8,11 +8,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Observe = Literal["cells", "encoders", "track"]
-"""How much is seen of a robot: commands, readings, stall and crossed cells; its encoders, too; its poses, too."""
+Observe = Literal["readings", "cells", "encoders", "track"]
+"""How much is seen of a robot: commands, readings and stall; crossed cells, too; its encoders, too; its poses, too."""
 
-OBSERVATIONS: tuple[Observe, ...] = ("cells", "encoders", "track")
+OBSERVATIONS: tuple[Observe, ...] = ("readings", "cells", "encoders", "track")
 """From the least to the most: each has all that those before it have."""
+
+CALIBRATES: tuple[Observe, ...] = OBSERVATIONS[1:]
+"""As much as a calibration needs: from readings alone nothing is told of where a robot drove."""
+
+
+def sees(observe: Observe, least: Observe) -> bool:
+    """Return whether an observation has as much as another, the least that is wanted."""
+    return OBSERVATIONS.index(observe) >= OBSERVATIONS.index(least)
 
 
 @dataclass(frozen=True)
@@ -25,7 +33,8 @@ class ObservedTrial:
         commands: (t, 2) move and turn, -1..1.
         readings: (t, s) of each range sensor, 0..1.
         stalled: (t,) bool.
-        cells: Crossed cells of the arena's grid, ascending: of a pen's line the order is not known.
+        cells: Crossed cells of the arena's grid, ascending: of a pen's line the order is not known. Empty where
+            nobody counted.
         wheels: (t + 1, 2) way of the left and the right wheel since the start, by encoders [m]; no rows where
             encoders are not observed.
         poses: (t + 1, 3) x [m], y [m], heading [rad]; no rows where no camera looks.
@@ -36,6 +45,8 @@ class ObservedTrial:
         end: Why it ended, as `EndReason` has it.
         end_pose: Where it stood at its end by a ruler: x [m], y [m], heading [rad] with all full turns from that of
             the start on; None where nobody measured.
+        last_readings: (s,) of each range sensor after the last command; no entries where nobody looked.
+        last_stalled: Whether the last command was blocked; False where nobody looked.
     """
 
     start: tuple[float, float, float]
@@ -52,10 +63,12 @@ class ObservedTrial:
     battery_v: float = float("nan")
     end: str = "step limit"
     end_pose: tuple[float, float, float] | None = None
+    last_readings: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    last_stalled: bool = False
 
     @property
     def observe(self) -> Observe:
-        """How much is seen of it."""
+        """How much is seen of it; cells where it has neither wheels nor poses, counted or not."""
         if len(self.poses):
             return "track"
         return "encoders" if len(self.wheels) else "cells"

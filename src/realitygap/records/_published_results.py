@@ -361,11 +361,14 @@ class PublishedResults:
         physical = self._complete_runs()
         for name in self.conditions if condition is None else [condition]:
             if name in physical:
-                lacking = [pl.lit(None, dtype).alias(extra) for extra, dtype in EXTRA_SCHEMA.items()]
-                yield from (
-                    frame if columns is None else frame.with_columns(lacking).select(columns)
-                    for frame in self._driven(name)
-                )
+                for frame in self._driven(name):
+                    there = set(frame.columns)
+                    lacking = [
+                        pl.lit(None, dtype).alias(extra)
+                        for extra, dtype in EXTRA_SCHEMA.items()
+                        if extra not in there
+                    ]
+                    yield frame if columns is None else frame.with_columns(lacking).select(columns)
             else:
                 yield from self._frames(chunks.get(name, []), columns)
 

@@ -7,7 +7,6 @@ SVG with the caption that says what was drawn.
 
 from realitygap.report._agreement import Agreement, measure_agreement
 from realitygap.report._archive_figure import draw_archive
-from realitygap.report._arena_figure import draw_arena_and_robot
 from realitygap.report._audit import (
     Audit,
     AuditedCondition,
@@ -47,36 +46,36 @@ from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._effects import (
-    Interval,
     a12,
     bca_interval,
     detectable_effect,
     newcombe_interval,
     runs_needed,
 )
-from realitygap.report._formats import save_drawing, save_picture
+from realitygap.report._formats import check_ending, save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
 from realitygap.report._gap_maps_figure import draw_gap_maps
-from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
+from realitygap.report._gap_order_figure import draw_gap_pairs
 from realitygap.report._gap_page import refuse_gap_page, write_gap_report
 from realitygap.report._gap_replay_figure import draw_gap_replay
 from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._individual_file import export_individual
-from realitygap.report._individuals_figure import draw_better_individuals, draw_individuals
+from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import Each, choose_moving, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
-from realitygap.report._page import REPORT_NAME, write_report
+from realitygap.report._page import write_report
 from realitygap.report._paper_audit import Finding, audit_paper
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._permutation import holm, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
-from realitygap.report._sensor_figure import draw_sensors, save_sensor_figure
-from realitygap.report._show import save_arena, save_robot, save_twin, save_view
+from realitygap.report._score_figure import draw_scores
+from realitygap.report._sensor_figure import save_sensor_figure
+from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
 from realitygap.report._statistics import (
+    Interval,
     IntervalRanks,
-    MedianInterval,
     Quartiles,
     interval_ranks,
     median_interval,
@@ -91,7 +90,6 @@ __all__ = [
     "FAMILY_HEAD",
     "GOAL_HEAD",
     "NARROW",
-    "REPORT_NAME",
     "STRATEGY_HEAD",
     "SUMMARY_SCHEMA",
     "TASK_SCHEMA",
@@ -116,9 +114,9 @@ __all__ = [
     "Finding",
     "Interval",
     "IntervalRanks",
-    "MedianInterval",
     "Quartiles",
     "Side",
+    "Subject",
     "Tally",
     "Variety",
     "a12",
@@ -128,6 +126,7 @@ __all__ = [
     "audit_results",
     "bca_interval",
     "chance_of_best",
+    "check_ending",
     "choose_moving",
     "choose_trial",
     "compare_choices",
@@ -136,14 +135,11 @@ __all__ = [
     "detectable_effect",
     "distance_notes",
     "draw_archive",
-    "draw_arena_and_robot",
-    "draw_better_individuals",
     "draw_choices",
     "draw_closing",
     "draw_coverage",
     "draw_distance",
     "draw_divergence",
-    "draw_gap_differences",
     "draw_gap_maps",
     "draw_gap_pairs",
     "draw_gap_replay",
@@ -152,7 +148,7 @@ __all__ = [
     "draw_lineage",
     "draw_networks",
     "draw_paths",
-    "draw_sensors",
+    "draw_scores",
     "draw_species",
     "draw_trial",
     "export_frame",

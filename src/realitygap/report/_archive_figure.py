@@ -16,13 +16,12 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    draw_line,
+    draw_points,
+    draw_widths,
     head_axes,
-    house_style,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
 )
 from realitygap.report._path_figure import (
     TracedPath,
@@ -114,20 +113,21 @@ def draw_tally_archive(
         + ", ".join(f"{each} {values[-1]:.2f}" for each, values in novelty.items())
         + "."
     )
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(
-                paths,
-                novelty,
-                resolved.placed_arena,
-                resolved.tried_on.body,
-                unit,
-                label_of(described),
-                width,
-            )
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    return draw_widths(
+        lambda width: _draw(
+            paths,
+            novelty,
+            resolved.placed_arena,
+            resolved.on.body,
+            unit,
+            label_of(described),
+            width,
+        ),
+        widths,
+        name,
+        caption,
+        alt,
+    )
 
 
 def _chosen(tally: Tally, condition: str | None) -> str:
@@ -247,18 +247,10 @@ def _draw_field(axes: Axes, paths: Sequence[TracedPath], arena: Arena, body: Bod
         )
     draw_visited(axes, (), arena, body)
     for k, path in enumerate(paths):
-        if path.poses is not None:
-            color, dashes = PENS[k % len(PENS)]
-            style: Any = (0, tuple(dashes)) if dashes else "solid"
-            draw_line(
-                axes,
-                path.poses[:, 0],
-                path.poses[:, 1],
-                color=color,
-                linestyle=style,
-                linewidth=1.0,
-                zorder=5,
-            )
+        color, dashes = PENS[k % len(PENS)]
+        style: Any = (0, tuple(dashes)) if dashes else "solid"
+        for poses, _ in path.tracks:
+            draw_points(axes, poses, color=color, linestyle=style, linewidth=1.0, zorder=5)
 
 
 def _draw_curves(axes: Axes, novelty: dict[str, npt.NDArray[np.float64]], unit: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from realitygap.platforms import SimPlatform
 from realitygap.report._tally import settings_of
 
 _CONTACT = {
@@ -24,8 +25,8 @@ def sim_assumptions(conditions: Sequence[Mapping[str, Any]]) -> list[tuple[str, 
     found: dict[str, list[str]] = {}
     for condition in conditions:
         settings = settings_of(condition)
-        sim = settings.get("sim")
-        if settings.get("platform") == "sim" and isinstance(sim, Mapping):
+        sim = settings.get(SimPlatform.name)
+        if isinstance(sim, Mapping):
             text = assumed(sim, float(settings.get("noise") or 0.0))
             found.setdefault(text, []).append(str(condition["name"]))
     return [(", ".join(names), text) for text, names in found.items()]

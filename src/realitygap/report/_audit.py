@@ -22,7 +22,6 @@ from realitygap.errors import TableError, whole_number
 from realitygap.report._effects import (
     POWER,
     USUAL_EFFECTS,
-    Interval,
     a12,
     a12_of_effect,
     bca_intervals,
@@ -34,7 +33,7 @@ from realitygap.report._effects import (
     share_above,
 )
 from realitygap.report._permutation import ALPHA, holm, permutation_p, runs_for_a_claim, smallest_p
-from realitygap.report._statistics import SMALLEST_N, median_interval
+from realitygap.report._statistics import SMALLEST_N, Interval, median_interval
 
 COLUMNS = ("condition", "run", "value")
 _MOST_MISTAKES = 20

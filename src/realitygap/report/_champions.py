@@ -12,11 +12,13 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError
+from realitygap.platforms import retry_genomes
 from realitygap.records import ResultsFolder
-from realitygap.report._effects import Interval, bca_interval, difference_of_means, mean_interval
+from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
+from realitygap.report._statistics import Interval
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
-from realitygap.runs import Condition, genome_of
-from realitygap.trials import NoiseKey, retry_genomes
+from realitygap.runs import Condition, genome_of, partners_of
+from realitygap.trials import NoiseKey
 
 FRESH_TRIALS = 20
 """How often each champion is tried again: repeats 1 to 20 of its trial, of which the study ran number 0."""
@@ -99,7 +101,7 @@ def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
         condition = Condition.from_settings(name, dict(settings_of(described)))
         if condition.is_physical:
             raise RecordError("a robot drove it, and no program drives its champions again")
-        rows = _champion_rows(tally, name)
+        rows = _champion_rows(tally, condition)
         reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
     except RecordVersionError:
         none = np.empty(0)
@@ -112,13 +114,12 @@ def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
     return Champions(name, label, reported, fresh)
 
 
-def _champion_rows(tally: Tally, condition: str) -> pl.DataFrame:
+def _champion_rows(tally: Tally, condition: Condition) -> pl.DataFrame:
     """The best individual of each of the first runs, the first of several alike."""
     column = f"coverage_{tally.measure}"
-    replicates = [int(run) for run in tally.replicates(condition)[:MOST_RUNS]]
-    rows = tally.folder.read(
-        condition, replicates, ["replicate", "generation", "individual", column, "genome", "key"]
-    )
+    replicates = [int(run) for run in tally.replicates(condition.name)[:MOST_RUNS]]
+    columns = ["replicate", "generation", "individual", column, "key", *condition.genome_columns]
+    rows = tally.folder.read(condition.name, replicates, columns)
     best = rows.filter(pl.col(column) == pl.col(column).max().over("replicate"))
     return best.unique("replicate", keep="first", maintain_order=True)
 
@@ -136,13 +137,14 @@ def _try_again(
     ]
     genomes = [genome_of(condition, row) for row in rows.iter_rows(named=True)]
     batch = retry_genomes(
-        condition.simulated_on,
+        condition.on,
         condition.arena.arena(),
         genomes,
         noise=condition.noise,
         noise_keys=keys,
         repeats=range(FRESH_TRIALS + 1),
         inputs=condition.network_inputs,
+        partners=[partners_of(condition, row) for row in rows.iter_rows(named=True)],
     )
     coverage: npt.NDArray[np.float64] = getattr(batch, column).reshape(len(genomes), -1)
     reported = rows[column].to_numpy()

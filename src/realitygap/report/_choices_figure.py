@@ -15,14 +15,15 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    house_style,
+    draw_widths,
+    mark_key,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
     wrap,
+    write,
 )
-from realitygap.report._statistics import SMALLEST_N, MedianInterval, median_interval, quartiles
+from realitygap.report._statistics import SMALLEST_N, Interval, median_interval, quartiles
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ class Choice:
     label: str
     n: int
     median: float
-    interval: MedianInterval | None
+    interval: Interval | None
     effect: float
     other_median: float | None
     published: tuple[float, ...]
@@ -143,12 +144,7 @@ def draw_tally_choices(
     if not groups:
         raise ValueError("No condition of this study names a baseline, so there are no choices to compare.")
     caption, alt = _caption(tally, groups), _alt(groups)
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(groups, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    return draw_widths(lambda width: _draw(groups, width), widths, name, caption, alt)
 
 
 # drawing
@@ -236,15 +232,14 @@ def _draw_group(
         )
         _draw_choice(axes, choice, y, reference.median)
         is_reference = index == 0
-        axes.annotate(
+        write(
+            axes,
             text,
             (0.0, y if layout.is_wide else start + 0.06),
             (x_words, 0.0),
+            8.0,
             xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="left",
             va="center" if layout.is_wide else "top",
-            fontsize=8.0,
             weight="bold" if is_reference else "normal",
             linespacing=1.15,
         )
@@ -268,27 +263,16 @@ def _head(axes: Axes, group: list[Choice], x_words: float, layout: _Layout) -> N
     n = f"n = {counts[0]}" if len(counts) == 1 else f"n = {counts[0]} to {counts[-1]}"
     labels = ", ".join(sorted({choice.label for choice in group}))
     title = f"Changes to “{shorten(group[0].condition, 30)}”"
-    axes.annotate(
-        title,
-        (0.0, 1.0),
-        (x_words, 9.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        ha="left",
-        va="bottom",
-        fontsize=9.0,
-        weight="bold",
-    )
+    write(axes, title, (0.0, 1.0), (x_words, 9.0), 9.0, va="bottom", weight="bold")
     right = (layout.width - layout.plot_right) * 72
-    axes.annotate(
+    write(
+        axes,
         f"{labels}, {n}" + (" runs each" if layout.is_wide else ""),
         (1.0, 1.0),
         (right - 2, 9.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
+        7.5,
         ha="right",
         va="bottom",
-        fontsize=7.5,
         color=Ink.MUTED,
     )
 
@@ -363,15 +347,15 @@ def _write_numbers(axes: Axes, choice: Choice, y: float, layout: _Layout, *, is_
     elif is_reference:
         items = [(far - 2, middle, "normal")]
     for x, text, weight in items:
-        axes.annotate(
+        write(
+            axes,
             text,
             (1.0, y),
             (x, 0.0),
+            8.0 if weight == "bold" else 7.5,
             xycoords=("axes fraction", "data"),
-            textcoords="offset points",
             ha="right",
             va="center",
-            fontsize=8.0 if weight == "bold" else 7.5,
             weight=weight,
             color=Ink.TEXT if weight == "bold" else Ink.MUTED,
         )
@@ -392,30 +376,28 @@ def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout:
         ]
     if any(choice.other_median is not None for choice in choices):
         handles.append(
-            Line2D(
-                [],
-                [],
-                color=Ink.OURS,
-                markerfacecolor=Ink.GROUND,
-                linewidth=0,
-                marker="s",
-                markersize=4.4,
+            mark_key(
+                "median as its selection counts",
+                "s",
+                4.4,
+                Ink.OURS,
                 markeredgewidth=1.1,
-                label="median as its selection counts",
+                hollow=True,
+                linestyle="-",
+                linewidth=0,
             )
         )
     if any(choice.published for choice in choices):
         handles.append(
-            Line2D(
-                [],
-                [],
-                color=Ink.PUBLISHED,
-                markerfacecolor=Ink.GROUND,
-                linewidth=0,
-                marker="D",
-                markersize=4.0,
+            mark_key(
+                "the paper’s runs",
+                "D",
+                4.0,
+                Ink.PUBLISHED,
                 markeredgewidth=1.1,
-                label="the paper’s runs",
+                hollow=True,
+                linestyle="-",
+                linewidth=0,
             )
         )
     height = float(figure.get_size_inches()[1])

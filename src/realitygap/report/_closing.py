@@ -12,7 +12,6 @@ from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing
 from realitygap.report._drawing import NARROW, WIDE, inline
 
-PAGE_NAME = "report.html"
 GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
 FAMILY_HEAD = (
     "family",

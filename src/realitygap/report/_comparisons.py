@@ -16,7 +16,6 @@ from realitygap.records import ResultsFolder
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
     RESAMPLES,
-    Interval,
     a12,
     bca_intervals,
     detectable_effect,
@@ -35,7 +34,7 @@ from realitygap.report._permutation import (
     sign_flip_p,
     smallest_p,
 )
-from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._statistics import CONFIDENCE, Interval
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 
 _MOST_RUNS_NAMED = 100_000

@@ -16,11 +16,12 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
-    house_style,
+    draw_widths,
+    mark_key,
     new_figure,
     place_axes,
-    to_svg,
     wrap,
+    write,
 )
 from realitygap.report._statistics import SMALLEST_N, median_interval, quartiles
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
@@ -39,16 +40,35 @@ _SHADES = 12
 
 
 @dataclass(frozen=True)
-class _Panel:
-    """What one panel shows.
+class Axis:
+    """The common vertical axis of all panels.
+
+    Attributes:
+        label: name of the score, with its unit.
+        low: lower end.
+        high: upper end.
+        ticks: values with a line and a number.
+        decimals: of these numbers.
+    """
+
+    label: str
+    low: float
+    high: float
+    ticks: tuple[float, ...]
+    decimals: int
+
+
+@dataclass(frozen=True)
+class Panel:
+    """The runs of one condition.
 
     Attributes:
         title: the condition's name.
         note: label and number of runs.
-        values: (n, g) coverage of each run by generation [0..1], NaN after a run's last generation.
-        n_drawn: of how many runs, from the first, lines are drawn.
-        run_bests: (n,) best coverage of each run [0..1].
-        published: published best coverages, one per run of their own [0..1].
+        values: (n, g) score of each run by generation, NaN after a run's last generation.
+        n_drawn: number of runs, from the first, of which lines are drawn.
+        run_bests: (n,) best score of each run.
+        published: published best scores, one per run of their own.
     """
 
     title: str
@@ -92,12 +112,9 @@ def draw_tally_coverage(
         f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the "
         "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(panels, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    return draw_widths(
+        lambda width: draw_panels(panels, width, _coverage_axis(panels)), widths, name, caption, alt
+    )
 
 
 def _points_of(description: Mapping[str, Any]) -> Points:
@@ -105,25 +122,25 @@ def _points_of(description: Mapping[str, Any]) -> Points:
     return "best-so-far" if points == "best-so-far" else "best-of-generation"
 
 
-def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> _Panel:
+def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> Panel:
     name = condition["name"]
     values = tally.generation_bests(name, tally.measure)
     if points == "best-so-far":
         values = (
             np.where(np.isnan(values), np.nan, np.fmax.accumulate(values, axis=1)) if values.size else values
         )
-    return _Panel(
+    return Panel(
         title=name,
         note=f"{label_of(condition)}, n = {len(values)}",
         values=values,
-        n_drawn=_count_drawable(values),
+        n_drawn=count_drawable(values),
         run_bests=tally.run_bests(name, tally.measure),
         published=tuple(condition.get("published") or ()),
     )
 
 
-def _count_drawable(values: npt.NDArray[np.float64]) -> int:
-    """Of how many runs, from the first, the distinct pieces of lines are few enough."""
+def count_drawable(values: npt.NDArray[np.float64]) -> int:
+    """Number of runs, from the first, whose distinct pieces of lines are few enough; `values` is (n, g)."""
     n_drawn = len(values)
     while n_drawn > 1 and sum(len(counts) for _, counts in _segments(values[:n_drawn])) > _MOST_SEGMENTS:
         n_drawn = max(1, n_drawn // 2)
@@ -144,10 +161,11 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
 # drawing
 
 
-def _draw(panels: list[_Panel], width: float) -> Figure:
+def draw_panels(panels: list[Panel], width: float, axis: Axis) -> Figure:
+    """Return a figure of this width [in] with a panel for each condition, and a legend."""
     n_columns = _columns(len(panels), width)
     n_rows = math.ceil(len(panels) / n_columns)
-    left, right, gap = 0.56, 0.06, 0.22
+    left, right, gap = 0.56 + 0.07 * max(0, len(f"{axis.high:.{axis.decimals}f}") - 3), 0.06, 0.22
     panel_width = (width - left - right - gap * (n_columns - 1)) / n_columns
     panel_height = min(1.75, max(1.15, 0.55 * panel_width))
     letters = int(panel_width / 0.078)
@@ -157,16 +175,15 @@ def _draw(panels: list[_Panel], width: float) -> Figure:
     tick_height, legend_height = 0.24, 0.62 if width >= 6 else 0.98
     height = n_rows * (title_height + panel_height + tick_height) + legend_height
     figure = new_figure(width, height)
-    top = _top_of(panels)
     for index, panel in enumerate(panels):
         row, column = divmod(index, n_columns)
         x = left + column * (panel_width + gap)
         y = row * (title_height + panel_height + tick_height) + title_height
         axes = place_axes(figure, x, y, panel_width, panel_height)
-        _draw_panel(axes, panel, top, first_column=column == 0)
+        _draw_panel(axes, panel, axis, first_column=column == 0)
         _write_title(axes, panel, letters, note_below=notes_below)
         if column == 0:
-            axes.set_ylabel("coverage", labelpad=4)
+            axes.set_ylabel(wrap(axis.label, int(panel_height / 0.078)), labelpad=4)
         if index + n_columns >= len(panels):
             axes.set_xlabel("generation", labelpad=2)
     _draw_legend(figure, panels, left if width >= 6 else 0.1, height - legend_height + 0.3, width)
@@ -179,21 +196,23 @@ def _columns(n_panels: int, width: float) -> int:
     return min(n_panels, 3 if n_panels <= 9 else 4)
 
 
-def _top_of(panels: list[_Panel]) -> float:
-    """Upper end of the common vertical axis: the next tenth above everything shown."""
+def _coverage_axis(panels: list[Panel]) -> Axis:
+    """From 0 to the next tenth above everything shown."""
     highest = max([0.1, *(float(p.run_bests.max()) for p in panels if len(p.run_bests))])
     highest = max([highest, *(value for panel in panels for value in panel.published)])
-    return min(1.0, math.ceil(highest * 10 + 0.2) / 10)
+    top = min(1.0, math.ceil(highest * 10 + 0.2) / 10)
+    ticks = np.arange(0.0, top + 1e-9, 0.1 if top <= 0.6 else 0.2)
+    return Axis("coverage", 0.0, top, tuple(ticks.tolist()), 1)
 
 
-def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool) -> None:
+def _draw_panel(axes: Axes, panel: Panel, axis: Axis, *, first_column: bool) -> None:
     n_generations = max(1, panel.values.shape[1])
     side = n_generations - 1 + _side_offset(n_generations)
     step = _side_offset(n_generations)
     axes.set_xlim(-0.25 * step, side + 0.6 * step)
-    axes.set_ylim(0.0, top)
-    axes.set_yticks(np.arange(0.0, top + 1e-9, 0.1 if top <= 0.6 else 0.2))
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.1f}")
+    axes.set_ylim(axis.low, axis.high)
+    axes.set_yticks(axis.ticks)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:.{axis.decimals}f}")
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
     axes.tick_params(axis="y", length=0, labelleft=first_column)
     axes.spines["left"].set_visible(False)
@@ -221,20 +240,19 @@ def _draw_panel(axes: Axes, panel: _Panel, top: float, *, first_column: bool) ->
         )
 
 
-def _write_title(axes: Axes, panel: _Panel, letters: int, *, note_below: bool) -> None:
+def _write_title(axes: Axes, panel: Panel, letters: int, *, note_below: bool) -> None:
     title = wrap(panel.title, letters)
     axes.set_title(
         title, loc="left", fontsize=8.5, weight="bold", linespacing=1.1, pad=17 if note_below else 5
     )
-    axes.annotate(
+    write(
+        axes,
         panel.note,
         (0.0 if note_below else 1.0, 1.0),
         (0.0, 5.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
+        7.5,
         ha="left" if note_below else "right",
         va="bottom",
-        fontsize=7.5,
         color=Ink.MUTED,
     )
 
@@ -305,7 +323,7 @@ def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> 
     axes.plot([x], [middle.median], "o", color=Ink.OURS, markersize=4.2)
 
 
-def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, width: float) -> None:
+def _draw_legend(figure: Figure, panels: list[Panel], left: float, top: float, width: float) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -319,17 +337,7 @@ def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, 
         handles.append(Line2D([], [], color=Ink.OURS, linewidth=1.0, label="quartiles, best of run"))
     if any(panel.published for panel in panels):
         handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="",
-                marker="D",
-                markersize=4.2,
-                color=Ink.PUBLISHED,
-                markerfacecolor=Ink.GROUND,
-                markeredgewidth=1.1,
-                label="the paper’s runs",
-            )
+            mark_key("the paper’s runs", "D", 4.2, Ink.PUBLISHED, markeredgewidth=1.1, hollow=True)
         )
     height = float(figure.get_size_inches()[1])
     figure.legend(
@@ -349,14 +357,14 @@ def _draw_legend(figure: Figure, panels: list[_Panel], left: float, top: float, 
 # words
 
 
-def _caption(tally: Tally, panels: list[_Panel], points: Points) -> str:
+def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
     labels = sorted({label_of(condition) for condition in tally.conditions})
     each = "Best coverage of each generation" if points == "best-of-generation" else "Best coverage so far"
     counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     parts = [
         f"{each}, counted {counted}, by generation (from 0). {' and '.join(labels)}.",
-        _say_runs(panels),
-        f"Blue: the median over the runs{_say_interval(panels)}.",
+        say_runs(panels),
+        f"Blue: the median over the runs{say_interval(panels)}.",
         "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"
         + (", beside the values that the paper prints." if any(panel.published for panel in panels) else "."),
     ]
@@ -366,7 +374,8 @@ def _caption(tally: Tally, panels: list[_Panel], points: Points) -> str:
     return " ".join(parts)
 
 
-def _say_runs(panels: list[_Panel]) -> str:
+def say_runs(panels: list[Panel]) -> str:
+    """Say which lines are runs, and whether some are left out."""
     cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
     if cut:
         drawn = ", ".join(f"{panel.n_drawn} of {len(panel.values)} in {panel.title}" for panel in cut)
@@ -377,7 +386,8 @@ def _say_runs(panels: list[_Panel]) -> str:
     return "Gray: every run; a piece of line that several runs share is stronger."
 
 
-def _say_interval(panels: list[_Panel]) -> str:
+def say_interval(panels: list[Panel]) -> str:
+    """Say whether the medians have intervals."""
     counts = [len(panel.values) for panel in panels]
     if max(counts) < SMALLEST_N:
         return f" (no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %)"

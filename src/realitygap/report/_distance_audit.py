@@ -14,9 +14,8 @@ import polars as pl
 
 from realitygap import _special as special
 from realitygap.errors import RecordError, real_number, whole_number
-from realitygap.evolution import BehaviorDistance, behavior_distance
-from realitygap.evolution._distances import Sort, measure_of, pack_behaviors
-from realitygap.kernels import _distances
+from realitygap.evolution import BehaviorDistance, CellOrder, behavior_distance, measure_of, pack_behaviors
+from realitygap.kernels.neat import distances
 from realitygap.records import ResultsFolder
 from realitygap.report._questions import grid_of
 from realitygap.report._statistics import CONFIDENCE
@@ -106,7 +105,7 @@ class DistanceAudit:
     distance: BehaviorDistance
     columns: int
     rows: int
-    sort: Sort
+    sort: CellOrder
     seed: int
     straight: float
     n_walks: int
@@ -155,7 +154,7 @@ def audit_distance(
     straight: float = STRAIGHT,
     n_walks: int = N_WALKS,
     n_pairs: int = N_PAIRS,
-    sort: Sort = "x-then-y",
+    sort: CellOrder = "x-then-y",
 ) -> DistanceAudit:
     """What a distance of behaviors weighs: each cell, and how many there are.
 
@@ -259,7 +258,7 @@ def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
 
 
 def _leverages(
-    distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: Sort
+    distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: CellOrder
 ) -> Values:
     """(w, c) distance from each walk to itself with each cell changed."""
     found = np.empty((len(walks), columns * rows))
@@ -270,7 +269,7 @@ def _leverages(
     return found
 
 
-def _order(columns: int, rows: int, sort: Sort) -> npt.NDArray[np.int64]:
+def _order(columns: int, rows: int, sort: CellOrder) -> npt.NDArray[np.int64]:
     """(c,) cells as the paper sorts them."""
     numbers = np.arange(columns * rows).reshape(rows, columns)
     return (numbers.T if sort == "x-then-y" else numbers).ravel()
@@ -316,7 +315,7 @@ def _confound(
     behaviors: Sequence[Sequence[int]],
     columns: int,
     rows: int,
-    sort: Sort,
+    sort: CellOrder,
 ) -> Confound:
     """Of behaviors two by two: the first with the second, the third with the fourth, and so on."""
     measure = measure_of(distance.name, columns, rows, sort)
@@ -324,7 +323,7 @@ def _confound(
         measure, [_as_behavior(distance, each, columns) for each in behaviors], columns, rows
     )
     apart = np.empty(len(behaviors) // 2)
-    _distances.distances_in_pairs(measure, packed, apart)
+    distances.distances_in_pairs(measure, packed, apart)
     visited = [set(each) for each in behaviors]
     lengths = np.array([len(each) for each in visited], np.float64)
     difference = np.abs(lengths[0::2] - lengths[1::2])
@@ -370,7 +369,7 @@ def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) ->
 
 
 def _confounds_of(
-    folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: Sort
+    folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: CellOrder
 ) -> list[Confound]:
     """On the trials of each condition of a study."""
     found = []

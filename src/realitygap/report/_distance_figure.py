@@ -13,12 +13,14 @@ from realitygap.report._distance_audit import Confound, DistanceAudit, distance_
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_dots,
     draw_line,
     house_style,
     new_figure,
     place_axes,
     shorten,
     to_svg,
+    write,
 )
 from realitygap.report._formats import captioned, save_drawing
 
@@ -83,24 +85,8 @@ def _draw(audit: DistanceAudit, width: float) -> Figure:
 
 
 def _title(axes: Axes, title: str, text: str = "") -> None:
-    axes.annotate(
-        title,
-        (0, 1),
-        (0, 17),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=9,
-        weight="bold",
-    )
-    axes.annotate(
-        text,
-        (0, 1),
-        (0, 5.5),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=7.5,
-        color=Ink.MUTED,
-    )
+    write(axes, title, (0, 1), (0, 17), 9, weight="bold")
+    write(axes, text, (0, 1), (0, 5.5), 7.5, color=Ink.MUTED)
 
 
 # the map
@@ -154,13 +140,11 @@ def _draw_pairs(axes: Axes, confound: Confound, audit: DistanceAudit, *, wide: b
     axes.set_ylim(0, 1.05 * top)
     # drawn at their whole numbers they would hide each other
     jitter = np.random.default_rng(audit.seed).uniform(-0.35, 0.35, len(differences))
-    draw_line(
+    draw_dots(
         axes,
         (differences + jitter)[:_POINTS],
         distances[:_POINTS],
-        linestyle="none",
-        marker="o",
-        markersize=1.7,
+        1.7,
         markeredgewidth=0,
         color=Ink.RUN,
         alpha=0.55,
@@ -200,24 +184,16 @@ def _draw_correlations(axes: Axes, confounds: list[Confound], names: float, *, w
             (shorten(label, int(names / 0.075)), 0.0, -6, "right"),
             ("none" if math.isnan(found.value) else in_words(found), 1.0, 8, "left"),
         ):
-            axes.annotate(
-                text,
-                (at, row),
-                (x, 0),
-                xycoords=("axes fraction", "data"),
-                textcoords="offset points",
-                ha=side,
-                va="center",
-                fontsize=7.5,
+            write(
+                axes, text, (at, row), (x, 0), 7.5, xycoords=("axes fraction", "data"), ha=side, va="center"
             )
     axes.set_xlabel("Spearman’s correlation of distance with the difference in visited cells", labelpad=2)
-    axes.annotate(
+    write(
+        axes,
         "Distance and length in each condition" if wide else "In each condition",
         (0, 1),
         (-72 * names + 4, 8),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=9,
+        9,
         weight="bold",
     )
 

@@ -13,18 +13,29 @@ import numpy.typing as npt
 from realitygap.drawing import Ink
 from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.playback import Divergence, MovingTrial, in_motion, measure_divergence, own_divergence
-from realitygap.playback._moving import placed, ray_ends
+from realitygap.platforms import known_specs, platform_class, platform_names, split_spec, trace_genome
+from realitygap.playback import (
+    Divergence,
+    MovingTrial,
+    in_motion,
+    measure_divergence,
+    own_divergence,
+    placed,
+    ray_ends,
+)
 from realitygap.records import ResultsFolder, refuse_results
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_dots,
     draw_line,
+    draw_points,
     house_style,
     new_figure,
     place_axes,
     shorten,
     to_svg,
+    write,
 )
 from realitygap.report._driven import refuse_replay
 from realitygap.report._formats import captioned, check_ending, save_drawing
@@ -32,7 +43,7 @@ from realitygap.report._path_figure import arena_extent, draw_arena
 from realitygap.report._tally import Tally, read_tally, settings_of
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.runs import Condition, genome_of
-from realitygap.trials import NoiseKey, trace_genome
+from realitygap.trials import NoiseKey
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,9 +58,6 @@ _GHOSTS = 7
 
 _MOST_TRAILS = 30
 """Repeats whose paths are drawn; more would be a blot."""
-
-PLATFORMS = ("jyro", "sim", "twin")
-"""That a network can be tried on beside its own, with their defaults, such as twin:FILE."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,7 @@ def save_divergence(
         condition: whose network it is; the first one when not given.
         replicate: of which run; the typical one when not given.
         generation: of the run; that of its best trial when not given.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
         repeats: trials on each side, each on fresh noise, 2 to 1000.
 
     Returns:
@@ -99,15 +107,7 @@ def save_divergence(
     path = Path(path)
     check_ending(path, (".pdf", ".png", ".svg"))
     refuse_results(path)
-    which, sides = _compare(
-        results,
-        against=against,
-        condition=condition,
-        replicate=replicate,
-        generation=generation,
-        individual=individual,
-        repeats=repeats,
-    )
+    which, sides = _compare(results, against, repeats, condition, replicate, generation, individual)
     title = " and ".join(side.name for side in sides)
     drawing = draw_divergence(*sides, of=which)
     return save_drawing(captioned(drawing, "divergence"), path, title=title)
@@ -127,35 +127,19 @@ def compare_trials(
 
     Arguments and errors as in `save_divergence`.
     """
-    _, sides = _compare(
-        results,
-        against=against,
-        condition=condition,
-        replicate=replicate,
-        generation=generation,
-        individual=individual,
-        repeats=repeats,
-    )
-    return sides
+    return _compare(results, against, repeats, condition, replicate, generation, individual)[1]
 
 
 def _compare(
-    results: ResultsFolder | str | Path,
-    *,
-    against: str,
-    condition: str | None,
-    replicate: int | None,
-    generation: int | None,
-    individual: int | None,
-    repeats: int,
+    results: ResultsFolder | str | Path, against: str, repeats: int, *which: Any
 ) -> tuple[str, tuple[Side, ...]]:
-    """Which network it is, and its trials on all sides."""
+    """Which network it is, and its trials on all sides; `which` says it as `choose_trial` takes it."""
     whole_number("repeats", repeats, 2, 1000)
     names = [name.strip() for name in against.split(",")]
     if not 1 <= len(names) < len(_COLORS):
         raise ValueError(f"against names {len(names)}, expected one or two, with a comma between.")
     tally = read_tally(results)
-    trial = choose_trial(tally, condition, replicate, generation, individual)
+    trial = choose_trial(tally, *which)
     others = [_beside(tally, trial.condition, name) for name in names]
     for each in (trial.condition, *others):
         if each.is_physical:
@@ -169,12 +153,13 @@ def _compare(
 
 def _called(name: str) -> str:
     """A condition or a platform without the folder of its file."""
-    platform, colon, file = name.partition(":")
-    return f"{platform}:{Path(file).stem}" if colon else name
+    platform, file = split_spec(name)
+    return f"{platform}:{Path(file).stem}" if file else name
 
 
 def _is_platform(name: str) -> bool:
-    return name.partition(":")[0] in PLATFORMS
+    platform = split_spec(name)[0]
+    return platform in platform_names() and platform_class(platform).is_for_studies
 
 
 def _beside(tally: Tally, own: Condition, against: str) -> Condition:
@@ -184,30 +169,26 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
     if _is_platform(against):
         fresh = Condition.model_validate({"name": own.name, "platform": against})
-        changed: dict[str, Any] = {"platform": fresh.platform, "noise": fresh.noise}
-        changed[fresh.platform] = getattr(fresh, fresh.platform)
-        return own.model_copy(update=changed)
+        return own.model_copy(update={"platform": fresh.platform, "noise": fresh.noise, "on": fresh.on})
     raise ValueError(
-        f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *PLATFORMS])}"
+        f"Unknown condition or platform {against!r}. {did_you_mean(against, [*names, *known_specs()])}"
     )
 
 
 def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, repeats: int) -> Side:
-    row, arena = trial.row, trial.condition.arena.arena()
+    row, arena = trial.row, trial.condition.arena.arena().alone
     key = NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"])
     trials = []
     for repeat in range(1, repeats + 1):
         trajectory = trace_genome(
-            on.simulated_on,
+            on.on,
             arena,
             genome,
             noise=on.noise,
             noise_key=replace(key, repeat=repeat),
             inputs=trial.condition.network_inputs,
         )
-        trials.append(
-            in_motion(trajectory, on.arena_of(trajectory), on.simulated_on, title=name, label=on.label)
-        )
+        trials.append(in_motion(trajectory, on.arena_of(trajectory), on.on, title=name, label=on.label))
     return Side(name, tuple(trials))
 
 
@@ -316,34 +297,13 @@ def _draw_side(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     for trial in side.trials[1:_MOST_TRAILS]:
-        draw_line(
-            axes, trial.poses[:, 0], trial.poses[:, 1], color=color, linewidth=0.5, alpha=0.22, zorder=4
-        )
-    draw_line(
-        axes,
-        first.poses[:, 0],
-        first.poses[:, 1],
-        color=color,
-        linewidth=1.7,
-        zorder=6,
-        solid_joinstyle="round",
-    )
+        draw_points(axes, trial.poses, color=color, linewidth=0.5, alpha=0.22, zorder=4)
+    draw_points(axes, first.poses, color=color, linewidth=1.7, zorder=6, solid_joinstyle="round")
     rows = np.unique(np.linspace(0, len(first.poses) - 1, _GHOSTS).round().astype(int))
     for row in rows:
         _draw_robot(axes, first, int(row), color, strong=row == rows[-1])
     ends = np.array([trial.poses[-1, :2] for trial in side.trials])
-    draw_line(
-        axes,
-        ends[1:, 0],
-        ends[1:, 1],
-        marker="o",
-        linestyle="",
-        color=color,
-        markersize=2.2,
-        alpha=0.7,
-        markeredgewidth=0,
-        zorder=7,
-    )
+    draw_dots(axes, ends[1:, 0], ends[1:, 1], 2.2, color=color, alpha=0.7, markeredgewidth=0, zorder=7)
     _write_head(axes, side, color, is_narrow=is_narrow)
 
 
@@ -353,10 +313,9 @@ def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong:
         corners = placed([*outline, outline[0]], moment.pose)
         if strong:
             axes.fill(corners[:, 0], corners[:, 1], color=Ink.GROUND, alpha=0.75, linewidth=0, zorder=7.5)
-        draw_line(
+        draw_points(
             axes,
-            corners[:, 0],
-            corners[:, 1],
+            corners,
             color=color if strong else Ink.BODY,
             linewidth=1.6 if strong else 0.6,
             zorder=8 if strong else 5,
@@ -386,15 +345,14 @@ def _write_head(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
             "normal",
         ),
     ):
-        axes.annotate(
+        write(
+            axes,
             text,
             (x, 1.0),
             (0, 5),
-            xycoords="axes fraction",
-            textcoords="offset points",
+            9.5 if weight == "bold" else 8.0,
             ha=align,
             va="bottom",
-            fontsize=9.5 if weight == "bold" else 8.0,
             weight=weight,
             color=ink,
             annotation_clip=False,

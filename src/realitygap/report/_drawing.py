@@ -11,7 +11,7 @@ import re
 import textwrap
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from realitygap.drawing import FONT, Ink
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 _SVG = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
@@ -94,6 +95,25 @@ class Drawing:
         return self.svg
 
 
+def draw_widths(
+    draw: Callable[[float], Figure], widths: Sequence[float], name: str, caption: str, alt: str
+) -> list[Drawing]:
+    """A figure in several widths.
+
+    Args:
+        draw: makes the figure of a width [in].
+        widths: of the figures [in].
+        name: what the ids in the drawings begin with.
+        caption, alt: as in `Drawing`.
+    """
+    drawings = []
+    with house_style():
+        for index, width in enumerate(widths):
+            figure = draw(width)
+            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
+    return drawings
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Draw with our settings, whatever the user's are; they are back as they were afterwards.
@@ -136,21 +156,60 @@ def draw_line(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, **style: Any) ->
     axes.add_artist(Line2D(xs, ys, **style))
 
 
-def head_axes(axes: Axes, title: str, label: str) -> None:
-    """Above axes: what they show on the left, of what it is on the right."""
-    for x, text, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, label, "right", Ink.MUTED)):
-        axes.annotate(
-            text,
-            (x, 1.0),
-            (0, 6),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            ha=align,
-            va="bottom",
-            fontsize=8.0,
-            weight="bold" if x == 0.0 else "normal",
-            color=color,
-        )
+def draw_points(axes: Axes, points: npt.NDArray[Any], **style: Any) -> None:
+    """A line through points (n, 2 or more), x and y first, as by `draw_line`."""
+    draw_line(axes, points[:, 0], points[:, 1], **style)
+
+
+def mark_key(
+    label: str, marker: str, size: float, color: str, *, hollow: bool = False, **style: Any
+) -> Line2D:
+    """A mark of a size [points] for a legend; a hollow one has the color of the ground inside."""
+    from matplotlib.lines import Line2D
+
+    fixed: dict[str, Any] = {
+        "linestyle": "",
+        "marker": marker,
+        "markersize": size,
+        "color": color,
+        "label": label,
+    }
+    inside = {"markerfacecolor": Ink.GROUND} if hollow else {}
+    return Line2D([], [], **{**fixed, **inside, **style})
+
+
+def draw_dots(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, size: float, **style: Any) -> None:
+    """Round marks of a size [points], as by `draw_line`."""
+    draw_line(axes, xs, ys, **{"marker": "o", "linestyle": "", "markersize": size, **style})
+
+
+def write(
+    axes: Axes,
+    text: str,
+    place: tuple[float, float],
+    shift: tuple[float, float],
+    size: float,
+    *,
+    xycoords: Any = "axes fraction",
+    **style: Any,
+) -> None:
+    """Text of a size [points], moved by `shift` [points] from a place in the axes."""
+    axes.annotate(text, place, shift, xycoords=xycoords, textcoords="offset points", fontsize=size, **style)
+
+
+def head_axes(
+    axes: Axes,
+    title: str,
+    label: str,
+    *,
+    y: float = 1.0,
+    shift: tuple[float, float] = (0.0, 6.0),
+    **style: Any,
+) -> None:
+    """Above axes, or below them with y = 0: what they show on the left, of what it is on the right."""
+    (x, up), va = shift, "bottom" if y else "top"
+    write(axes, title, (0.0, y), (x, up), 8.0, va=va, weight="bold", **style)
+    write(axes, label, (1.0, y), (-x, up), 8.0, ha="right", va=va, color=Ink.MUTED, **style)
 
 
 def shorten(text: str, n_letters: int) -> str:

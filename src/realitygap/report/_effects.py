@@ -6,15 +6,14 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
-from realitygap.kernels._resampling import count_drawn
+from realitygap.kernels.math.resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
-from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._statistics import CONFIDENCE, Interval
 
 Values = npt.NDArray[np.float64]
 Statistic = Callable[[Values, Values, Values], Values]
@@ -35,21 +34,6 @@ NORMAL_MEAN_DISTANCE = math.sqrt(2 / math.pi)
 
 MOST_RUNS = 1_000_000
 _BLOCK = 4_000_000
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Bounds of an effect.
-
-    Attributes:
-        low: lower bound, in the unit of the effect.
-        high: upper bound.
-        method: `BCa`, a bootstrap; `Newcombe` and `t`, by formula.
-    """
-
-    low: float
-    high: float
-    method: Literal["BCa", "Newcombe", "t"]
 
 
 def a12(one: Values, other: Values) -> float:

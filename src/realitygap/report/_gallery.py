@@ -7,12 +7,15 @@ from typing import Any
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
-from realitygap.report import _arena_figure, _lineage_figure, _networks_figure
+from realitygap.report import _networks_figure
+from realitygap.report._arena_figure import draw_tally_arena
 from realitygap.report._drawing import Drawing
 from realitygap.report._individuals_figure import draw_tally_better, draw_tally_individuals
+from realitygap.report._lineage_figure import draw_chosen_lineage
 from realitygap.report._species_figure import count_species, draw_tally_species
 from realitygap.report._structures import Structures
 from realitygap.report._tally import Tally, settings_of
+from realitygap.report._trial_figure import choose_trial
 
 
 def content(
@@ -26,42 +29,48 @@ def content(
         on_page: makes of anchor, title and drawings what the template shows.
     """
 
-    def placed(anchor: str, title: str, drawn: list[Drawing] | str) -> Any:
-        return drawn if isinstance(drawn, str) else on_page(anchor, title, drawn)
+    def placed(number: str, drawn: list[Drawing] | str) -> Any:
+        return drawn if isinstance(drawn, str) else on_page(f"figure-{number}", f"Figure {number}", drawn)
+
+    def draw(number: str, condition: str, figure: Callable[..., list[Drawing]]) -> Any:
+        try:
+            return placed(number, figure(tally, condition, widths=widths, name=f"figure-{number}"))
+        except RecordVersionError:
+            return (
+                f"Figure {number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
+                f"{condition}. Use the version that ran the study."
+            )
 
     networks, structures = _networks_figure.content(tally, widths)
     found: dict[str, Any] = {
-        "arena": placed("figure-2", "Figure 2", _arena_figure.content(tally, widths)),
-        "individuals": [],
-        "networks": placed("figure-7", "Figure 7", networks),
+        "arena": draw("2", tally.runs["condition"][0], draw_tally_arena),
+        "networks": placed("7", networks),
         "structures": [_listed(group, tally) for group in structures],
         "structure_groups": structures,
     }
     objective, novelty = _first(tally, "coverage"), _first(tally, "novelty", noise=0.5)
-    for number, condition, draw in (
-        ("5", _first(tally, "coverage", driven=True), draw_tally_individuals),
-        ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_tally_individuals),
-        ("9", novelty, draw_tally_better),
-    ):
-        if condition is not None:
-            try:
-                drawn: list[Drawing] | str = draw(tally, condition, widths=widths, name=f"figure-{number}")
-            except RecordVersionError:
-                drawn = (
-                    f"Figure {number} is missing: this realitygap ({__version__}) cannot read the settings of "
-                    f"condition {condition}. Use the version that ran the study."
-                )
-            found["individuals"].append(placed(f"figure-{number}", f"Figure {number}", drawn))
+    found["individuals"] = [
+        draw(number, condition, figure)
+        for number, condition, figure in (
+            ("5", _first(tally, "coverage", driven=True), draw_tally_individuals),
+            ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_tally_individuals),
+            ("9", novelty, draw_tally_better),
+        )
+        if condition is not None
+    ]
     species = count_species(tally)
     condition = objective or str(tally.runs["condition"][0])
     found["species"] = placed(
-        "figure-11",
-        "Figure 11",
-        draw_tally_species(tally, species, condition, widths=widths, name="figure-11"),
+        "11", draw_tally_species(tally, species, condition, widths=widths, name="figure-11")
     )
     found["species_counts"] = species
-    found["lineage"] = placed("figure-12", "Figure 12", _lineage_figure.content(tally, condition, widths))
+    found["lineage"] = draw("12", condition, _draw_lineage)
     return found
+
+
+def _draw_lineage(tally: Tally, condition: str, **how: Any) -> list[Drawing]:
+    """The lineage of the champion of a condition's typical run."""
+    return draw_chosen_lineage(tally, choose_trial(tally, condition), **how)
 
 
 def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: bool = False) -> str | None:

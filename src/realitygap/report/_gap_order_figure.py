@@ -13,8 +13,10 @@ from realitygap.gap import GapSide
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_dots,
     draw_line,
     house_style,
+    mark_key,
     new_figure,
     place_axes,
     shorten,
@@ -33,20 +35,20 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     """Mean quality of each controller on both sides, with intervals, beside the line of no gap."""
     source, target = gap.source, gap.target
     size = min(width - 0.75, _MOST_ACROSS)
-    order = _order_in_words(gap)
+    order, score = _order_in_words(gap), gap.result.score
     caption = (
-        f"Mean coverage of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
+        f"Mean {score} of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
         f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. "
         f"On the line there is no gap. {order}"
     )
-    alt = f"Scatter of {source.n} controllers: coverage on {source.name} against coverage on {target.name}. {order}"
+    alt = f"Scatter of {source.n} controllers: {score} on {source.name} against {score} on {target.name}. {order}"
     with house_style():
         figure = new_figure(width, size + 0.6)
         axes = place_axes(figure, 0.55, 0.1, size, size)
-        top = _top(source, target)
-        axes.set_xlim(0, top)
-        axes.set_ylim(0, top)
-        draw_line(axes, [0, top], [0, top], color=Ink.RULE, linewidth=1.0, zorder=1)
+        ends = _ends(source, target, *gap.task.score_range)
+        axes.set_xlim(*ends)
+        axes.set_ylim(*ends)
+        draw_line(axes, ends, ends, color=Ink.RULE, linewidth=1.0, zorder=1)
         kinds: list[str] = [each.kind for each in gap.controllers]
         across, up = _reaches(source), _reaches(target)
         for kind, color, marker in (("random", Ink.PUBLISHED, "s"), ("champion", Ink.OURS, "o")):
@@ -55,8 +57,8 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
                 _draw_pairs(
                     axes, source.means[rows], target.means[rows], across[rows], up[rows], color, marker
                 )
-        axes.set_xlabel(f"coverage on {shorten(source.name, 24)} ({source.label})", labelpad=3)
-        axes.set_ylabel(f"coverage on {shorten(target.name, 24)} ({target.label})", labelpad=3)
+        axes.set_xlabel(f"{score} on {shorten(source.name, 24)} ({source.label})", labelpad=3)
+        axes.set_ylabel(f"{score} on {shorten(target.name, 24)} ({target.label})", labelpad=3)
         _legend(axes, kinds)
         return Drawing(to_svg(figure, "gap-pairs", alt), caption, alt, figure)
 
@@ -73,19 +75,10 @@ def _draw_pairs(axes: Axes, x: Any, y: Any, across: Any, up: Any, color: str, ma
 
 
 def _legend(axes: Axes, kinds: list[str]) -> None:
-    from matplotlib.lines import Line2D
 
     shown = (("random", Ink.PUBLISHED, "s", "unrelated"), ("champion", Ink.OURS, "o", "champions"))
     handles = [
-        Line2D(
-            [],
-            [],
-            color=color,
-            marker=marker,
-            linestyle="",
-            markersize=4.2,
-            label=f"{name}, n = {kinds.count(kind)}",
-        )
+        mark_key(f"{name}, n = {kinds.count(kind)}", marker, 4.2, color)
         for kind, color, marker, name in shown
         if kind in kinds
     ]
@@ -107,15 +100,16 @@ def _order_in_words(gap: GapStudy) -> str:
 def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     """The difference of means of each controller in order, with intervals, the level, and the margin."""
     source, target, level = gap.source, gap.target, gap.result.level
+    score = gap.result.score
     differences = target.means - source.means
     reach = np.hypot(_reaches(source), _reaches(target))
     order = np.argsort(differences)
     margin = gap.result.equivalence.more.get("margin")
     band = f" The gray band is the margin of equivalence, ±{margin:g}." if margin else ""
     caption = (
-        f"Coverage on {target.name} ({target.label}) less coverage on {source.name} ({source.label}) of each of "
-        f"{source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals of 95 % for "
-        f"each by itself. Blue: the level, {level}.{band}"
+        f"{score[0].upper()}{score[1:]} on {target.name} ({target.label}) less that on {source.name} ({source.label}) "
+        f"of each of {source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals "
+        f"of 95 % for each by itself. Blue: the level, {level}.{band}"
     )
     span = f"{differences.min():.2f} to {differences.max():.2f}"
     alt = f"Differences of {source.n} controllers from {span}; mean {level}."
@@ -135,12 +129,10 @@ def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
         for place, k in enumerate(order):
             ends = [differences[k] - reach[k], differences[k] + reach[k]]
             draw_line(axes, [place, place], ends, color=Ink.RUN, linewidth=0.8)
-        draw_line(
-            axes, np.arange(n), differences[order], color=Ink.TEXT, marker="o", linestyle="", markersize=3.4
-        )
+        draw_dots(axes, np.arange(n), differences[order], 3.4, color=Ink.TEXT)
         axes.set_xticks([])
         axes.set_xlabel("controllers in order", labelpad=3)
-        axes.set_ylabel("difference in coverage", labelpad=3)
+        axes.set_ylabel(f"difference in {score}", labelpad=3)
         return Drawing(to_svg(figure, "gap-differences", alt), caption, alt, figure)
 
 
@@ -151,6 +143,12 @@ def _reaches(side: GapSide) -> Any:
     return float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)
 
 
-def _top(source: GapSide, target: GapSide) -> float:
-    most = max(float((side.means + _reaches(side)).max()) for side in (source, target))
-    return min(1.0, math.ceil(most * 10 + 0.2) / 10)
+def _ends(source: GapSide, target: GapSide, low: float, high: float) -> tuple[float, float]:
+    """The ends of both axes: at tenths of the scale beyond the intervals, and within the score's range."""
+    sides = [(side.means - _reaches(side), side.means + _reaches(side)) for side in (source, target)]
+    least, most = min(float(each.min()) for each, _ in sides), max(float(each.max()) for _, each in sides)
+    least = min(least, low if math.isfinite(low) else 0.0)
+    tenth = 0.1 if high <= 1 else max(most - least, 1e-9) / 10
+    return max(math.floor(least / tenth + 1e-9) * tenth, low), min(
+        math.ceil(most / tenth + 0.2) * tenth, high
+    )

@@ -9,7 +9,7 @@ from typing import Any
 
 from realitygap._version import __version__
 from realitygap.errors import RecordError
-from realitygap.gap import Estimate, GapResult
+from realitygap.gap import SHOWN, Estimate, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
 from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
 from realitygap.report._gap_maps_figure import draw_gap_maps
@@ -19,19 +19,6 @@ from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._page import LABELS, FigureOnPage
 from realitygap.study import GapBetween
 
-_MEASURES = (
-    ("rms", "RMS gap", "root mean square over controllers of the difference in coverage, noise taken out"),
-    ("level", "Level", "mean difference in coverage, target less simulator"),
-    ("a12", "A₁₂", "how likely a trial on the target is above one of the same controller in simulation"),
-    ("srcc", "Correlation", "Spearman’s, of mean coverages over controllers"),
-    ("noise_ceiling", "Noise ceiling", "the correlation that noise leaves of a perfect one, by split halves"),
-    ("srcc_disattenuated", "Without noise", "the correlation over its ceiling, at most 1"),
-    ("mmrv", "MMRV", "mean maximum rank violation, in the target’s coverage"),
-    ("mmrv_floor", "MMRV floor", "that of one half of the target’s trials by the other half"),
-    ("energy", "Energy distance, cells", "of visited cells, mean over controllers [√cells]"),
-    ("energy_ends", "Energy distance, ends", "of the places where trials end, mean over controllers [m]"),
-    ("equivalence", "Equivalence", "the level with the 90 % interval of two one-sided tests"),
-)
 _APART = (
     (
         "reevolved",
@@ -40,6 +27,14 @@ _APART = (
     ),
     ("luck", "Luck of selection", "what champions lose on fresh seeds where they were selected"),
 )
+
+
+_OBSERVED = {
+    "readings": "the robot’s readings",
+    "cells": "crossed cells",
+    "encoders": "cells and encoders",
+    "track": "all poses",
+}
 
 
 def refuse_gap_page(path: str | Path) -> None:
@@ -99,8 +94,9 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         "title": f"The gap from {result.source} to {result.target}",
         "labels": [(label, LABELS[label]) for label in labels],
         "verdict": result.verdict,
+        "score": result.score,
         "facts": _facts(gap),
-        "measures": [_row(result, *each) for each in _MEASURES],
+        "measures": [_row(result, each.name, each.title, each.meaning) for each in SHOWN],
         "apart": [_row(result, *each) for each in _APART],
         "advice": None if why is None else why.advice,
         "figures": [
@@ -147,9 +143,10 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
             f"{len(kinds)}: {kinds.count('random')} unrelated networks and {kinds.count('champion')} champions",
         ),
         ("Arena", study.arena.name),
+        ("Score", result.score),
         (
             "Observed",
-            {"cells": "crossed cells", "encoders": "cells and encoders"}.get(study.observe, "all poses"),
+            _OBSERVED[study.observe],
         ),
     ]
     if result.misspecified is not None:
@@ -163,7 +160,7 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, An
     p = found.more.get("p")
     return {
         "title": title,
-        "meaning": meaning,
+        "meaning": meaning.format(score=result.score),
         "estimate": "–" if found.estimate is None else f"{found.estimate:.3f}",
         "interval": "–" if found.low is None else f"{found.low:.3f} to {found.high:.3f}",
         "n": found.n,

@@ -1,4 +1,4 @@
-"""One individual of a study as a file for other programs: JSON, ONNX or GraphML."""
+"""One individual of a study as a file for other programs: JSON, ONNX, GraphML or C."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any, Literal
 
 from realitygap._version import __version__
 from realitygap.errors import did_you_mean, from_extra
-from realitygap.evolution import Genome, to_networkx, to_onnx
-from realitygap.evolution._json import interface_to_dict, to_text
+from realitygap.evolution import Genome, interface_to_dict, to_c, to_networkx, to_onnx, to_text
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results, write_whole
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.runs import genome_of
 
-Format = Literal["json", "onnx", "graphml"]
+Format = Literal["json", "onnx", "graphml", "c"]
 
 
 def export_individual(
@@ -35,6 +34,7 @@ def export_individual(
     * json: the genome with a version; `Genome.load` reads it.
     * onnx: the network, as `to_onnx` makes it, in double precision.
     * graphml: the genome as a graph, as `to_networkx` makes it.
+    * c: the network as a header of C99, as `to_c` makes it, in double precision; files end in .c or .h.
 
     Each has the names of inputs and outputs, and says which individual it is.
 
@@ -45,13 +45,13 @@ def export_individual(
         condition: of which; the first one when not given.
         replicate: which run; the typical one when not given.
         generation: of the run; the last one when not given.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
 
     Returns:
         The path of the file.
 
     Raises:
-        MissingExtraError: the extra `export` is not installed; JSON needs none.
+        MissingExtraError: the extra `export` is not installed; JSON and C need none.
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, its settings are another
             version's, or the file is one of a study's own or cannot be written.
         TypeError: the number of a run, generation or individual is not a whole number.
@@ -78,13 +78,13 @@ def export_individual(
 
 
 def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]:
-    writers = {"json": _json, "onnx": _onnx, "graphml": _graphml}
+    writers = {"json": _json, "onnx": _onnx, "graphml": _graphml, "c": _c, "h": _c}
     word = out.suffix.lower().removeprefix(".") if format is None else format
     if word not in writers:
         what = f"{out} ends in {out.suffix or 'nothing'}" if format is None else f"Unknown format {format!r}"
         near = did_you_mean(word, writers)
         raise ValueError(
-            f"{what}, expected json, onnx or graphml.{f' {near}' if near.startswith('Did') else ''}"
+            f"{what}, expected json, onnx, graphml or c.{f' {near}' if near.startswith('Did') else ''}"
         )
     return writers[word]
 
@@ -107,6 +107,12 @@ def _onnx(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
         model.metadata_props.add(key=key, value=str(value))
     data: bytes = model.SerializeToString()
     return data
+
+
+def _c(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+    inputs, outputs = _names(chosen)
+    network = genome.network()
+    return to_c(network, inputs[: network.n_inputs], outputs, origin=origin).encode("ascii")
 
 
 def _graphml(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:

@@ -17,12 +17,14 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_dots,
     draw_line,
-    house_style,
+    draw_widths,
+    head_axes,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
+    write,
 )
 from realitygap.report._path_figure import (
     TracedPath,
@@ -121,38 +123,10 @@ def draw_tally_individuals(
         )
         + "."
     )
-    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw_generations(panels, arena, body, label, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
-
-
-def draw_better_individuals(
-    folder: ResultsFolder | str | Path,
-    condition: str | None = None,
-    replicate: int | None = None,
-    *,
-    width: float = WIDE,
-) -> Drawing:
-    """The individuals of highest coverage of one run, as the paper's Figure 9.
-
-    Args:
-        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
-        condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, as in `draw_paths`.
-        width: of the figure [in].
-
-    Raises:
-        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
-        ValueError: there is no such condition or run.
-    """
-    tally = read_tally(folder)
-    name = tally.name_of(condition)
-    (drawing,) = draw_tally_better(tally, name, replicate, widths=[width])
-    return drawing
+    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
+    return draw_widths(
+        lambda width: _draw_generations(panels, arena, body, label, width), widths, name, caption, alt
+    )
 
 
 def draw_tally_better(
@@ -163,7 +137,14 @@ def draw_tally_better(
     widths: Sequence[float] = (WIDE,),
     name: str = "better",
 ) -> list[Drawing]:
-    """As `draw_better_individuals`, of what was read already, in several widths.
+    """The individuals of highest coverage of one run, as the paper's Figure 9, in several widths.
+
+    Args:
+        tally: the study. The trials that are shown are recomputed.
+        condition: of which.
+        replicate: which run; when not given the typical one, as in `draw_paths`.
+        widths: of the figures [in].
+        name: what the ids begin with.
 
     Raises:
         ValueError: there is no such condition or run.
@@ -194,27 +175,24 @@ def draw_tally_better(
             f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
         )
     )
-    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure, places = _panels(len(paths) + 1, arena, width)
-            for path, axes in zip(paths, places, strict=False):
-                draw_arena(axes, arena, *arena_extent(arena))
-                draw_path(axes, path, arena, body)
-                short = width < 6
-                _write_below(
-                    axes,
-                    f"gen {path.generation}, ind {path.individual}"
-                    if short
-                    else f"generation {path.generation}, individual {path.individual}",
-                    f"{path.coverage:.3f}"
-                    if short
-                    else f"{shorten(label, 12)}, coverage {path.coverage:.3f}",
-                )
-            draw_path_legend(places[-1], paths, small=width < 6)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt + "."), caption, alt + ".", figure))
-    return drawings
+    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
+
+    def draw(width: float) -> Figure:
+        figure, places = _panels(len(paths) + 1, arena, width)
+        short = width < 6
+        for path, axes in zip(paths, places, strict=False):
+            draw_arena(axes, arena, *arena_extent(arena))
+            draw_path(axes, path, arena, body)
+            if short:
+                left, right = f"gen {path.generation}, ind {path.individual}", f"{path.coverage:.3f}"
+            else:
+                left = f"generation {path.generation}, individual {path.individual}"
+                right = f"{shorten(label, 12)}, coverage {path.coverage:.3f}"
+            head_axes(axes, left, right, y=0.0, shift=(1.0, -4.0))
+        draw_path_legend(places[-1], paths, small=short)
+        return figure
+
+    return draw_widths(draw, widths, name, caption, alt + ".")
 
 
 def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:
@@ -254,12 +232,14 @@ def _draw_generations(
         draw_arena(axes, arena, *arena_extent(arena))
         _draw_pens(axes, panel, arena, body, small=small)
         best = max(panel, key=lambda path: path.coverage)
-        _write_below(
+        head_axes(
             axes,
             f"generation {best.generation}",
             f"best {best.coverage:.3f}"
             if small
             else f"{shorten(label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}",
+            y=0.0,
+            shift=(1.0, -4.0),
         )
     n_pens = max((path.individual for panel in panels for path in panel), default=0) + 1
     _draw_pen_legend(places[-1], n_pens, small=small)
@@ -270,11 +250,9 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
     draw_visited(axes, sorted({cell for path in paths for cell in path.cells}), arena, body)
     drawn = [path for path in paths if path.poses is not None]
     for path in paths:
-        if path.poses is not None:
-            draw_line(
-                axes, path.poses[:, 0], path.poses[:, 1], zorder=5, **_pen(path.individual, small=small)
-            )
-        else:
+        for poses, _ in path.tracks:
+            draw_line(axes, poses[:, 0], poses[:, 1], zorder=5, **_pen(path.individual, small=small))
+        if path.poses is None:
             _dot_cells(axes, path, arena, small=small)
     if drawn:
         _number_ends(axes, drawn, arena, small=small)
@@ -319,29 +297,26 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
         color = PENS[path.individual % len(PENS)][0]
         if math.dist(end, place) * points > radius:
             draw_line(axes, [end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
-            draw_line(
-                axes, [end[0]], [end[1]], marker="o", linestyle="", color=color, markersize=2.0, zorder=8
-            )
-        draw_line(
+            draw_dots(axes, [end[0]], [end[1]], 2.0, color=color, zorder=8)
+        draw_dots(
             axes,
             [place[0]],
             [place[1]],
-            marker="o",
-            linestyle="",
+            2 * radius - 0.8,
             color=color,
             markerfacecolor=Ink.GROUND,
-            markersize=2 * radius - 0.8,
             markeredgewidth=0.9,
             zorder=9,
         )
-        axes.annotate(
+        write(
+            axes,
             str(path.individual),
             place,
             (0, -0.15),
-            textcoords="offset points",
+            5.6 if small else 6.8,
+            xycoords="data",
             ha="center",
             va="center_baseline",
-            fontsize=5.6 if small else 6.8,
             weight="bold",
             color=color,
             zorder=10,
@@ -362,25 +337,6 @@ def _moved_apart(ends: npt.NDArray[np.float64], least: float) -> npt.NDArray[np.
             break
         places += (push[..., None] * apart).sum(axis=1) * 0.6
     return places
-
-
-def _write_below(axes: Axes, left: str, right: str) -> None:
-    for x, text, align, weight, color in (
-        (0, left, "left", "bold", Ink.TEXT),
-        (1, right, "right", "normal", Ink.MUTED),
-    ):
-        axes.annotate(
-            text,
-            (x, 0),
-            (1 - 2 * x, -4),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            ha=align,
-            va="top",
-            fontsize=8.0,
-            weight=weight,
-            color=color,
-        )
 
 
 def _draw_pen_legend(axes: Axes, n_pens: int, *, small: bool) -> None:

@@ -12,19 +12,16 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._version import __version__
 from realitygap.drawing import Ink
-from realitygap.errors import RecordVersionError
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_widths,
     head_axes,
-    house_style,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
 )
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
@@ -87,7 +84,7 @@ def draw_lineage(
         condition: of which; the first one when not given.
         replicate: which run; the typical one when not given.
         generation: of the run; that of its best trial, the champion, when not given.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
         width: of the figure [in].
 
     Raises:
@@ -130,12 +127,7 @@ def draw_chosen_lineage(
         f"Lineage of {trial.title}, coverage {champion.coverage:.3f}, with {len(ancestors) - 1} ancestors. "
         f"New structure: {'; '.join(brought) or 'none'}."
     )
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(trial, rows, ancestors, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    return draw_widths(lambda width: _draw(trial, rows, ancestors, width), widths, name, caption, alt)
 
 
 # who they are
@@ -382,16 +374,3 @@ def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors
     axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel("coverage")
-
-
-def content(
-    tally: Tally, condition: str, widths: Sequence[float], *, name: str = "figure-12"
-) -> list[Drawing] | str:
-    """The lineage of the champion of a condition's typical run in these widths, or why it is missing."""
-    try:
-        return draw_chosen_lineage(tally, choose_trial(tally, condition), widths=widths, name=name)
-    except RecordVersionError:
-        return (
-            f"Figure 12 is missing: this realitygap ({__version__}) cannot read the settings of condition {condition}. "
-            "Use the version that ran the study."
-        )

@@ -61,9 +61,9 @@ def write_movie(
         each: show several trials: each individual of a generation (the first eight), the best one of each generation,
             or of each condition. Not given: one trial of each results.
         condition: of which; the first one when not given.
-        replicate: which run; the typical one when not given, whose best coverage is the median.
+        replicate: which run; the typical one when not given, whose best trial is the median.
         generation: of the run; that of its best trial when not given.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
         speed: 1 is as fast as it was; 2 is twice as fast.
         title: in the head; which trials they are when not given.
         width: of the pictures [px].
@@ -115,10 +115,11 @@ def choose_moving(
     chosen = [(tally, choose_trial(tally, *numbers)) for tally in tallies]
     if len(chosen) == 1:
         (one,) = chosen
-        return one[1].title, [_moving(*one, one[1].title)]
+        return one[1].title, _moving(*one, one[1].title)
     return f"{len(chosen)} studies", [
-        _moving(tally, trial, str(tally.description.get("name", tally.folder.path.name)))
+        robot
         for tally, trial in chosen
+        for robot in _moving(tally, trial, str(tally.description.get("name", tally.folder.path.name)))
     ]
 
 
@@ -139,8 +140,8 @@ def _several(
         trials = [choose_trial(tally, name, replicate) for name in names]
         study = str(tally.description.get("name", "study"))
         return f"{study}: the best of each condition", [
-            _moving(tally, trial, trial.row["condition"]) for trial in trials
-        ]
+            robot for trial in trials for robot in _moving(tally, trial, trial.row["condition"])
+        ][:_MOST]
     name = tally.name_of(condition)
     tally.condition(name)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
@@ -158,21 +159,27 @@ def _several(
         shown = np.unique(np.linspace(0, last, min(last + 1, _MOST)).round().astype(int)).tolist()
         trials = [choose_trial(tally, name, replicate, k) for k in shown]
         title = f"{name}, run {replicate}: the best of each generation"
-    return title, [_moving(tally, trial, f"{each} {trial.row[each]}") for trial in trials]
+    return title, [robot for trial in trials for robot in _moving(tally, trial, f"{each} {trial.row[each]}")][
+        :_MOST
+    ]
 
 
-def _moving(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
+def _moving(tally: Tally, trial: ChosenTrial, title: str) -> list[MovingTrial]:
+    """All robots of a trial; of more robots than pens, those that have one."""
     if trial.condition.is_physical:
-        return _driven(tally, trial, title)
+        return [_driven(tally, trial, title)]
     condition = trial.condition
     trajectory = replay(condition, trial.row)
-    return in_motion(
-        trajectory,
-        condition.arena_of(trajectory),
-        condition.simulated_on,
-        title=title,
-        label=condition.label,
-    )
+    return [
+        in_motion(
+            robot,
+            condition.arena_of(trajectory),
+            condition.on,
+            title=f"{title}, robot {k}" if trajectory.others else title,
+            label=condition.label,
+        )
+        for k, robot in enumerate(trajectory.robots[:_MOST])
+    ]
 
 
 def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
@@ -187,7 +194,7 @@ def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     if poses is None:
         raise refuse_replay(name)
     steps = _steps_of(tally, name, replicate, which)
-    robot = trial.condition.scribbler
+    robot = trial.condition.on
     shape, arena = RobotShape.of(robot), trial.condition.arena.arena()
     n_rows = len(poses)
     rays = np.full((n_rows, len(shape.mounts)), np.nan)
@@ -198,7 +205,7 @@ def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
             rays[rows] = (1.0 - np.array(step.readings)) * shape.reach
         stalled[rows] = step.stalled
     times = [step.time for step in steps]
-    step_s = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else robot.wait_s
+    step_s = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else robot.command_s
     return MovingTrial.of_rows(
         title, trial.label, arena, shape, step_s, poses, rays, stalled, parts=PATH_PARTS
     )

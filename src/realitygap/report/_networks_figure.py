@@ -9,13 +9,15 @@ from typing import Any
 import polars as pl
 
 from realitygap._version import __version__
-from realitygap.drawing import Ink, Picture
+from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_widths,
+    head_axes,
     house_style,
     new_figure,
     place_axes,
@@ -79,12 +81,7 @@ def draw_tally_networks(
         pictures.append((f"structure {letter}", share, _picture(tally, _row_of(tally, structure.example))))
     caption = _caption(tally, condition, group)
     alt = "Networks. " + " ".join(f"{title}: {picture.description}" for title, _, picture in pictures)
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(pictures, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    return draw_widths(lambda width: _draw(pictures, width), widths, name, caption, alt)
 
 
 def draw_network(
@@ -121,7 +118,7 @@ def _first_objective(tally: Tally) -> str:
 def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, Any]:
     rows = tally.folder.read(condition, [replicate])
     last = rows.filter(pl.col("generation") == rows["generation"].max())
-    return last.row(int(last[f"coverage_{tally.measure}"].arg_max() or 0), named=True)
+    return last.row(int(last[tally.score_column(condition)].arg_max() or 0), named=True)
 
 
 def _row_of(tally: Tally, individual: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -170,19 +167,7 @@ def _draw(pictures: list[tuple[str, str, Picture]], width: float) -> Any:
         row, column = divmod(index, n_columns)
         axes = place_axes(figure, column * (across + gap), row * (up + text_height) + 0.26, across, up)
         draw_picture(axes, shown, scale=1.08 if n_columns == 2 else 0.95)
-        for x, words, align, color in ((0.0, title, "left", Ink.TEXT), (1.0, text, "right", Ink.MUTED)):
-            axes.annotate(
-                words,
-                (x, 1.0),
-                (1 - 2 * x, 4),
-                xycoords="axes fraction",
-                textcoords="offset points",
-                ha=align,
-                va="bottom",
-                fontsize=8.0,
-                weight="bold" if x == 0.0 else "normal",
-                color=color,
-            )
+        head_axes(axes, title, text, shift=(1.0, 4.0))
     return figure
 
 

@@ -17,6 +17,7 @@ import polars as pl
 
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError, RecordError, RecordVersionError
+from realitygap.platforms import described_platform, is_physical
 from realitygap.records import (
     RecordWarning,
     ResultsFolder,
@@ -37,11 +38,13 @@ from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._replay import content as replay_content
+from realitygap.report._score_figure import draw_scores_in
 from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize_tally
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._task_summary import summarize_tasks
 from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
@@ -53,13 +56,6 @@ LABELS = {
     "REAL": "driven on the physical robot",
 }
 """What the labels of figures say."""
-
-_PLATFORMS = {
-    "jyro": "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors",
-    "sim": "a robot simulated with its outline, contact, motors and sensors, as its file and the settings have them",
-    "twin": "pseudo-reality: a robot of real wheels, motors and sensors in MuJoCo, as its file has them",
-    "scribbler": "the paper’s robot, driven over its own protocol",
-}
 
 _MOST_GAPS = 12
 """Conditions whose missing runs are listed; of more it is said how many."""
@@ -149,6 +145,7 @@ def _render(content: Mapping[str, Any]) -> str:
     )
     environment.filters["share"] = _share
     environment.filters["count"] = _count
+    environment.filters["score"] = _score
     return environment.get_template("report.html.jinja").render(content)
 
 
@@ -187,6 +184,8 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "interval_notes": _interval_notes(summary),
         "confidence": f"{100 * CONFIDENCE:.0f} %",
         "coverage": _coverage_figure(tally),
+        "tasks": summarize_tasks(tally.folder).to_dicts(),
+        "scores": _score_figures(tally),
         "paths": _path_figures(tally),
         "choices": _choices_figure(tally),
         "gallery": _gallery.content(
@@ -212,6 +211,16 @@ def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> FigureO
 
 def _coverage_figure(tally: Tally) -> FigureOnPage:
     return _on_page("figure-4", "Figure 4", *draw_tally_coverage(tally, widths=(WIDE, NARROW)))
+
+
+def _score_figures(tally: Tally) -> list[FigureOnPage]:
+    """A figure for each score of another task than coverage."""
+    drawn = draw_scores_in(tally.folder, (WIDE, NARROW))
+    numbers = ["Figure S"] if len(drawn) == 1 else [f"Figure S{k + 1}" for k in range(len(drawn))]
+    return [
+        _on_page(f"figure-scores-{k}", number, *pair)
+        for k, (number, pair) in enumerate(zip(numbers, drawn, strict=True))
+    ]
 
 
 def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
@@ -261,6 +270,13 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
     if tally.driven:
         said = " ".join(describe_driven(name, driven) for name, driven in tally.driven.items())
         banners.append(("Trials on a robot", said))
+    if tally.uncounted:
+        banners.append(
+            (
+                "Conditions that are left out",
+                f"Nobody counted the cells of {', '.join(tally.uncounted)}, whose task does not need them.",
+            )
+        )
     missing = _missing_runs(tally)
     if missing:
         expected = len(tally.conditions) * _expected_replicates(tally)
@@ -319,7 +335,7 @@ def _facts(tally: Tally) -> list[tuple[str, str]]:
     facts.append(
         (
             "Platform",
-            "; ".join(f"{each}: {_PLATFORMS[each]}" if each in _PLATFORMS else each for each in platforms),
+            "; ".join(map(described_platform, platforms)),
         )
     )
     facts += [(f"Assumed of {names}", text) for names, text in sim_assumptions(tally.conditions)]
@@ -340,7 +356,8 @@ def _robot_steps(tally: Tally) -> int | None:
         steps = platform.get("steps") if isinstance(platform, Mapping) else None
         if not isinstance(steps, int):
             return None
-        total += steps * tally.n_trials(condition["name"])
+        robots = settings.get("arena", {}).get("robots", 1)
+        total += steps * robots * tally.n_trials(condition["name"])
     return total
 
 
@@ -379,12 +396,14 @@ def _command(tally: Tally) -> dict[str, Any]:
     name = str(description.get("name") or "")
     built_in = _is_built_in(description)
     study = name if built_in else "STUDY.toml"
+    seed, replicates = description.get("seed", 1), _expected_replicates(tally)
+    command, function, port = "realitygap run", "run_study", ""
+    if all(is_physical(settings_of(condition)) for condition in description["conditions"]):
+        command, function, port = "realitygap drive", "drive_study", "PORT"
     return {
         "built_in": built_in,
-        "run": f"realitygap run {study} --seed {description.get('seed', 1)} "
-        f"--replicates {_expected_replicates(tally)} --out DIR",
-        "python": f"run_study({study!r}, 'DIR', seed={description.get('seed', 1)}, "
-        f"replicates={_expected_replicates(tally)})",
+        "run": f"{command} {study}{port and f' --port {port}'} --seed {seed} --replicates {replicates} --out DIR",
+        "python": f"{function}({study!r}, {port and f'{port!r}, '}'DIR', seed={seed}, replicates={replicates})",
     }
 
 
@@ -404,6 +423,10 @@ def _is_built_in(description: Mapping[str, Any]) -> bool:
 
 def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
+
+
+def _score(value: float | None) -> str:
+    return "–" if value is None else f"{value:#.4g}"
 
 
 def _count(value: int) -> str:

@@ -7,10 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from realitygap.report._declared import declared
 from realitygap.report._tally import settings_of
-
-_N_INPUTS = 3
-"""Largest reading, stall and time; a constant may be a fourth."""
 
 _N_OUTPUTS = 2
 """Move and turn."""
@@ -74,7 +72,7 @@ def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> list[Parameter]:
     return [
         row("Generations", "5", neat("generations")),
         row("Population size", "8", neat("population")),
-        row("Input nodes", "3; 4 with novelty", [_n_inputs(each) for each in settings]),
+        row("Input nodes", "3; 4 with novelty", [len(declared(each)[0]) for each in settings]),
         row("Hidden nodes, at first", "0", [0] * len(names)),
         row("Output nodes", "2", [_N_OUTPUTS] * len(names)),
         row("Prob. to add link", "0.1", neat("add_link")),
@@ -96,20 +94,6 @@ def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> SettingsTables:
         rows.append((condition["name"], str(condition.get("hash") or "")[:12], cells))
     common = [(key, flat[first].get(key, "–")) for key in keys if key not in differing]
     return SettingsTables(tuple(differing), tuple(rows), tuple(common))
-
-
-def _n_inputs(settings: Mapping[str, Any]) -> int:
-    """Of another task than coverage those that it names."""
-    named = settings.get("task", {}).get("inputs")
-    return len(named) if named else _N_INPUTS + _has_bias_input(settings)
-
-
-def _has_bias_input(settings: Mapping[str, Any]) -> bool:
-    """As `CoverageTask.has_bias_input`, also for settings that another version wrote."""
-    bias_input = settings.get("task", {}).get("bias_input", "with-novelty")
-    return bool(
-        bias_input == "always" or (bias_input == "with-novelty" and settings.get("selection") == "novelty")
-    )
 
 
 def _flatten(values: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:

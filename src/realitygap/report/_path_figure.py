@@ -12,21 +12,25 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap.drawing import Ink
+from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError
+from realitygap.platforms import is_physical
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_dots,
     draw_line,
-    house_style,
+    draw_points,
+    draw_widths,
+    head_axes,
+    mark_key,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
 )
 from realitygap.report._driven import driven_paths
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Tally, label_of, read_tally, settings_of, task_of
 from realitygap.runs import Condition, replay
 from realitygap.world import Arena, Body, Pose
 
@@ -36,6 +40,10 @@ if TYPE_CHECKING:
 
 _MOST_PANELS = 11
 """Generations shown at most, evenly spread; with the legend they fill rows of two and of three."""
+
+
+Track = tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]
+"""Poses (t + 1, 3), and whether each step was blocked (t + 1,)."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,7 @@ class TracedPath:
         cells: cells along its line, columns * row + column.
         poses: (t + 1, 3) x, y [m], heading [rad]; None where the trial cannot be recomputed.
         stalled: (t + 1,) whether each step was blocked; None likewise.
+        others: poses and blocked steps of the other robots of the trial.
     """
 
     generation: int
@@ -56,6 +65,14 @@ class TracedPath:
     cells: tuple[int, ...]
     poses: npt.NDArray[np.float64] | None
     stalled: npt.NDArray[np.bool_] | None
+    others: tuple[Track, ...] = ()
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """Poses and blocked steps of all robots; none where the trial cannot be recomputed."""
+        if self.poses is None or self.stalled is None:
+            return ()
+        return ((self.poses, self.stalled), *self.others)
 
 
 def draw_paths(
@@ -70,7 +87,7 @@ def draw_paths(
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
         condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, whose best coverage is the median of its
+        replicate: which run; when not given the typical one, whose best trial by the task is the median of its
             condition (the lower of the two middle ones, and the first of several alike).
         width: of the figure [in]; it decides how many panels stand side by side.
 
@@ -109,22 +126,17 @@ def draw_tally_paths(
         + ", ".join(f"generation {path.generation} {path.coverage:.3f}" for path in paths)
         + "."
     )
-    arena, body, label = resolved.placed_arena, resolved.tried_on.body, label_of(described)
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            figure = _draw(paths, arena, body, label, width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
+    return draw_widths(lambda width: _draw(paths, arena, body, label, width), widths, name, caption, alt)
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:
-    """The run whose best coverage is the median: the lower middle one, and the first of several alike.
+    """The run whose best trial by the task is the median: the lower middle one, and the first of several alike.
 
     Raises:
         ValueError: the condition has no runs.
     """
-    bests = tally.run_bests(condition, tally.measure)
+    bests = tally.run_scores(condition)
     if len(bests) == 0:
         raise ValueError(f"Condition {condition!r} has no runs yet.")
     middle = np.sort(bests)[(len(bests) - 1) // 2]
@@ -133,7 +145,7 @@ def typical_replicate(tally: Tally, condition: str) -> int:
 
 def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[TracedPath], str]:
     """The best trial of each generation shown, and why trials could not be recomputed (empty: they could)."""
-    column = f"coverage_{tally.measure}"
+    column = tally.score_column(condition.name)
     rows = tally.folder.read(condition.name, [replicate])
     if rows.is_empty():
         raise ValueError(no_such_run(tally, condition.name, replicate))
@@ -144,7 +156,7 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
     shown = np.unique(
         np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
     )
-    return trace_paths(tally, condition, best[shown], column)
+    return trace_paths(tally, condition, best[shown], f"coverage_{tally.measure}")
 
 
 def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
@@ -164,15 +176,23 @@ def trace_paths(
         return _driven_paths(tally, condition, rows, column), ""
     paths, problem = [], ""
     for row in rows.iter_rows(named=True):
-        poses = stalled = None
+        tracks: list[Track] = []
         try:
-            trajectory = replay(condition, row)
-            poses, stalled = trajectory.poses, trajectory.stalled
+            tracks = [(robot.poses, robot.stalled) for robot in replay(condition, row).robots]
         except (RealityGapError, ValueError) as error:
             # another version's genome or numbers; the cells visited are in the row
             problem = str(error)
+        poses, stalled = tracks[0] if tracks else (None, None)
         paths.append(
-            TracedPath(row["generation"], row["individual"], row[column], tuple(row["cells"]), poses, stalled)
+            TracedPath(
+                row["generation"],
+                row["individual"],
+                row[column],
+                tuple(row["cells"]),
+                poses,
+                stalled,
+                tuple(tracks[1:]),
+            )
         )
     return paths, problem
 
@@ -195,13 +215,14 @@ def _driven_paths(tally: Tally, condition: Condition, rows: pl.DataFrame, column
 
 def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], problem: str) -> str:
     """Where the drawn lines come from, or why there are none."""
-    if settings_of(condition).get("platform") == "scribbler":
+    if is_physical(settings_of(condition)):
         if all(path.poses is not None for path in paths):
             return "The paths are what the emulator’s witness saw; where the robot was blocked is not marked."
         return "Only the cells were entered, which are shaded; the lines themselves are on paper."
     if problem:
         return f"Some paths are missing: the trials could not be recomputed. {problem}"
-    return "The paths were recomputed from the records and visit the cells recorded."
+    several = " Each color is a robot." if any(path.others for path in paths) else ""
+    return f"The paths were recomputed from the records and visit the cells recorded.{several}"
 
 
 # drawing
@@ -280,40 +301,29 @@ def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> 
         row, column = divmod(cell, grid.columns)
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
-    outline = body_outline(body, arena.start)
-    draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
-    draw_line(
-        axes,
-        [arena.start.x],
-        [arena.start.y],
-        marker="o",
-        linestyle="",
-        color=Ink.TEXT,
-        markersize=3.4,
-        zorder=7,
-    )
+    for start in arena.starts:
+        outline = body_outline(body, start)
+        draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
+        draw_dots(axes, [start.x], [start.y], 3.4, color=Ink.TEXT, zorder=7)
 
 
 def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
     """One trial: cells, path, start, end, and where it was blocked."""
     draw_visited(axes, path.cells, arena, body)
-    if path.poses is None or path.stalled is None:
-        return
-    draw_line(
-        axes,
-        path.poses[:, 0],
-        path.poses[:, 1],
-        color=Ink.OURS,
-        linewidth=1.3,
-        solid_joinstyle="round",
-        zorder=5,
-    )
-    blocked = np.unique(np.round(path.poses[path.stalled, :2], 6), axis=0)
+    for robot, (poses, stalled) in enumerate(path.tracks):
+        _draw_track(axes, poses, stalled, PENS[(robot + 1) % len(PENS)][0] if robot else Ink.OURS)
+
+
+def _draw_track(
+    axes: Axes, poses: npt.NDArray[np.float64], stalled: npt.NDArray[np.bool_], color: str
+) -> None:
+    """One robot: its path, its end, and where it was blocked."""
+    draw_points(axes, poses, color=color, linewidth=1.3, solid_joinstyle="round", zorder=5)
+    blocked = np.unique(np.round(poses[stalled, :2], 6), axis=0)
     if len(blocked):
-        draw_line(
+        draw_points(
             axes,
-            blocked[:, 0],
-            blocked[:, 1],
+            blocked,
             marker="x",
             linestyle="",
             color=Ink.REACH,
@@ -321,15 +331,13 @@ def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
             markeredgewidth=1.1,
             zorder=6,
         )
-    draw_line(
+    draw_dots(
         axes,
-        path.poses[-1:, 0],
-        path.poses[-1:, 1],
-        marker="o",
-        linestyle="",
-        color=Ink.OURS,
+        poses[-1:, 0],
+        poses[-1:, 1],
+        4.4,
+        color=color,
         markerfacecolor=Ink.GROUND,
-        markersize=4.4,
         markeredgewidth=1.2,
         zorder=6,
     )
@@ -347,32 +355,11 @@ def body_outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
 def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str, width: float) -> None:
     n_cells = arena.grid.n_cells
     figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
-    axes.annotate(
-        f"generation {path.generation}",
-        (0, 0),
-        (1, -4),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        ha="left",
-        va="top",
-        fontsize=8.0,
-        weight="bold",
-    )
     if width > 2.5:
         figure_text = f"{shorten(label, 12)}, coverage {figure_text}"
     else:
         figure_text = f"{path.coverage:.3f} {shorten(label, 12)}"
-    axes.annotate(
-        figure_text,
-        (1, 0),
-        (-1, -4),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        fontsize=8.0,
-        color=Ink.MUTED,
-    )
+    head_axes(axes, f"generation {path.generation}", figure_text, y=0.0, shift=(1.0, -4.0))
 
 
 def draw_path_legend(axes: Axes, paths: list[TracedPath], *, small: bool) -> None:
@@ -382,42 +369,14 @@ def draw_path_legend(axes: Axes, paths: list[TracedPath], *, small: bool) -> Non
 
     axes.set_axis_off()
     handles: list[Any] = [
-        Line2D(
-            [],
-            [],
-            color=Ink.BODY,
-            marker="s",
-            markerfacecolor="none",
-            linestyle="",
-            markersize=7,
-            label="robot at the start",
-        ),
+        mark_key("robot at the start", "s", 7, Ink.BODY, markerfacecolor="none"),
         Line2D([], [], color=Ink.TEXT, marker="o", linestyle="", markersize=3.4, label="start"),
     ]
     if any(path.poses is not None for path in paths):
         handles += [
             Line2D([], [], color=Ink.OURS, linewidth=1.3, label="path of its center"),
-            Line2D(
-                [],
-                [],
-                color=Ink.OURS,
-                marker="o",
-                markerfacecolor=Ink.GROUND,
-                linestyle="",
-                markersize=4.4,
-                markeredgewidth=1.2,
-                label="end",
-            ),
-            Line2D(
-                [],
-                [],
-                color=Ink.REACH,
-                marker="x",
-                linestyle="",
-                markersize=4.0,
-                markeredgewidth=1.1,
-                label="blocked here",
-            ),
+            mark_key("end", "o", 4.4, Ink.OURS, markeredgewidth=1.2, hollow=True),
+            mark_key("blocked here", "x", 4.0, Ink.REACH, markeredgewidth=1.1),
         ]
     handles += [
         Patch(facecolor=Ink.VISITED, label="cell visited"),
@@ -450,7 +409,9 @@ def _caption(
     problem: str,
 ) -> str:
     name = condition["name"]
-    bests = tally.run_bests(name, tally.measure)
+    bests = tally.run_scores(name)
+    is_coverage = task_of(condition) == "coverage"
+    worth = "coverage" if is_coverage else "score"
     best = bests[list(tally.replicates(name)).index(replicate)]
     counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     n_generations = tally.generation_bests(name, tally.measure).shape[1]
@@ -458,14 +419,14 @@ def _caption(
         "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
     )
     why = (
-        f"It is the typical run and not a picked one: its best coverage, {best:.3f}, is the median of the "
+        f"It is the typical run and not a picked one: its best {worth}, {best:.3f}, is the median of the "
         f"{len(bests)} runs (the lower middle one, the first of several alike)."
         if typical
-        else f"The run was chosen by number; its best coverage is {best:.3f}."
+        else f"The run was chosen by number; its best {worth} is {best:.3f}."
     )
     parts = [
-        f"Condition {name}, run {replicate}: the individual of highest coverage in {which}, coverage counted "
-        f"{counted}. {label_of(condition)}, n = 1 run, no interval.",
+        f"Condition {name}, run {replicate}: the individual of {'highest' if is_coverage else 'best'} {worth} in "
+        f"{which}, coverage counted {counted}. {label_of(condition)}, n = 1 run, no interval.",
         why if len(bests) > 1 else "It is the only run.",
         say_origin(condition, paths, problem),
     ]

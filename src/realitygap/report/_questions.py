@@ -19,14 +19,13 @@ from realitygap.records import ResultsFolder
 from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
 from realitygap.report._effects import (
-    Interval,
     bca_intervals,
     ratio_of_robust_spreads,
     ratio_of_spreads,
     robust_spread,
 )
 from realitygap.report._permutation import SEED, lattice
-from realitygap.report._statistics import CONFIDENCE
+from realitygap.report._statistics import CONFIDENCE, Interval
 from realitygap.report._tally import Tally, read_tally, settings_of
 from realitygap.world import ArenaSettings
 

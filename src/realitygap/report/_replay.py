@@ -115,7 +115,9 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         if condition.is_physical:
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)
-        chosen = _choose(rows, room // (condition.simulated_on.steps + 1), f"coverage_{tally.measure}")
+        chosen = _choose(
+            rows, room // (condition.on.steps + 1) // condition.arena.robots, tally.score_column(name)
+        )
         trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
     except (RealityGapError, ValueError):
         note = (
@@ -123,12 +125,12 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         )
         return _Run(name, replicate, None, 0, rows.height, note)
     if not trials:
-        note = f"a trial of {condition.simulated_on.steps:,} steps is too long to be embedded in a page."
+        note = f"a trial of {condition.on.steps:,} steps is too long to be embedded in a page."
         return _Run(name, replicate, None, 0, rows.height, note)
     note = ""
     if len(trials) < rows.height:
         note = (
-            f"{len(trials):,} of {rows.height:,} trials, those of the highest coverage in each generation; "
+            f"{len(trials):,} of {rows.height:,} trials, the best ones of each generation; "
             "more would make the page too large."
         )
     data = _scene(condition) | {
@@ -156,7 +158,7 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
 
 def _scene(condition: Condition) -> dict[str, Any]:
     """Where and with what body and sensors; lengths in meters."""
-    arena, platform = condition.placed_arena, condition.simulated_on
+    arena, platform = condition.placed_arena, condition.on
     grid, mounts = arena.grid, platform.sensors.mounts
     return {
         "walls": [list(wall) for wall in arena.walls],
@@ -176,18 +178,24 @@ def _sensor_names(lefts: Sequence[float]) -> list[str]:
 
 
 def _pack_row(condition: Condition, row: Mapping[str, Any]) -> list[Any]:
-    """Generation, individual, cells along the line and at the ends of steps, the step's length and the bytes."""
+    """Return the trial as the page's script takes it.
+
+    That is the generation, the individual, the numbers of cells along the line and at the ends of steps, the duration
+    of a step, the bytes of the first robot, and those of each other one.
+    """
     trajectory = replay(condition, row)
     grid = condition.arena.arena().grid
-    cells, steps, end_steps = first_visits(trajectory.poses, grid)
-    packed = pack_trial(trajectory, cells, steps, end_steps)
+    visits = first_visits(np.stack([robot.poses for robot in trajectory.robots]), grid)
+    cells, _, end_steps = visits
+    first, *others = (base64.b64encode(pack_trial(robot, *visits)).decode() for robot in trajectory.robots)
     return [
         int(row["generation"]),
         int(row["individual"]),
         len(cells),
         len(end_steps),
         trajectory.step_s,
-        base64.b64encode(packed).decode(),
+        first,
+        *others,
     ]
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-from realitygap.report._drawing import draw_line, new_figure, place_axes
+from realitygap.report._drawing import draw_dots, draw_line, new_figure, place_axes, write
 
 
 def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
@@ -30,16 +30,14 @@ def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
         if isinstance(shape, Line):
             _draw_line(axes, shape, order, scale)
         elif isinstance(shape, Disc):
-            draw_line(
+            draw_dots(
                 axes,
                 [shape.x],
                 [shape.y],
-                marker="o",
-                linestyle="",
+                2 * shape.radius * scale,
                 color=shape.fill,
                 markeredgecolor=shape.color or shape.fill,
                 markeredgewidth=shape.width * scale if shape.color else 0.0,
-                markersize=2 * shape.radius * scale,
                 zorder=2 + order,
                 clip_on=False,
             )
@@ -82,15 +80,16 @@ def _draw_line(axes: Axes, line: Line, order: int, scale: float) -> None:
 
 def _draw_text(axes: Axes, text: Text, order: int, scale: float) -> None:
     box = {"boxstyle": "square,pad=0.08", "facecolor": Ink.GROUND, "edgecolor": "none"} if text.halo else None
-    axes.annotate(
+    write(
+        axes,
         text.text,
         (text.x, text.y),
         (text.shift[0] * scale, text.shift[1] * scale),
-        textcoords="offset points",
+        text.size * scale,
+        xycoords="data",
         ha={"start": "left", "middle": "center", "end": "right"}[text.anchor],
         va="center",
         rotation=90 if text.upright else 0,
-        fontsize=text.size * scale,
         color=text.color,
         weight="bold" if text.bold else "normal",
         zorder=2 + order,

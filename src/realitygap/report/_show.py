@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from realitygap.errors import did_you_mean
+from realitygap.platforms import JyroPlatform
 from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
@@ -18,7 +19,6 @@ from realitygap.report._path_figure import draw_tally_paths
 from realitygap.report._species_figure import count_species, draw_tally_species
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial, draw_chosen_trial
-from realitygap.robots import JyroPlatform
 from realitygap.robots.twin import TwinModel, load_twin, twin_picture
 from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
@@ -50,7 +50,7 @@ def save_view(
         replicate: which run; when not given the typical one, and for species the one with most of them.
         generation: of a trial, network or lineage; when not given that of the run's best trial, for a network the last
             one.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
 
     Returns:
         The path of the file.

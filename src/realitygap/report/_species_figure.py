@@ -17,12 +17,11 @@ from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     WIDE,
     Drawing,
+    draw_widths,
     head_axes,
-    house_style,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
 )
 from realitygap.report._path_figure import no_such_run
 from realitygap.report._structures import selection_of
@@ -30,6 +29,7 @@ from realitygap.report._tally import Tally, label_of, read_tally
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
 _LINES = {
@@ -164,25 +164,25 @@ def draw_tally_species(
         f"Species of run {replicate} of {condition}: {len(shares)} in all. Mean number of species in the last "
         "generation: " + ", ".join(f"{each} {values[-1]:.2f}" for each, values in means.items()) + "."
     )
-    drawings = []
-    with house_style():
-        for index, width in enumerate(widths):
-            is_wide = width >= 6
-            height = 2.25
-            figure = new_figure(width, height + 0.75 if is_wide else 2 * (height + 0.75) + 0.1)
-            across = 0.42 * width if is_wide else width - 0.55
-            left = place_axes(figure, 0.5, 0.3, across, height)
-            _draw_shares(left, shares, f"{shorten(condition, 28)}, run {replicate}", label_of(described))
-            right = place_axes(
-                figure,
-                0.57 * width if is_wide else 0.5,
-                0.3 if is_wide else height + 1.15,
-                (0.33 * width if is_wide else across - 0.75),
-                height,
-            )
-            _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+
+    def draw(width: float) -> Figure:
+        is_wide = width >= 6
+        height = 2.25
+        figure = new_figure(width, height + 0.75 if is_wide else 2 * (height + 0.75) + 0.1)
+        across = 0.42 * width if is_wide else width - 0.55
+        left = place_axes(figure, 0.5, 0.3, across, height)
+        _draw_shares(left, shares, f"{shorten(condition, 28)}, run {replicate}", label_of(described))
+        right = place_axes(
+            figure,
+            0.57 * width if is_wide else 0.5,
+            0.3 if is_wide else height + 1.15,
+            (0.33 * width if is_wide else across - 0.75),
+            height,
+        )
+        _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
+        return figure
+
+    return draw_widths(draw, widths, name, caption, alt)
 
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -34,18 +35,18 @@ class IntervalRanks:
 
 
 @dataclass(frozen=True)
-class MedianInterval:
-    """Two observed values between which the median of the population lies.
+class Interval:
+    """Bounds of an effect or of a median.
 
     Attributes:
-        low: lower bound, included, in the unit of the values.
-        high: upper bound, included.
-        coverage: as in `IntervalRanks`; never less than was asked for.
+        low: lower bound, in the unit of what it bounds, included.
+        high: upper bound.
+        method: `BCa`, a bootstrap; `ranks`, two observed values; `Newcombe` and `t`, by formula.
     """
 
     low: float
     high: float
-    coverage: float
+    method: Literal["BCa", "Newcombe", "ranks", "t"]
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(misses[lower - 1]))
 
 
-def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> MedianInterval | None:
+def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval | None:
     """The order-statistic interval of the median: no distribution is assumed and nothing is resampled.
 
     Args:
@@ -101,7 +102,7 @@ def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDE
         confidence: what the interval shall cover at least, between 0 and 1.
 
     Returns:
-        The interval with what it covers in truth, or None where n is too small (below 6 for 95 %).
+        The interval, or None where n is too small (below 6 for 95 %).
 
     Raises:
         ValueError: `values` is not one row of finite numbers, or `confidence` is not between 0 and 1.
@@ -112,7 +113,7 @@ def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDE
     ranks = interval_ranks(len(ordered), confidence)
     if ranks is None:
         return None
-    return MedianInterval(float(ordered[ranks.lower - 1]), float(ordered[ranks.upper - 1]), ranks.coverage)
+    return Interval(float(ordered[ranks.lower - 1]), float(ordered[ranks.upper - 1]), "ranks")
 
 
 def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_tally
 from realitygap.report._comparisons import (
     INTERVAL_NAME,
@@ -21,7 +22,7 @@ from realitygap.report._comparisons import (
     signed,
     span,
 )
-from realitygap.report._effects import Interval, bca_interval, difference_of_means, mean_interval
+from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
     Share,
@@ -32,6 +33,7 @@ from realitygap.report._questions import (
     spreads,
     tally_variety,
 )
+from realitygap.report._statistics import Interval
 from realitygap.report._tally import Tally, label_of, settings_of
 
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
@@ -123,7 +125,7 @@ def _selection_sentences(
 
 
 def _is_driven(condition: Mapping[str, Any]) -> bool:
-    return settings_of(condition).get("platform") == "scribbler"
+    return is_physical(settings_of(condition))
 
 
 def _apart(
@@ -195,11 +197,7 @@ def _noise_sentences(by_name: Mapping[str, Champions], conditions: Sequence[Mapp
             continue
         ends = sorted(usable, key=lambda each: float(settings_of(each)["noise"]))
         low, high = (by_name[each["name"]] for each in (ends[0], ends[-1]))
-        changes = []
-        for one, other in ((high.reported, low.reported), (high.expected, low.expected)):
-            interval = bca_interval(difference_of_means, one, other, paired=False)
-            within = f" ({span(interval, signs=True)})" if interval else ""
-            changes.append(f"{signed(float(one.mean() - other.mean()))}{within}")
+        changes = _difference(high.reported, low.reported), _difference(high.expected, low.expected)
         found.append(
             f"{high.condition} less {low.condition}: {changes[0]} as reported, {changes[1]} on fresh noise "
             f"(n = {high.n:,} and {low.n:,})."
@@ -225,10 +223,7 @@ def _champion_row(champions: Champions, reference: Champions | None) -> dict[str
     difference = "–"
     if reference is not None and not reference.problem:
         n = min(champions.n, reference.n)
-        one, other = champions.expected[:n], reference.expected[:n]
-        interval = bca_interval(difference_of_means, one, other, paired=False)
-        within = f" ({span(interval, signs=True)})" if interval else ""
-        difference = f"{signed(float(one.mean() - other.mean()))}{within}"
+        difference = _difference(champions.expected[:n], reference.expected[:n])
     return {
         "condition": champions.condition,
         "n": f"{champions.n:,}",
@@ -302,7 +297,7 @@ def _variety_row(variety: Variety, objective: Variety | None) -> dict[str, str]:
     return row
 
 
-def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], digits: int) -> str:
+def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], digits: int = 3) -> str:
     interval = bca_interval(difference_of_means, one, other, paired=False)
     within = f" ({span(interval, digits, signs=True)})" if interval else ""
     return f"{signed(float(one.mean() - other.mean()), digits)}{within}"

@@ -10,6 +10,7 @@ from typing import Any
 
 import polars as pl
 
+from realitygap.report._declared import Names, declared
 from realitygap.report._tally import Tally, settings_of
 
 _MOST_ORDERED = 6
@@ -94,15 +95,15 @@ def selection_of(condition: Mapping[str, Any]) -> str:
 def count_structures(tally: Tally) -> list[Structures]:
     """How often each structure occurs among the networks of each run's last generation, by selection."""
     genes = _count_genes(tally)
-    groups: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    groups: dict[tuple[str, tuple[Names, Names]], list[str]] = {}
     for condition in tally.conditions:
-        selection = selection_of(condition)
-        groups.setdefault((selection, _input_names(condition)), []).append(condition["name"])
+        key = selection_of(condition), declared(settings_of(condition))
+        groups.setdefault(key, []).append(condition["name"])
     found = []
-    for (selection, inputs), conditions in groups.items():
+    for (selection, names), conditions in groups.items():
         there = [name for name in conditions if name in genes]
         if there:
-            found.append(_count(tally, selection, inputs, {name: genes[name] for name in there}))
+            found.append(_count(tally, selection, names, {name: genes[name] for name in there}))
     return found
 
 
@@ -134,17 +135,10 @@ def _count_genes(tally: Tally) -> dict[str, pl.DataFrame]:
     return {name: pl.concat(frames).sort(_ROW) for name, frames in parts.items()}
 
 
-def _input_names(condition: Mapping[str, Any]) -> tuple[str, ...]:
-    settings = settings_of(condition)
-    bias = dict(settings.get("task") or {}).get("bias_input", "with-novelty")
-    with_bias = bias == "always" or (bias == "with-novelty" and settings.get("selection") == "novelty")
-    return ("obstacle", "stall", "time", *(("bias",) if with_bias else ()))
-
-
 def _count(
-    tally: Tally, selection: str, inputs: tuple[str, ...], genes: Mapping[str, pl.DataFrame]
+    tally: Tally, selection: str, declaration: tuple[Names, Names], genes: Mapping[str, pl.DataFrame]
 ) -> Structures:
-    outputs = ("move", "turn")
+    inputs, outputs = declaration
     names = dict(enumerate([*inputs, *outputs]))
     counts: dict[Links, Counter[str]] = {}
     examples: dict[Links, dict[str, Any]] = {}

@@ -38,12 +38,12 @@ def summarize(folder: ResultsFolder | str | Path) -> pl.DataFrame:
         (`line_`) and at the ends of steps (`ends_`) [0..1] `median`, the quartiles `q25` and `q75`, and the
         bounds `low` and `high` of the median's 95 % interval; `interval_coverage`, what that interval covers
         in truth; `published`, what the paper reports, one value per run of its own. Null where there are no
-        runs, too few for an interval (below 6), or nothing published.
+        runs, no counted cells, too few for an interval (below 6), or nothing published.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return summarize_tally(read_tally(folder))
+    return summarize_tally(read_tally(folder, with_uncounted=True))
 
 
 def summarize_tally(tally: Tally) -> pl.DataFrame:
@@ -68,7 +68,7 @@ def summarize_tally(tally: Tally) -> pl.DataFrame:
 
 def _describe(tally: Tally, condition: str, measure: Measure) -> dict[str, float | None]:
     values = tally.run_bests(condition, measure)
-    if np.isnan(values).any():  # of a robot nobody saw where its steps end
+    if np.isnan(values).any():  # nobody counted a robot's cells, or saw where its steps end
         return dict.fromkeys(_STATISTICS)
     middle = quartiles(values)
     interval = median_interval(values)

@@ -40,12 +40,14 @@ class Tally:
         best: one row per condition, replicate and generation, in key order: `trials`, how many individuals;
             `line` and `ends`, the highest coverage among them [0..1].
         driven: what the ledger says of each condition that a robot drove.
+        uncounted: names of the conditions that are left out, because nobody counted their cells.
     """
 
     folder: ResultsFolder
     description: Mapping[str, Any]
     best: pl.DataFrame
     driven: Mapping[str, Driven] = field(default_factory=dict)
+    uncounted: tuple[str, ...] = ()
 
     @property
     def conditions(self) -> list[Mapping[str, Any]]:
@@ -84,6 +86,18 @@ class Tally:
         """(n,) best coverage of each run of a condition, in the order of replicates [0..1]."""
         return self.runs.filter(pl.col("condition") == condition)[measure].to_numpy()
 
+    def score_column(self, condition: str) -> str:
+        """The column of rows that says which trial of a condition is the best: its coverage, or its task's score."""
+        is_coverage = task_of(self.condition(condition)) == "coverage"
+        return f"coverage_{self.measure}" if is_coverage else "task_fitness"
+
+    def run_scores(self, condition: str) -> npt.NDArray[np.float64]:
+        """(n,) best of each run of a condition by its task, in the order of replicates."""
+        if task_of(self.condition(condition)) == "coverage":
+            return self.run_bests(condition, self.measure)
+        found = bests_of(self.folder, condition)
+        return found.max(axis=1) if len(found) else np.empty(0)
+
     def replicates(self, condition: str) -> npt.NDArray[np.uint32]:
         """(n,) which replicates of a condition there are, in order."""
         return self.runs.filter(pl.col("condition") == condition)["replicate"].to_numpy()
@@ -105,8 +119,12 @@ class Tally:
         return int(rows["trials"].sum())
 
 
-def read_tally(folder: ResultsFolder | str | Path) -> Tally:
+def read_tally(folder: ResultsFolder | str | Path, *, with_uncounted: bool = False) -> Tally:
     """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
+
+    Args:
+        folder: the results of a study, or the path to them.
+        with_uncounted: whether conditions of which nobody counted cells are kept; their coverage is NaN.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -131,24 +149,64 @@ def read_tally(folder: ResultsFolder | str | Path) -> Tally:
         raise RecordError(
             f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.{begun}"
         )
+    uncounted = () if with_uncounted else _uncounted(best)
+    best = best.filter(~pl.col("condition").is_in(list(uncounted)))
+    if best.is_empty():
+        raise RecordError(
+            f"Nobody counted the cells of {', '.join(uncounted)} in {folder.path}, and a report shows coverage. The "
+            "scores of the task are printed at the end of a study; in Python: "
+            "realitygap.report.summarize_tasks(FOLDER)."
+        )
     description = folder.description
     description["conditions"] = [
-        _labeled(each if isinstance(each, dict) else {"name": each}, driven)
-        for each in description["conditions"]
+        _labeled(each, driven) for each in conditions_of(description) if each["name"] not in uncounted
     ]
-    return Tally(folder, description, best, driven)
+    return Tally(folder, description, best, driven, uncounted)
+
+
+def _uncounted(best: pl.DataFrame) -> tuple[str, ...]:
+    """Names of the conditions of which no cells are known."""
+    counted = best.group_by("condition", maintain_order=True).agg(pl.col("line").is_not_null().any())
+    return tuple(counted.filter(~pl.col("line"))["condition"])
+
+
+def labeled_conditions(folder: ResultsFolder) -> list[dict[str, Any]]:
+    """The conditions of a study, with the label of the robot that drove them, which only the ledger knows."""
+    driven = read_driven(folder)
+    return [_labeled(each, driven) for each in conditions_of(folder.description)]
 
 
 def _labeled(condition: dict[str, Any], driven: Mapping[str, Driven]) -> dict[str, Any]:
-    """With the label of the robot that drove it, which only the ledger knows."""
     label = driven[condition["name"]].label if condition["name"] in driven else None
     return condition if label is None else condition | {"label": label}
+
+
+def conditions_of(description: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The conditions in a study's description, which may name them alone."""
+    return [each if isinstance(each, dict) else {"name": each} for each in description["conditions"]]
 
 
 def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
     """The resolved settings of a condition; empty where the description has none."""
     settings = condition.get("settings")
     return settings if isinstance(settings, dict) else {}
+
+
+def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
+    """(n, g) best fitness by the task in each generation of each run."""
+    parts = [
+        frame.group_by("replicate", "generation", maintain_order=True).agg(pl.col("task_fitness").max())
+        for frame in folder.frames(condition, ["replicate", "generation", "task_fitness"])
+    ]
+    if not parts:
+        return np.empty((0, 0))
+    best = pl.concat(parts).sort("replicate", "generation")
+    return best["task_fitness"].to_numpy().reshape(best["replicate"].n_unique(), -1)
+
+
+def task_of(condition: Mapping[str, Any]) -> str:
+    """The kind of a condition's task."""
+    return str(settings_of(condition).get("task", {}).get("kind", "coverage"))
 
 
 def label_of(condition: Mapping[str, Any]) -> str:

@@ -11,9 +11,7 @@ import polars as pl
 
 from realitygap.records import ResultsFolder
 from realitygap.report._statistics import median_interval, quartiles
-from realitygap.report._tally import label_of, settings_of
-
-_COLUMNS = ["replicate", "generation", "task_fitness"]
+from realitygap.report._tally import bests_of, label_of, labeled_conditions, task_of
 
 TASK_SCHEMA = pl.Schema(
     {
@@ -43,26 +41,14 @@ def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
     """
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
     rows: list[dict[str, Any]] = []
-    for condition in folder.description["conditions"]:
-        task = settings_of(condition).get("task", {}).get("kind", "coverage")
+    for condition in labeled_conditions(folder):
+        task = task_of(condition)
         if task == "coverage":
             continue
-        best = _bests(folder, condition["name"])
+        best = bests_of(folder, condition["name"])
         row = {"condition": condition["name"], "label": label_of(condition), "task": task, "n": len(best)}
         rows.append(row | _described(best) if len(best) else row)
     return pl.DataFrame(rows, schema=TASK_SCHEMA)
-
-
-def _bests(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
-    """(n, g) best fitness by the task in each generation of each run."""
-    parts = [
-        frame.group_by("replicate", "generation", maintain_order=True).agg(pl.col("task_fitness").max())
-        for frame in folder.frames(condition, _COLUMNS)
-    ]
-    if not parts:
-        return np.empty((0, 0))
-    best = pl.concat(parts).sort("replicate", "generation")
-    return best["task_fitness"].to_numpy().reshape(best["replicate"].n_unique(), -1)
 
 
 def _described(best: npt.NDArray[np.float64]) -> dict[str, float | None]:

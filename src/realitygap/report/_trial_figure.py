@@ -14,6 +14,7 @@ from realitygap.errors import whole_number
 from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     Drawing,
+    head_axes,
     house_style,
     new_figure,
     place_axes,
@@ -118,7 +119,7 @@ def choose_trial(
             )
         rows = rows.filter(pl.col("individual") == individual)
     measure = f"coverage_{tally.measure}"
-    row = rows.row(int(rows[measure].arg_max() or 0), named=True)
+    row = rows.row(int(rows[tally.score_column(name)].arg_max() or 0), named=True)
     resolved = Condition.from_settings(name, dict(settings_of(described)))
     return ChosenTrial(resolved, label_of(described), row, measure)
 
@@ -137,7 +138,7 @@ def draw_trial(
         condition: of which; the first one when not given.
         replicate: which run; the typical one when not given, as in `draw_paths`.
         generation: of the run; that of its best trial when not given.
-        individual: of the generation; the one of highest coverage when not given.
+        individual: of the generation; the best one by the task when not given.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the trial comes out
@@ -153,11 +154,12 @@ def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
     coverage = trial.row[trial.measure]
     counted = "along the line driven" if trial.measure == "coverage_line" else "at the ends of steps"
     n_steps, n_stalls = len(trajectory.commands), int(trajectory.stalled.sum())
+    several = "Each color is a robot. Readings, commands and blocked steps are of the first, dark blue. "
     caption = (
         f"{trial.title}: {n_steps} steps of {trajectory.step_s:g} s, {n_stalls} of them blocked (×; gray stripes), "
         f"coverage {coverage:.3f} {counted}. Dot: start; circle: end; shaded: cells visited. Readings are distances "
         "without noise; obstacle is what the network saw, 1 being nearest, with noise. "
-        f"{trial.label}, n = 1 trial, no interval. Recomputed from the records."
+        f"{several if trajectory.others else ''}{trial.label}, n = 1 trial, no interval. Recomputed from the records."
     )
     alt = f"Path, readings and commands of one trial. {caption}"
     with house_style():
@@ -183,6 +185,7 @@ def _traced(trial: ChosenTrial, trajectory: Trajectory) -> TracedPath:
         tuple(row["cells"]),
         trajectory.poses,
         trajectory.stalled,
+        tuple((robot.poses, robot.stalled) for robot in trajectory.others),
     )
 
 
@@ -195,7 +198,7 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     figure = new_figure(_WIDTH, up + head + 0.42)
     field = place_axes(figure, 0.05, head, across, up)
     draw_arena(field, arena, x_range, y_range)
-    draw_path(field, _traced(trial, trajectory), arena, trial.condition.tried_on.body)
+    draw_path(field, _traced(trial, trajectory), arena, trial.condition.on.body)
     _head(field, trial)
     left, gap = across + 0.65, 0.24
     height = (up - 2 * gap) / 3
@@ -205,9 +208,9 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
     n_sensors = trajectory.readings.shape[1]
     names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
     _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
-    axes[0].set_ylim(0, 1.08 * trial.condition.simulated_on.sensors.max_range)
-    _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, ["obstacle"], "input")
-    _lines(axes[2], times[1:], trajectory.commands.T, trial.condition.output_names, "command")
+    axes[0].set_ylim(0, 1.08 * trial.condition.on.sensors.max_range)
+    _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, trial.condition.network_inputs[:1], "input")
+    _lines(axes[2], times[1:], trajectory.commands.T, ("move", "turn"), "command")
     axes[2].set_ylim(-1.1, 1.1)
     for each in axes:
         each.set_xlim(0, times[-1])
@@ -219,23 +222,8 @@ def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
 
 
 def _head(axes: Axes, trial: ChosenTrial) -> None:
-    for x, text, align, weight, color in (
-        (0.0, shorten(trial.title, 60), "left", "bold", Ink.TEXT),
-        (1.0, f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}", "right", "normal", Ink.MUTED),
-    ):  # fmt: skip
-        axes.annotate(
-            text,
-            (x, 1.0),
-            (0, 5),
-            xycoords="axes fraction",
-            textcoords="offset points",
-            ha=align,
-            va="bottom",
-            fontsize=8.0,
-            weight=weight,
-            color=color,
-            annotation_clip=False,
-        )
+    facts = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
+    head_axes(axes, shorten(trial.title, 60), facts, shift=(0.0, 5.0), annotation_clip=False)
 
 
 def _lines(axes: Axes, times: Any, rows: Any, names: Any, unit: str) -> None:

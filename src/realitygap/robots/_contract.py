@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Literal, NamedTuple, Protocol, Self, runtime_checkable
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType, TracebackType
+from typing import Any, Literal, NamedTuple, Protocol, Self, runtime_checkable
 
 from realitygap.world import Pose
 
@@ -25,11 +26,14 @@ class Observation(NamedTuple):
         readings: (s,) one a sensor from left to right, 0 (nothing seen) to 1 (as near as can be told).
         stalled: Whether it is blocked.
         raw: (s,) the same in the robot's native units, as they came.
+        channels: Values of the sensors that `select_channels` chose, by name: `light.K`, `line.K` and `bump.K` from 0
+            to 1, `encoder.K` (part of full speed in the last command) from -1 to 1.
     """
 
     readings: tuple[float, ...]
     stalled: bool
     raw: tuple[float, ...]
+    channels: Mapping[str, float] = MappingProxyType({})
 
 
 @runtime_checkable
@@ -37,6 +41,9 @@ class Robot(Protocol):
     """Anything that can be reset, read, driven and stopped.
 
     As a context manager it stops its motors and lets go of the robot on the way out, whatever happened.
+
+    A robot with other sensors than range sensors also has `channels`, their names, such as `light.0`, and a method
+    `select(names)`. Its observations then have the chosen ones: a sensor that no controller sees is not read.
 
     Attributes:
         label: What figures of its trials say.
@@ -82,6 +89,17 @@ class Robot(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
+
+
+def channels_of(robot: Any) -> tuple[str, ...]:
+    """Return the names of the sensors that a robot has besides its range sensors."""
+    return tuple(getattr(robot, "channels", ()))
+
+
+def select_channels(robot: Any, names: Sequence[str]) -> None:
+    """Choose the sensors that a robot reads besides its range sensors, from the next `observe` on."""
+    if channels_of(robot):
+        robot.select(tuple(names))
 
 
 def check_command(command: Command) -> Command:

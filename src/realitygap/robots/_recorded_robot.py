@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +59,13 @@ class RecordedRobot(ProgramRobot):
         self.clock = RecordedClock()
         self._closed = f"{recording.path} is closed: open the recording anew."
         self._lines = [line for line in recording.lines if line["kind"] != "wire" and line["name"] != "stop"]
+        values = [line.get("values", {}) for line in self._lines if line["name"] == "observe"]
+        self.channels = tuple(values[0].get("channels", {})) if values else ()
         self._next = 0
         self._n_steps = 0
+
+    def select(self, names: Sequence[str]) -> None:
+        """Nothing: the sensors that were read are in the recording."""
 
     def _take(self, name: str) -> Mapping[str, Any]:
         """What was recorded at this point, which must be such a call."""
@@ -95,7 +100,8 @@ class RecordedRobot(ProgramRobot):
     def observe(self) -> Observation:
         """What the robot saw at this point."""
         seen = self._take("observe")
-        return Observation(tuple(seen["readings"]), seen["stalled"], tuple(seen["raw"]))
+        channels = seen.get("channels", {})
+        return Observation(tuple(seen["readings"]), seen["stalled"], tuple(seen["raw"]), channels)
 
     def drive(self, command: Command) -> None:
         """Nothing, if the robot was told just that.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from realitygap.evolution import NeatSettings, random_key
-from realitygap.kernels import _task_run
+from realitygap.kernels.tasks import run
 from realitygap.tasks import ClassicalTask
 
 # Room for genes and hidden nodes beyond the first ones; doubled and run again where it was not enough.
@@ -15,9 +15,9 @@ FIRST_ROOM = 128
 FIRST_HIDDEN_ROOM = 32
 
 _NUMBERS = {
-    "xor": _task_run.XOR,
-    "double-pole": _task_run.DOUBLE_POLE,
-    "double-pole-no-velocity": _task_run.DOUBLE_POLE_NO_VELOCITY,
+    "xor": run.XOR,
+    "double-pole": run.DOUBLE_POLE,
+    "double-pole-no-velocity": run.DOUBLE_POLE_NO_VELOCITY,
 }
 
 
@@ -53,23 +53,23 @@ def run_task(task: ClassicalTask, settings: NeatSettings, seed: int, replicate: 
     """
     bias_input = task.n_inputs
     neat = settings.rules(task.n_inputs + 1, 1, bias_input=bias_input)
-    rules = _task_run.TaskRules(
+    rules = run.TaskRules(
         _NUMBERS[task.name], settings.population, settings.generations, float(settings.bias_value)
     )
     room = neat.n_first_genes + FIRST_ROOM
     hidden_room = neat.start_hidden + FIRST_HIDDEN_ROOM
-    outcome = np.zeros(_task_run.N_OUTCOMES, np.int64)
+    outcome = np.zeros(run.N_OUTCOMES, np.int64)
     key = np.uint64(random_key(seed))
     while True:
-        space = _task_run.make_task_room(rules, neat, room, hidden_room)
-        if _task_run.run_task(rules, neat, key, replicate, space, outcome):
+        space = run.make_task_room(rules, neat, room, hidden_room)
+        if run.run_task(rules, neat, key, replicate, space, outcome):
             break
         room, hidden_room = 2 * room, 2 * hidden_room
     return TaskRun(
-        solved=bool(outcome[_task_run.SOLVED]),
-        evaluations=int(outcome[_task_run.EVALUATIONS]),
-        generations=int(outcome[_task_run.N_GENERATIONS]),
-        n_hidden=int(outcome[_task_run.N_HIDDEN]),
-        n_connections=int(outcome[_task_run.N_ENABLED]),
-        generalization=int(outcome[_task_run.GENERALIZATION]),
+        solved=bool(outcome[run.SOLVED]),
+        evaluations=int(outcome[run.EVALUATIONS]),
+        generations=int(outcome[run.N_GENERATIONS]),
+        n_hidden=int(outcome[run.N_HIDDEN]),
+        n_connections=int(outcome[run.N_ENABLED]),
+        generalization=int(outcome[run.GENERALIZATION]),
     )

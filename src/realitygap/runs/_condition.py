@@ -7,24 +7,36 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, SerializeAsAny, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    ModelWrapValidatorHandler,
+    SerializeAsAny,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails
 
 from realitygap._version import __version__
-from realitygap.errors import RecordVersionError
-from realitygap.evolution import (
-    DISTANCES,
-    ControllerInterface,
-    NeatSettings,
-    NoveltySettings,
-    inputs_of_ranges,
-    random_key,
+from realitygap.errors import RecordVersionError, did_you_mean
+from realitygap.evolution import DISTANCES, NeatSettings, NoveltySettings, random_key
+from realitygap.kernels.neat.genome import NeatRules
+from realitygap.platforms import (
+    PYTHON,
+    JyroPlatform,
+    Platform,
+    platform_class,
+    platform_names,
+    study_platforms,
 )
-from realitygap.kernels._genome import NeatRules
-from realitygap.robots import JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, hash_elsewhere
-from realitygap.settings import Settings, mistakes
-from realitygap.tasks import CoverageTask, Task, as_task
-from realitygap.trials import Trajectory, paper_inputs, sim_scene
-from realitygap.world import Arena, ArenaSettings, check_drawn_starts
+from realitygap.settings import Settings, mistakes, shown
+from realitygap.tasks import ControllerSettings, CoverageTask, Task, as_task
+from realitygap.trials import MOST_TEAMS, Trajectory
+from realitygap.world import Arena, ArenaSettings
 
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -33,11 +45,6 @@ NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 MOST_TRIALS = 5_000_000
 
 Selection = Literal["coverage", "fitness", "novelty", "random"]
-Platform = Literal["jyro", "sim", "twin", "scribbler"]
-
-
-# Platforms that may name a file, and the setting that this is.
-FILE_KEYS = {"sim": "robot", "twin": "file"}
 
 
 class Condition(Settings):
@@ -55,11 +62,11 @@ class Condition(Settings):
         "fitness by it; novelty; or nothing: random tries as many unrelated networks, the control that the paper "
         "lacks.",
     )
-    platform: Platform = Field(
+    platform: str = Field(
         "jyro",
         description="What the networks are tried on: jyro, the paper's simulation; sim, a robot simulated with its "
-        "outline, contact, motors and sensors (sim:FILE is one of a file); twin:FILE, pseudo-reality in MuJoCo; or "
-        "scribbler, the robot.",
+        "outline, contact, motors and sensors (sim:FILE is one of a file); twin:FILE, pseudo-reality in MuJoCo; "
+        "scribbler, the robot; or a platform that another package adds.",
     )
     noise: float = Field(
         0.1,
@@ -77,25 +84,73 @@ class Condition(Settings):
     )
     arena: ArenaSettings = ArenaSettings()
     task: Annotated[SerializeAsAny[Settings], BeforeValidator(as_task)] = CoverageTask()
+    controller: ControllerSettings = ControllerSettings()
     neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
     novelty: NoveltySettings = NoveltySettings()
-    jyro: JyroPlatform = JyroPlatform()
-    sim: SimPlatform = Field(default_factory=SimPlatform)
-    twin: TwinPlatform = TwinPlatform()
-    scribbler: ScribblerPlatform = ScribblerPlatform()
+    on: SerializeAsAny[Platform] = Field(
+        default_factory=JyroPlatform,
+        description="The settings of the platform, `[platform.NAME]`.",
+        json_schema_extra={"hidden": True},
+    )
 
-    @model_validator(mode="before")
     @classmethod
-    def _platform_may_name_a_file(cls, values: Any) -> Any:
+    def table_of(cls, name: str) -> type[BaseModel] | None:
+        """Return the settings of the platform of this name."""
+        return platform_class(name) if name in platform_names() else None
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _platform_has_its_settings(cls, values: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
+        """Make `on` of the table that is named like the platform; its mistakes are reported with all others."""
         if not isinstance(values, dict):
-            return values
-        name, colon, file = str(values.get("platform", "")).partition(":")
-        if colon and name in FILE_KEYS:
-            values = {**values, "platform": name, name: {**dict(values.get(name, {})), FILE_KEYS[name]: file}}
-        if name == "twin":
-            values = {**values, "twin": _hashed(dict(values.get("twin", {})))}
-        # a robot adds its own noise
-        return {"noise": 0.0, **values} if name in ("sim", "twin", "scribbler") else values
+            return validate(values)
+        if "on" in values:
+            return validate(_with_platform_of(values))
+        spec = str(values.get("platform", "jyro"))
+        name, colon, rest = spec.partition(":")
+        if name not in platform_names() or not (model := platform_class(name)).is_for_studies:
+            return validate(values)  # which the field's own check reports
+        for other in set(values) & set(platform_names()) - {name}:
+            raise ValueError(f"{other}: of no meaning here, the condition's platform is {name!r}")
+        values = {"noise": model.default_noise, **values, "platform": name}
+        table = values.pop(name, {})
+        if colon and not (rest and model.rest_setting):
+            raise ValueError(f"platform is {spec!r}, expected {' or '.join(model.specs())}")
+        if colon and isinstance(table, Mapping):
+            table = {**table, model.rest_setting: rest}
+        elif colon:
+            raise ValueError(
+                f"platform is {spec!r}, expected {name!r} where its settings are given as {shown(table)}"
+            )
+        lines: list[InitErrorDetails] = []
+        try:
+            values["on"] = model.model_validate(table).identified()
+        except ValidationError as error:
+            lines = _lines(error, (name,))
+        try:
+            made = validate(values)
+        except ValidationError as error:
+            if not lines:
+                raise
+            lines = [line for line in _lines(error, ()) if line["loc"]] + lines
+        else:
+            if not lines:
+                return made
+        raise ValidationError.from_exception_data(name, lines)
+
+    @field_validator("platform")
+    @classmethod
+    def _is_a_platform(cls, platform: str) -> str:
+        if platform not in platform_names() or not platform_class(platform).is_for_studies:
+            name = platform.partition(":")[0]
+            if name == PYTHON:
+                raise ValueError(
+                    "expected the platform of an installed package, so that others can repeat the study"
+                )
+            raise ValueError(
+                f"there is no such platform for studies. {did_you_mean(name, study_platforms())}"
+            )
+        return platform
 
     @model_validator(mode="before")
     @classmethod
@@ -116,36 +171,27 @@ class Condition(Settings):
             return self
         if self.selection == "coverage":
             raise ValueError(
-                f"selection is 'coverage', which is another task than {self.fitness_task.name!r}, expected 'fitness', "
-                "'novelty' or 'random'"
+                f"selection is 'coverage', which is another task than {self.task_of_trials.name!r}, expected "
+                "'fitness', 'novelty' or 'random'"
             )
-        if self.is_physical:
+        if self.is_physical and self.selection == "novelty":
             raise ValueError(
-                f"task.kind is {self.fitness_task.name!r}, expected coverage with platform 'scribbler': an operator "
-                "enters the visited squares, and nothing else is known of a trial."
+                f"selection is 'novelty' with task {self.task_of_trials.name!r}, expected 'fitness' with platform "
+                f"{self.platform!r}: nobody counts the cells of its trials."
             )
         return self
 
     @model_validator(mode="after")
-    def _a_twin_is_noisy_by_itself(self) -> Self:
-        if self.platform == "twin" and self.noise != 0:
-            raise ValueError(
-                f"noise is {self.noise:g}, expected none with platform 'twin': its readings are noisy by themselves. "
-                "Leave it out."
-            )
+    def _its_readings_take_the_noise(self) -> Self:
+        self.on.check_noise(self.noise)
         return self
 
     @model_validator(mode="after")
     def _an_operator_can_score_it(self) -> Self:
-        if self.is_physical and self.noise != 0:
-            raise ValueError(
-                f"noise is {self.noise:g}, expected none with platform 'scribbler': a robot's readings are noisy by "
-                "themselves. Leave it out."
-            )
         if self.is_physical and self.counted_cells != "line":
             raise ValueError(
-                "task.cells is 'ends', expected 'line' with platform 'scribbler': on paper stands the line that was "
-                "driven, and not where steps end."
+                f"task.cells is 'ends', expected 'line' with platform {self.platform!r}: on paper stands the line "
+                "that was driven, and not where steps end."
             )
         return self
 
@@ -158,7 +204,7 @@ class Condition(Settings):
             what = "their order" if distance.needs_order else "where the trial ended"
             raise ValueError(
                 f"novelty.distance is {distance.name!r}, expected 'paper', 'jaccard' or 'hamming' with platform "
-                f"'scribbler': an operator enters the visited squares, and not {what}."
+                f"{self.platform!r}: an operator enters the visited squares, and not {what}."
             )
         if distance.needs_order and self.counted_cells != "line":
             raise ValueError(
@@ -168,26 +214,49 @@ class Condition(Settings):
         return self
 
     @model_validator(mode="after")
-    def _robot_and_arena_have_what_networks_see(self) -> Self:
-        if self.platform == "sim":
-            sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise)
-        elif self.platform == "twin":
-            there = inputs_of_ranges(len(self.twin.sensors.mounts))
-            ControllerInterface(self.network_inputs).check(there, "A network", "platform 'twin'")
-        elif self.coverage is None and self.network_inputs != paper_inputs(self.neat_rules):
+    def _inputs_are_declared_once(self) -> Self:
+        names = ("inputs", "bias_input") if self.coverage is not None else ("inputs",)
+        fields = type(self.task).model_fields
+        twice = [name for name in names if getattr(self.task, name) != fields[name].default]
+        if self.controller.inputs and twice:
             raise ValueError(
-                f"the networks of task {self.fitness_task.name!r} see {', '.join(self.network_inputs)}, expected "
-                f"{', '.join(paper_inputs(self.neat_rules))} on platform {self.platform!r}. Choose platform 'sim', or "
-                "give the task these inputs."
+                f"task.{twice[0]} and controller.inputs both say what networks see. Leave task.{twice[0]} out: "
+                "controller.inputs names every input, bias included"
             )
         return self
 
     @model_validator(mode="after")
-    def _robot_fits_at_start(self) -> Self:
-        if self.platform == "jyro":
-            self.arena.arena().straight_walls()  # which says where there are none
-        robot = self.sim.model if self.platform == "sim" else self.tried_on.body
-        check_drawn_starts(self.placed_arena, robot)
+    def _several_robots_can_be_scored(self) -> Self:
+        robots, population = self.arena.robots, self.neat.population
+        starts, each = len(self.arena.other_starts), self.arena.networks == "each"
+        if starts not in (0, robots - 1):
+            raise ValueError(
+                f"arena.other_starts has {starts} starts, expected {robots - 1} with arena.robots = {robots}"
+            )
+        if robots == 1:
+            if each:
+                raise ValueError("arena.networks is 'each', which goes with several robots. Set arena.robots")
+            return self
+        if self.records_behavior:
+            raise ValueError(
+                f"novelty.distance is {self.novelty.distance!r}, which compares where one robot ends, expected one "
+                f"that compares cells with arena.robots = {robots}"
+            )
+        if each and self.selection == "novelty":
+            raise ValueError(
+                "arena.networks is 'each', expected 'one' with selection 'novelty': cells are those of all robots"
+            )
+        if not (robots if each else 1) <= population <= MOST_TEAMS:
+            raise ValueError(
+                f"neat.population is {population:,}, expected {robots} to {MOST_TEAMS:,} with arena.robots = {robots}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _robot_and_arena_have_what_networks_see(self) -> Self:
+        self.on.check_robots(self.arena.arena())
+        self.on.check(self.arena.arena(), self.network_inputs, self.noise)
+        self.on.check_starts(self.placed_arena)
         return self
 
     @model_validator(mode="after")
@@ -203,24 +272,12 @@ class Condition(Settings):
     @property
     def label(self) -> str:
         """What every figure of this condition says, SIM; of a robot the ledger knows whether EMULATED or REAL."""
-        return self.tried_on.label
+        return self.on.label
 
     @property
     def is_physical(self) -> bool:
         """Whether its trials are driven by a robot, and scored into a ledger."""
-        return self.platform == "scribbler"
-
-    @property
-    def tried_on(self) -> JyroPlatform | SimPlatform | TwinPlatform | ScribblerPlatform:
-        """The settings of its platform."""
-        return self.scribbler if self.platform == "scribbler" else self.simulated_on
-
-    @property
-    def simulated_on(self) -> JyroPlatform | SimPlatform | TwinPlatform:
-        """The settings of the platform that computes its trials."""
-        if self.platform == "twin":
-            return self.twin
-        return self.sim if self.platform == "sim" else self.jyro
+        return self.on.is_physical
 
     @property
     def key(self) -> int:
@@ -233,8 +290,8 @@ class Condition(Settings):
         return self.task if isinstance(self.task, CoverageTask) else None
 
     @property
-    def fitness_task(self) -> Task:
-        """Its task where that is another than coverage."""
+    def task_of_trials(self) -> Task:
+        """Its task, as what scores trials."""
         if not isinstance(self.task, Task):
             raise TypeError(f"The task is {self.task!r}, which is no `Task`.")
         return self.task
@@ -242,15 +299,13 @@ class Condition(Settings):
     @property
     def drawn_names(self) -> tuple[str, ...]:
         """Dotted names of the numbers that are drawn for its trials, in the order in which records have them."""
-        if self.platform != "sim":
-            return ()
-        return sim_scene(self.sim, self.arena.arena(), self.network_inputs, self.noise).drawn_names
+        return self.on.drawn_names(self.arena.arena(), self.network_inputs, self.noise)
 
     @property
     def placed_arena(self) -> Arena:
         """Its arena, with what its platform's settings say of the arena's numbers; of what is drawn, the centers."""
         arena = self.arena.arena()
-        changed = self.sim.arena_numbers if self.platform == "sim" else {}
+        changed = self.on.arena_numbers
         return arena.with_numbers(changed) if changed else arena
 
     def arena_of(self, trial: Trajectory) -> Arena:
@@ -270,10 +325,17 @@ class Condition(Settings):
         return "line" if self.coverage is None else self.coverage.cells
 
     @property
+    def genome_columns(self) -> tuple[str, ...]:
+        """Columns of its rows that have the genomes of a trial."""
+        return ("genome", "partners") if self.arena.networks == "each" else ("genome",)
+
+    @property
     def network_inputs(self) -> tuple[str, ...]:
         """Names of what its networks see, in order."""
+        if self.controller.inputs:
+            return self.controller.inputs
         if self.coverage is None:
-            return tuple(self.fitness_task.inputs)
+            return tuple(self.task_of_trials.inputs)
         return self.coverage.input_names(self.selection)
 
     @property
@@ -286,23 +348,33 @@ class Condition(Settings):
         """Its NEAT in the form that kernels read."""
         inputs = self.network_inputs
         bias_input = inputs.index("bias") if "bias" in inputs else -1
-        return self.neat.rules(len(inputs), 2, bias_input=bias_input)
+        wheels = self.output_names == ("left", "right")
+        return self.neat.rules(len(inputs), 2, bias_input=bias_input, drives_wheels=wheels)
 
     @property
     def output_names(self) -> tuple[str, ...]:
         """Names of what its networks answer, in order."""
-        return ("move", "turn")
+        return self.controller.outputs
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
-        unused = {"jyro", "sim", "twin", "scribbler"} - {self.platform}
-        return self.model_dump(mode="json", exclude={"name", *unused})
+        return self.model_dump(mode="json", exclude={"name"})
+
+    @model_serializer(mode="wrap")
+    def _with_the_table_of_its_platform(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        values[self.platform] = values.pop("on")
+        if not values["controller"]:
+            del values["controller"]
+        return values
 
     def hash(self) -> str:
         """A hash of `settings` and, where random numbers depend on it, the name."""
         counted: dict[str, Any] = self.settings()
         if not self.pair:
             counted["name"] = self.name
+        if self.on.version:
+            counted["version"] = self.on.version
         text = json.dumps(counted, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -314,6 +386,12 @@ class Condition(Settings):
             RecordVersionError: They are not the settings of this version: one is missing, unknown or out of its
                 range. None is filled in: a default of today may not be what the study was run with.
         """
+        platform = str(settings.get("platform"))
+        if "platform" in settings and platform not in platform_names():
+            raise RecordVersionError(
+                f"Condition {name!r} is on platform {platform!r}, which is not installed. Install the package that "
+                "adds it."
+            )
         try:
             condition = cls.model_validate({"name": name, **settings})
         except ValidationError as error:
@@ -329,12 +407,34 @@ class Condition(Settings):
         return condition
 
 
-def _hashed(twin: dict[str, Any]) -> dict[str, Any]:
-    """Settings of a twin with the hash of its file."""
-    file = twin.get("file")
-    if not file or not isinstance(file, str):
-        raise ValueError("platform is 'twin', expected twin:FILE, with the file of the twin")
-    return twin if twin.get("sha256") else {**twin, "sha256": hash_elsewhere(file)}
+def _with_platform_of(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a condition that is made with a platform, `on`, instead of a name."""
+    on = values["on"]
+    if not isinstance(on, Platform):
+        raise ValueError(
+            f"on: expected a platform with its settings, such as SimPlatform(), came {shown(on)}"
+        )
+    name = getattr(type(on), "name", None)
+    if values.get("platform", name) != name:
+        raise ValueError(f"platform is {values['platform']!r}, expected {name!r}, which `on` is")
+    if name in platform_names() and type(on) is not platform_class(str(name)):
+        raise ValueError(
+            f"on: expected {platform_class(str(name)).__name__} for {name!r}, came {type(on).__name__}"
+        )
+    return {"platform": name, "noise": on.default_noise, **values}
+
+
+def _lines(error: ValidationError, within: tuple[str, ...]) -> list[InitErrorDetails]:
+    """The mistakes of an error, with the name of their table in front of their places."""
+    return [
+        {
+            "type": each["type"],
+            "loc": (*within, *each["loc"]),
+            "input": each["input"],
+            "ctx": each.get("ctx", {}),
+        }
+        for each in error.errors()
+    ]
 
 
 def _missing(given: Mapping[str, Any], full: Mapping[str, Any], place: str = "") -> Iterator[str]:

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.evolution import Genome, NoveltyArchive, Population, genome_record
-from realitygap.kernels._genome import first_genomes, make_genomes
+from realitygap.evolution import ControllerInterface, Genome, NoveltyArchive, Population, genome_record
+from realitygap.kernels.neat.genome import first_genomes, make_genomes
 
 from ._condition import Condition
 
-N_INPUTS = 3
 N_OUTPUTS = 2
 
 
@@ -50,8 +49,20 @@ class Told:
     novelty: tuple[float | None, ...]
 
 
+def population_of(condition: Condition, replicate: int) -> Population:
+    """Return the population of one run of a condition."""
+    bias = condition.has_bias_input
+    n_inputs = len(condition.network_inputs) - bias
+    return Population(n_inputs, N_OUTPUTS, condition.neat, replicate=replicate, bias=bias, key=condition.key)
+
+
+def named(genome: Genome, condition: Condition) -> Genome:
+    """Return a genome whose inputs and outputs have the condition's names."""
+    return genome.with_interface(ControllerInterface(condition.network_inputs, condition.output_names))
+
+
 class Evolution:
-    """One run: `ask` for a generation, `tell` the cells that each individual visited, and so on.
+    """One run: `ask` for a generation, `tell` what each individual is worth, and so on.
 
     What is asked is a function of the condition, the replicate and what was told: as in the whole runs that
     `run_replicates` carries out, by the same kernels and with the same random numbers. The novelty archive is updated
@@ -62,10 +73,7 @@ class Evolution:
         self._condition = condition
         self._replicate = replicate
         self.generation = 0
-        bias = condition.has_bias_input
-        self._population = Population(
-            N_INPUTS, N_OUTPUTS, condition.neat, replicate=replicate, bias=bias, key=condition.key
-        )
+        self._population = population_of(condition, replicate)
         self._grid = condition.arena.arena().grid
         grid = self._grid
         is_novelty = condition.selection == "novelty"
@@ -74,31 +82,37 @@ class Evolution:
         )
 
     def ask(self) -> list[Asked]:
-        """This generation, in the order in which `tell` wants their cells."""
-        if self._condition.selection == "random":
-            return [Asked(genome, 0, ()) for genome in self._unrelated()]
+        """This generation, in the order in which `tell` wants their scores."""
+        condition = self._condition
+        if condition.selection == "random":
+            return [Asked(named(genome, condition), 0, ()) for genome in self._unrelated()]
         return [
-            Asked(genome, int(species), tuple(int(parent) for parent in parents if parent >= 0))
+            Asked(
+                named(genome, condition),
+                int(species),
+                tuple(int(parent) for parent in parents if parent >= 0),
+            )
             for genome, species, parents in zip(
                 self._population.ask(), self._population.species, self._population.parents, strict=True
             )
         ]
 
-    def tell(self, cells: Sequence[Sequence[int]]) -> Told:
-        """Take the cells that each individual visited, and breed the next generation.
+    def tell(self, scores: Sequence[float], cells: Sequence[Sequence[int]]) -> Told:
+        """Take what a generation is worth, and breed the next one.
 
         Args:
-            cells: n lists, in the order of individuals; their order within a list does not matter.
+            scores: (n,) by the task, in the order of individuals, such as coverage 0..1.
+            cells: n lists of visited cells, by which novelty selects; their order within a list does not matter.
 
         Raises:
-            ValueError: Another number of lists, or a cell outside the grid.
+            ValueError: Another number of individuals, or a cell outside the grid.
         """
         n = self._condition.neat.population
-        if len(cells) != n:
-            raise ValueError(f"There are cells of {len(cells)} individuals, expected {n}.")
-        coverage = [len(set(each)) / self._grid.n_cells for each in cells]
+        for what, given in (("scores", scores), ("cells", cells)):
+            if len(given) != n:
+                raise ValueError(f"There are {what} of {len(given)} individuals, expected {n}.")
         if self._archive is None:
-            told = Told(tuple(coverage), (None,) * n)
+            told = Told(tuple(scores), (None,) * n)
         else:
             novelty = tuple(float(value) for value in self._archive.update(cells))
             told = Told(novelty, novelty)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all
-from realitygap.kernels import _maze
-from realitygap.kernels._novelty import admit
-from realitygap.kernels._points import point_novelty
+from realitygap.kernels.neat.novelty import admit
+from realitygap.kernels.neat.points import point_novelty
+from realitygap.kernels.tasks import maze
 from realitygap.tasks import MazeAgent, MazeTask
 from realitygap.trials import maze_exit, maze_rules, maze_scene
 from realitygap.world import Arena
@@ -100,14 +100,14 @@ class MazeTrials:
     ) -> tuple[NDArray[np.float64], NDArray[np.int32], Any]:
         neat = genomes[0].rules
         networks = decode_all(genomes)
-        lanes, wiring = _maze.make_maze_block(self._scene, neat, networks.place.shape[1])
-        trace = _maze.make_maze_trace(
+        lanes, wiring = maze.make_maze_block(self._scene, neat, networks.place.shape[1])
+        trace = maze.make_maze_trace(
             self._scene.heading, neat.n_inputs, self.agent.steps if n_kept else -1, max(n_kept, 1)
         )
         n = len(genomes)
         ends = np.zeros((n, 2))
         arrived = np.full(n, -1, np.int32)
-        n_tried = _maze.run_maze_trials(
+        n_tried = maze.run_maze_trials(
             self._scene,
             maze_rules(self._arena, self.agent, genomes[0].bias_value),
             neat,

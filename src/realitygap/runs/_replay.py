@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from realitygap.errors import RecordError
-from realitygap.evolution import ControllerInterface, Genome, genome_from_record
-from realitygap.trials import NoiseKey, Trajectory, trace_genome
+from realitygap.evolution import Genome, genome_from_record
+from realitygap.platforms import trace_genome
+from realitygap.trials import NoiseKey, Trajectory
 
 from ._condition import Condition
+from ._evolution import named
 
 _COLUMNS = (
     *("condition", "replicate", "generation", "individual", "genome", "key"),
@@ -20,8 +22,16 @@ _COLUMNS = (
 
 def genome_of(condition: Condition, row: Mapping[str, Any]) -> Genome:
     """The genome of a row of results, whose inputs and outputs have the condition's names."""
-    genome = genome_from_record(row["genome"], condition.neat_rules, condition.neat.bias_value)
-    return genome.with_interface(ControllerInterface(condition.network_inputs, condition.output_names))
+    return _genome_from(condition, row["genome"])
+
+
+def partners_of(condition: Condition, row: Mapping[str, Any]) -> list[Genome]:
+    """The genomes of the other robots of a row's trial; none if all robots have the row's genome."""
+    return [_genome_from(condition, partner) for partner in row.get("partners") or ()]
+
+
+def _genome_from(condition: Condition, record: Mapping[str, Any]) -> Genome:
+    return named(genome_from_record(record, condition.neat_rules, condition.neat.bias_value), condition)
 
 
 def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> Trajectory:
@@ -35,9 +45,9 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
         The trajectory.
 
     Raises:
-        RecordError: The row lacks a column, or the trial comes out otherwise than the row says: the row and the
-            condition do not belong together, or another version computed it. Cells in their order, both
-            coverages, blocked steps and the key are compared.
+        RecordError: The row lacks a column, or genomes of the other robots. Or the trial comes out otherwise than
+            the row says: the row and the condition do not belong together, or another version computed it. Cells in
+            their order, both coverages, blocked steps and the key are compared.
         RecordVersionError: The settings are not those of this version.
         TypeError: The condition is something else.
     """
@@ -52,13 +62,16 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
                 f"condition is {condition!r}, expected a Condition, or its settings as in study.json."
             )
         condition = Condition.from_settings(row["condition"], dict(condition.get("settings", condition)))
+    if condition.arena.networks == "each" and not row.get("partners"):
+        raise RecordError("The row lacks partners: expected a row with the genomes of the other robots.")
     trajectory = trace_genome(
-        condition.simulated_on,
+        condition.on,
         condition.arena.arena(),
         genome_of(condition, row),
         noise=condition.noise,
         noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
         inputs=condition.network_inputs,
+        partners=partners_of(condition, row),
     )
     difference = _difference(condition, trajectory, row)
     if difference:
@@ -90,7 +103,7 @@ def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, 
     again = {
         "coverage_line": trajectory.coverage_line,
         "coverage_ends": trajectory.coverage_ends,
-        "stalls": int(trajectory.stalled.sum()),
+        "stalls": trajectory.n_stalls,
     }
     differing = [
         f"{name} is {value} when run again, {row[name]} in its row"

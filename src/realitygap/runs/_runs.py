@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from realitygap.errors import OutgrownError, whole_number
 from realitygap.evolution import distance_kind
-from realitygap.kernels import _block, _run
-from realitygap.kernels._block import RunRows, RunRules
+from realitygap.kernels.neat import block
+from realitygap.kernels.neat.block import RunRows, RunRules
 from realitygap.records import list_column, schema_with
-from realitygap.trials import jyro_rules, jyro_scene
 
 from ._condition import Condition
 from ._staged import run_staged
+from ._teams import draw_teams
 
 # The largest genome that a run may grow.
 MOST_GENES = 16_384
@@ -35,13 +35,13 @@ def run_rules(condition: Condition) -> RunRules:
     """What its runs select for, in the form that kernels read."""
     novelty = condition.novelty
     selection = {
-        "coverage": _block.COVERAGE,
-        "fitness": _block.COVERAGE,
-        "novelty": _block.NOVELTY,
-        "random": _block.RANDOM,
+        "coverage": block.COVERAGE,
+        "fitness": block.COVERAGE,
+        "novelty": block.NOVELTY,
+        "random": block.RANDOM,
     }[condition.selection]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
-        selection = _block.NEAREST_NOVELTY
+        selection = block.NEAREST_NOVELTY
     return RunRules(
         n_generations=condition.neat.generations,
         population=condition.neat.population,
@@ -104,8 +104,8 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
     """
     if condition.is_physical:
         raise ValueError(
-            f"Condition {condition.name!r} is tried on a robot, expected one with platform 'jyro' or 'sim'. Drive it: "
-            "realitygap run STUDY --port PORT."
+            f"Condition {condition.name!r} is tried on a robot, expected one that is computed. Drive it: "
+            "realitygap drive STUDY --port PORT."
         )
     first_replicate = whole_number("first_replicate", first_replicate, 0, MAX_REPLICATES - 1)
     n_runs = whole_number("n_runs", n_runs, 1, MAX_REPLICATES - first_replicate)
@@ -129,25 +129,26 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
 
 
 def _is_whole(condition: Condition) -> bool:
-    """Whether the whole-run kernel knows its platform and its task."""
-    return condition.platform == "jyro" and condition.coverage is not None
+    """Whether its platform computes whole evolutions of its task."""
+    return condition.on.runs_whole and condition.coverage is not None
 
 
 def _run_whole(
     condition: Condition, rules: RunRules, first_replicate: int, rows: RunRows, room: int, hidden_room: int
 ) -> bool:
-    """All runs in one call of the whole-run kernel, which knows the platform `jyro` and its task; as `run_staged`."""
-    scene = jyro_scene(condition.jyro, condition.arena.arena())
-    neat = condition.neat_rules
-    trial = jyro_rules(
-        condition.jyro,
+    """All runs in one call of the platform; as `run_staged`."""
+    return condition.on.run_whole(
+        condition.arena.arena(),
+        condition.neat_rules,
+        rules,
+        inputs=condition.network_inputs,
         noise=condition.noise,
-        bias_input=condition.has_bias_input,
         bias_value=condition.neat.bias_value,
+        key=condition.key,
+        first_replicate=first_replicate,
+        rows=rows,
+        room=(room, hidden_room),
     )
-    space = _run.make_run_room(scene, neat, rules, rows.fitness.shape[0], room, hidden_room)
-    key = np.uint64(condition.key)
-    return bool(_run.run_replicates(scene, trial, neat, rules, key, first_replicate, space, rows))
 
 
 def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
@@ -160,8 +161,9 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
     done: list[dict[str, Any]] = []
     for condition in least or [_least(Condition(name="least"))]:
         # what kernels are compiled for: types, and not numbers
-        like: dict[str, Any] = {"platform": condition.platform, "precision": condition.simulated_on.precision}
+        like: dict[str, Any] = {"platform": condition.platform, "is_single": condition.on.is_single}
         like |= {"task": condition.task.model_dump(), "whole": _is_whole(condition)}
+        like["several"] = condition.arena.robots > 1
         if like not in done:
             done.append(like)
             run_rows(condition, 0, 1)
@@ -169,9 +171,9 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
 
 def _least(condition: Condition) -> Condition:
     """The condition with a population of two that live for one step, and have children."""
-    short = condition.simulated_on.model_copy(update={"steps": 1})
+    short = condition.on.model_copy(update={"steps": 1})
     neat = condition.neat.model_copy(update={"population": 2, "generations": 2})
-    return condition.model_copy(update={condition.platform: short, "neat": neat})
+    return condition.model_copy(update={"on": short, "neat": neat})
 
 
 def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
@@ -223,13 +225,15 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
     ).to_struct("genome")
     novelty = pl.Series("novelty", flat(rows.novelty)).fill_nan(None)
     extra: dict[str, Any] = {}
-    if condition.platform == "sim":
+    if condition.on.records_draws:
         extra["drawn"] = list_column(flat(rows.drawn), np.full(total, rows.drawn.shape[-1]))
     if condition.coverage is None:
         extra["task_fitness"] = flat(rows.task_fitness)
     if condition.records_behavior:
         start = condition.placed_arena.start
         extra["behavior"] = list_column(flat(rows.ended) + np.array([start.x, start.y]), np.full(total, 2))
+    if condition.arena.networks == "each":
+        extra["partners"] = _partners(condition, genome, first_replicate, n_runs)
     return pl.DataFrame(
         {
             "condition": pl.repeat(condition.name, total, dtype=pl.String, eager=True),
@@ -252,3 +256,20 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
         },
         schema=schema_with(extra),
     )
+
+
+def _partners(condition: Condition, genomes: pl.Series, first_replicate: int, n_runs: int) -> pl.Series:
+    """The genomes of the other robots of each trial, shape (n,) of lists."""
+    n, n_robots = condition.neat.population, condition.arena.robots
+    which = np.concatenate(
+        [
+            draw_teams(condition.key, replicate, generation, n, n_robots)[:, 1:]
+            + n * (condition.neat.generations * (replicate - first_replicate) + generation)
+            for replicate in range(first_replicate, first_replicate + n_runs)
+            for generation in range(condition.neat.generations)
+        ]
+    )
+    frame = pl.DataFrame(
+        {"trial": np.repeat(np.arange(len(which)), n_robots - 1), "genome": genomes.gather(which.ravel())}
+    )
+    return frame.group_by("trial", maintain_order=True).agg("genome")["genome"]

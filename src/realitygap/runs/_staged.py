@@ -12,22 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels import _block
-from realitygap.kernels._block import NoveltyRoom, RunRows, RunRules, Runs
-from realitygap.kernels._genome import Genomes, make_genomes
-from realitygap.kernels._lanes import LANES
-from realitygap.kernels._network import Networks, make_networks
-from realitygap.trials import open_trials, trajectories_of
+from realitygap.kernels.neat import block as block_kernels
+from realitygap.kernels.neat.block import NoveltyRoom, RunRows, RunRules, Runs
+from realitygap.kernels.neat.genome import Genomes, make_genomes
+from realitygap.kernels.neat.network import Networks, make_networks
+from realitygap.platforms import open_trials, scores_of, traced_at_once
 
 from ._condition import Condition
+from ._teams import draw_teams, mean_of_teams
 
 # Trials of a block: so many that calls from Python cost little beside them, so few that a block stays near.
 BLOCK_TRIALS = 4096
 LEAST_RUNS = 32
-
-
-# Of what is kept of every step at once, for tasks that look at it: near enough to stay in the cache.
-TRACE_BYTES = 8_000_000
 
 
 class _Block(NamedTuple):
@@ -94,9 +90,9 @@ class _Staged:
         self.condition, self.rules, self.together = condition, rules, together
         self.arena = condition.arena.arena()
         self.neat = condition.neat_rules
-        self.task = None if condition.coverage is not None else condition.fitness_task
+        self.task = None if condition.coverage is not None else condition.task_of_trials
         self.trials = open_trials(
-            condition.simulated_on,
+            condition.on,
             self.arena,
             self.neat,
             inputs=condition.network_inputs,
@@ -105,30 +101,33 @@ class _Staged:
         )
         grid, n_trials = self.arena.grid, together * rules.population
         self.block = _Block(
-            runs=_block.make_runs(rules, grid.n_cells, together),
+            runs=block_kernels.make_runs(rules, grid.n_cells, together),
             genomes=make_genomes(n_trials, self.neat.n_outputs, room, hidden_room),
             children=make_genomes(n_trials, self.neat.n_outputs, room, hidden_room),
             networks=make_networks(n_trials, self.neat, room, hidden_room),
             which=np.arange(n_trials, dtype=np.int32),
             counters=np.zeros((n_trials, 3), np.uint32),
-            novelty=_block.make_novelty_room(rules, grid.columns, grid.rows),
+            novelty=block_kernels.make_novelty_room(rules, grid.columns, grid.rows),
         )
+        self.which = self.block.which
+        self.teams = np.empty((0, rules.population, self.arena.n_robots), np.int32)
 
     def carry_out(self, first_replicate: int, n_runs: int, rows: RunRows, first_row: int) -> bool:
         """A block of runs from the first generation to the last; whether all genomes found room."""
         neat, rules, block = self.neat, self.rules, self.block
         key, first = np.uint64(self.condition.key), np.int64(first_replicate)
         runs, genomes, children = block.runs, block.genomes, block.children
-        _block.begin_runs(runs, genomes, n_runs, neat, rules, key, first)
+        block_kernels.begin_runs(runs, genomes, n_runs, neat, rules, key, first)
         if genomes.full[0]:
             return False
         for generation in range(rules.n_generations):
-            _block.decode_runs(
+            block_kernels.decode_runs(
                 genomes, block.networks, block.counters, n_runs, neat, rules, key, first, generation
             )
+            self._choose_teams(first_replicate, n_runs, generation)
             scored = self._try(n_runs * rules.population)
             self._select(scored, n_runs)
-            _block.keep_runs(
+            block_kernels.keep_runs(
                 runs,
                 genomes,
                 n_runs,
@@ -141,32 +140,36 @@ class _Staged:
             )
             self._keep(scored, n_runs, rows, first_row, generation)
             if generation + 1 < rules.n_generations:
-                _block.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
+                block_kernels.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
             if children.full[0]:
                 return False
             genomes, children = children, genomes
         return True
 
+    def _choose_teams(self, first_replicate: int, n_runs: int, generation: int) -> None:
+        """Choose the networks of the trials of a generation, if each robot has another one."""
+        if self.condition.arena.networks == "one":
+            return
+        n, key, n_robots = self.rules.population, self.condition.key, self.arena.n_robots
+        self.teams = np.stack(
+            [draw_teams(key, first_replicate + run, generation, n, n_robots) for run in range(n_runs)]
+        )
+        first = np.arange(n_runs, dtype=np.int32)[:, None, None] * np.int32(n)
+        self.which = (self.teams + first).reshape(-1, n_robots)
+
     def _try(self, n: int) -> _Scored:
         """All trials of a generation: at once, or portions of which every step is kept."""
         if self.task is None or not self.task.needs_trace:
             return self._try_some(0, n)
-        size = self._traced_at_once()
+        size = traced_at_once(self.trials, self.neat.n_inputs, is_single=self.condition.on.is_single)
         parts = [self._try_some(first, min(first + size, n)) for first in range(0, n, size)]
         return _Scored(*(np.concatenate(values) for values in zip(*parts, strict=True)))
-
-    def _traced_at_once(self) -> int:
-        """Trials whose steps fit into `TRACE_BYTES`, at least one block of lanes."""
-        numbers = 10 + 2 * len(self.trials.sensors) + self.neat.n_inputs
-        size = 4 if self.condition.simulated_on.precision == "single" else 8
-        blocks = TRACE_BYTES // (size * numbers * (self.trials.n_steps + 1) * LANES)
-        return max(1, blocks) * LANES
 
     def _try_some(self, first: int, last: int) -> _Scored:
         """Trials `first` up to `last` of a generation, scored by the task."""
         tried = self.trials.carry_out(
             self.block.networks,
-            self.block.which[first:last],
+            self.which[first:last],
             self.condition.key,
             self.block.counters[first:last],
             ends=self._is_novelty and self.rules.count_ends,
@@ -175,25 +178,29 @@ class _Staged:
         batch = tried.batch
         fitness = np.empty(0)
         if self.task is not None:
-            seen = trajectories_of(self.trials, tried, self.condition.network_inputs)
-            fitness = np.asarray(self.task.fitness(seen, self.trials.arena), np.float64)
+            fitness = scores_of(self.task, self.trials, tried, self.condition.network_inputs)
         counts = np.stack([batch.n_line, batch.n_ends, batch.n_stalls], axis=1)
         return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness)
 
     @property
     def _is_novelty(self) -> bool:
-        return self.rules.selection in (_block.NOVELTY, _block.NEAREST_NOVELTY)
+        return self.rules.selection in (block_kernels.NOVELTY, block_kernels.NEAREST_NOVELTY)
 
     def _select(self, scored: _Scored, n_runs: int) -> None:
         """What selection uses, into the block's fitness."""
         runs, rules = self.block.runs, self.rules
         if self.task is None:
-            _block.cover_runs(runs, n_runs, scored.counts, rules, self.arena.grid.n_cells)
+            block_kernels.cover_runs(runs, n_runs, scored.counts, rules, self.arena.grid.n_cells)
         else:
             runs.fitness[:n_runs] = scored.fitness.reshape(n_runs, -1)
+        if self.condition.arena.networks == "each":
+            for run, teams in enumerate(self.teams):
+                runs.fitness[run] = mean_of_teams(runs.fitness[run], teams)
         if self._is_novelty:
             visited = scored.ends if rules.count_ends else scored.cells
-            _block.select_novel(runs, n_runs, visited, scored.counts, scored.ended, rules, self.block.novelty)
+            block_kernels.select_novel(
+                runs, n_runs, visited, scored.counts, scored.ended, rules, self.block.novelty
+            )
 
     def _keep(self, scored: _Scored, n_runs: int, rows: RunRows, first_row: int, generation: int) -> None:
         """What the kernels do not keep."""

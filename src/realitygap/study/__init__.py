@@ -1,31 +1,33 @@
 """Studies: conditions x replicates, read from a file, carried out, taken up again."""
 
+from realitygap.platforms import open_target
+
 from ._bench import measure_speed
-from ._calibrate import calibrate, calibrate_from, save_calibration
-from ._calibrate_all import calibrate_all
-from ._calibrate_kinds import NO_LINE
-from ._camera_attendant import CameraAttendant, Looking
-from ._camera_operator import CameraOperator
+from ._calibrate.kinds import NO_LINE
+from ._calibrate.one import calibrate, calibrate_from, save_calibration
+from ._calibrate.whole import calibrate_all
+from ._camera_observer import CameraObserver, Looking
 from ._camera_spec import marks_of, read_camera, tag_of
-from ._closing import ClosingProgress, closing_the_gap
-from ._closing_plan import NAME as CLOSING
-from ._closing_plan import SMALL, ClosingPlan
-from ._closing_summary import summarize_closing
-from ._code import AllowCode, check_files, python_tasks
+from ._closing.plan import NAME as CLOSING
+from ._closing.plan import SMALL, ClosingPlan
+from ._closing.study import ClosingProgress, closing_the_gap
+from ._closing.summary import summarize_closing
+from ._code import AllowCode, check_files, python_tasks, task_named
 from ._controllers import Controller, sample_controllers
 from ._executors import usable_processors
-from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study
-from ._gap import MOST_CONTROLLERS, GapStudy, run_gap, study_gap
-from ._gap_between import GapBetween, gap_between
-from ._gap_plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
+from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
+from ._gap.between import GapBetween, gap_between
+from ._gap.plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
+from ._gap.study import MOST_CONTROLLERS, GapStudy, study_gap
+from ._gap.why import PARTS, part_of, why_gap
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
 from ._realism import measure_realism
 from ._robot import connect_robot
-from ._run import Progress, StudyResult, drive_study, machine_facts, refuse_port_without_robot, run_study
+from ._run import Progress, StudyResult, check_has_robot, drive_study, machine_facts, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
-from ._targets import observations_head, open_target
+from ._targets import observations_head
 from ._task import measure_task, task_settings
 from ._template import study_template
 from ._tracked import (
@@ -38,12 +40,10 @@ from ._tracked import (
     trial_of_file,
     trial_of_ledger,
 )
-from ._transfer import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
-from ._transfer_result import Estimate, Strategist, Transferred, TransferResult, estimate_mean
-from ._transfer_target import KeptTarget
+from ._transfer.result import Strategist, Transferred, TransferResult, estimate_mean
+from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._try_on import try_on
-from ._why import PARTS, calibration_of, part_of, why_gap
-from ._wrapped_targets import Guide, StoppedByPerson
+from ._wrapped_targets import StoppedByPerson
 
 __all__ = [
     "CLOSING",
@@ -56,18 +56,14 @@ __all__ = [
     "SMALL",
     "STRATEGIES",
     "AllowCode",
-    "CameraAttendant",
-    "CameraOperator",
+    "CameraObserver",
     "ClosingPlan",
     "ClosingProgress",
     "ConditionNotes",
     "Controller",
-    "Estimate",
     "GapBetween",
     "GapPlan",
     "GapStudy",
-    "Guide",
-    "KeptTarget",
     "Looking",
     "PhysicalResult",
     "PhysicalStudy",
@@ -87,8 +83,8 @@ __all__ = [
     "calibrate",
     "calibrate_all",
     "calibrate_from",
-    "calibration_of",
     "check_files",
+    "check_has_robot",
     "choose_condition",
     "closing_the_gap",
     "connect_robot",
@@ -115,11 +111,10 @@ __all__ = [
     "place_trial",
     "placing_words",
     "plan_gap",
+    "platform_sections",
     "python_tasks",
     "read_camera",
     "recorded_spreads",
-    "refuse_port_without_robot",
-    "run_gap",
     "run_study",
     "sample_controllers",
     "save_calibration",
@@ -129,6 +124,7 @@ __all__ = [
     "study_template",
     "summarize_closing",
     "tag_of",
+    "task_named",
     "task_settings",
     "transfer",
     "trial_of_file",

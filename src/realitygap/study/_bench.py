@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import llvmlite
 import numba
@@ -17,11 +17,12 @@ import polars
 
 from realitygap._version import __version__
 from realitygap.evolution import Population, decode_all
-from realitygap.kernels._peak import peak_flops
-from realitygap.kernels._trial import make_block, make_trace, run_trials
+from realitygap.kernels.jyro.trial import make_block, make_trace, run_trials
+from realitygap.kernels.math.peak import peak_flops
+from realitygap.platforms import JyroPlatform, jyro_rules, jyro_scene
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
-from realitygap.trials import NoiseKey, counters_of, jyro_rules, jyro_scene
+from realitygap.trials import NoiseKey, counters_of
 
 from ._executors import usable_processors
 from ._file import load_study
@@ -86,8 +87,8 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
 
 def _share_without_trials(condition: Condition, rate: float, seconds: float) -> float:
     """Of a run's time; from runs whose trials last one step."""
-    steps = condition.jyro.steps
-    short = condition.model_copy(update={"jyro": condition.jyro.model_copy(update={"steps": 1})})
+    steps = condition.on.steps
+    short = condition.model_copy(update={"on": condition.on.model_copy(update={"steps": 1})})
     work = _run_work(short)
     work(0)
     whole, least = 1 / rate, 1 / _rate(work, 1, seconds)
@@ -136,8 +137,9 @@ def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
     settings = condition.neat.model_copy(update=changes)
     genomes = Population(3, 2, settings, seed=condition.seed, bias=False).ask()
     networks, neat = decode_all(genomes), genomes[0].rules
-    scene = jyro_scene(condition.jyro, condition.arena.arena())
-    rules = jyro_rules(condition.jyro, noise=condition.noise, bias_input=False, bias_value=1.0)
+    platform = cast("JyroPlatform", condition.on)
+    scene = jyro_scene(platform, condition.arena.arena())
+    rules = jyro_rules(platform, noise=condition.noise, bias_input=False, bias_value=1.0)
     rows = np.arange(TRIALS_PER_CALL, dtype=np.int32)
     nothing = make_trace(scene.heading, scene.sensors.shape[0], neat.n_inputs, -1, 1)
     no_ends = np.zeros((0, scene.columns * scene.rows), np.uint8)
@@ -165,7 +167,7 @@ def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
             counts,
             nothing,
         )
-        return TRIALS_PER_CALL * condition.jyro.steps
+        return TRIALS_PER_CALL * condition.on.steps
 
     return work
 

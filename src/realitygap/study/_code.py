@@ -7,7 +7,16 @@ from pathlib import Path
 
 from realitygap.errors import StudyError, TaskError
 from realitygap.runs import Condition
-from realitygap.tasks import PYTHON, PythonTask, is_allowed, not_allowed, read_task_file, source_hash
+from realitygap.tasks import (
+    PYTHON,
+    PythonTask,
+    Task,
+    as_task,
+    is_allowed,
+    not_allowed,
+    read_task_file,
+    source_hash,
+)
 
 from ._study import Study
 
@@ -50,6 +59,38 @@ def with_code(condition: Condition) -> Condition:
     return (
         condition.model_copy(update={"task": task.allowed()}) if isinstance(task, PythonTask) else condition
     )
+
+
+def allowed_task(condition: Condition, allow_code: bool) -> Condition:
+    """Return a condition whose task may score trials.
+
+    Raises:
+        TaskError: It is a Python task that the user has not allowed.
+    """
+    task = condition.task
+    if isinstance(task, PythonTask) and not (task.may_run or allow_code or is_allowed(task.sha256)):
+        raise TaskError(not_allowed(task))
+    return with_code(condition)
+
+
+def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
+    """Return a task by its kind, with its defaults, or by its Python file.
+
+    Raises:
+        StudyError: There is no such task.
+        TaskError: Its Python file cannot be read, or is not allowed.
+    """
+    if not isinstance(task, str):
+        return task
+    if not task.startswith(PYTHON):
+        try:
+            return as_task({"kind": task})  # type: ignore[no-any-return]  # by its kind
+        except ValueError as error:
+            raise StudyError(f"--task: {error}") from None
+    own = PythonTask.from_file(task)
+    if not (allow_code or is_allowed(own.sha256)):
+        raise TaskError(not_allowed(own))
+    return own.allowed()
 
 
 def check_files(study: Study, folder: Path) -> None:

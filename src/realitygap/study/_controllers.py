@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,17 +12,19 @@ import polars as pl
 
 from realitygap.errors import StudyError, whole_number
 from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.platforms import RecordedPlatform, RecordedTarget, score_genomes, split_spec
 from realitygap.records import ResultsFolder
-from realitygap.runs import Condition, genome_of, run_replicates
-from realitygap.trials import NoiseKey, RecordedTarget, retry_genomes
+from realitygap.runs import Condition, genome_of, partners_of, run_replicates
+from realitygap.tasks import CoverageTask, Task
+from realitygap.trials import NoiseKey
 
+from ._code import allowed_task
 from ._file import DEFAULT_NEAT, load_study
 
 FRESH_TRIALS = 20
 """How often a champion is tried again where it was selected, each time on noise of its own."""
 
-_COLUMNS = ["replicate", "generation", "individual", "genome", "key", "coverage_line", "coverage_ends"]
-_PAPER_INPUTS = ("obstacle", "stall", "time")
+_COLUMNS = ["replicate", "generation", "individual", "key"]
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,11 @@ class Controller:
         genome: Its network.
         name: Such as random-3, or coverage-10/7 for the champion of run 7.
         kind: random, or champion.
-        selected_score: Coverage [0..1] for which it was selected; None where it was not.
-        fresh_score: Its mean coverage on fresh noise where it was selected; None where it was not, or where that
+        selected_score: Score for which it was selected, such as coverage [0..1]; None where it was not.
+        fresh_score: Its mean score on fresh noise where it was selected; None where it was not, or where that
             cannot be computed.
         selected_on: The platform where it was selected; empty where it was not.
+        condition: In which it was selected; None where it was not.
     """
 
     genome: Genome
@@ -45,27 +48,33 @@ class Controller:
     selected_score: float | None = None
     fresh_score: float | None = None
     selected_on: str = ""
+    condition: Condition | None = None
 
 
-def sample_controllers(kind: str | Path, n: int, seed: int = 1) -> list[Controller]:
-    """Draw n controllers with the inputs of the paper.
+def sample_controllers(
+    kind: str | Path, n: int, seed: int = 1, *, allow_code: bool = False
+) -> list[Controller]:
+    """Draw n controllers.
 
     Args:
-        kind: `random` (unrelated networks of the paper's NEAT), a folder of results, of whose champions n are drawn,
-            or the name or file of a study, of whose first condition that can be computed n runs are made.
+        kind: `random` (unrelated networks of the paper's NEAT, with the paper's inputs), a folder of results, of whose
+            champions n are drawn, or the name or file of a study, of whose first condition that can be computed n runs
+            are made. With several tasks, that is coverage, or else the first task.
         n: How many, at least 1.
         seed: Of the draw, and of the runs of a study.
+        allow_code: Whether the Python file of a task may run that the user has not allowed before.
 
     Raises:
         ValueError: n is out of range.
         StudyError: There is no such study, it has no condition of use, or there are not so many champions.
         RecordError: There are no such results.
+        TaskError: The Python file of a task is not allowed.
     """
     n = whole_number("n", n, 1)
     if str(kind) == "random":
         return _random(n, seed)
     if Path(kind).is_dir():
-        found = _of_folder(ResultsFolder.open(kind), kind)
+        found = _of_folder(ResultsFolder.open(kind), kind, allow_code)
         if len(found) < n:
             raise StudyError(
                 f"{kind} has champions of {len(found)} runs, and {n} controllers are asked for. Run more replicates, "
@@ -73,7 +82,25 @@ def sample_controllers(kind: str | Path, n: int, seed: int = 1) -> list[Controll
             )
         chosen = sorted(np.random.default_rng(seed).permutation(len(found))[:n])
         return _with_fresh_scores([found[k] for k in chosen])
-    return _with_fresh_scores(_of_study(kind, n, seed))
+    return _with_fresh_scores(_of_study(kind, n, seed, allow_code))
+
+
+def task_of(controllers: Sequence[Controller]) -> Task:
+    """Return the task for which controllers were selected; coverage of the driven line if they were not."""
+    for each in controllers:
+        if each.condition is not None:
+            return each.condition.task_of_trials
+    return CoverageTask()
+
+
+def have_same_score(one: Task, other: Task) -> bool:
+    """Return whether two tasks score trials alike, whatever their networks see."""
+    return _score_settings(one) == _score_settings(other)
+
+
+def _score_settings(task: Any) -> dict[str, Any]:
+    sensed = ("inputs", "bias_input", "time_input")
+    return {"name": task.name, **{k: v for k, v in task.model_dump().items() if k not in sensed}}
 
 
 def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
@@ -85,8 +112,8 @@ def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
     Raises:
         RecordError: The file cannot be read.
     """
-    name, _, path = target.partition(":")
-    if name != "recorded" or not path:
+    name, path = split_spec(target)
+    if name != RecordedPlatform.name or not path:
         return []
     found = RecordedTarget(path).controllers
     least = min(n for _, n in found)
@@ -113,46 +140,55 @@ class _Champion:
         return Controller(
             genome_of(self.condition, self.row),
             f"{self.condition.name}/{self.row['replicate']}",
-            selected_score=float(self.row[f"coverage_{self.condition.counted_cells}"]),
+            selected_score=float(self.row[_column_of(self.condition)]),
             selected_on=self.condition.platform,
+            condition=self.condition,
         )
 
 
-def _of_folder(folder: ResultsFolder, name: str | Path) -> list[_Champion]:
+def _of_folder(folder: ResultsFolder, name: str | Path, allow_code: bool) -> list[_Champion]:
+    described = folder.description["conditions"]
+    conditions = [Condition.from_settings(each["name"], dict(each["settings"])) for each in described]
+    selected = [each for each in conditions if each.selection != "random"]
+    if not selected:
+        raise StudyError(f"{name} has no champions: nothing was selected. Name other results, or `random`.")
     found: list[_Champion] = []
-    for described in folder.description["conditions"]:
-        condition = Condition.from_settings(described["name"], dict(described["settings"]))
-        if _is_of_use(condition):
-            rows = folder.read(condition.name, columns=_COLUMNS)
+    first = _coverage_first(selected)[0]
+    for condition in selected:
+        if have_same_score(condition.task_of_trials, first.task_of_trials):
+            rows = folder.read(
+                condition.name, columns=[*_COLUMNS, *condition.genome_columns, _column_of(condition)]
+            )
+            condition = allowed_task(condition, allow_code)
             found += [_Champion(condition, row) for row in _best_of_runs(condition, rows)]
-    if not found:
-        raise StudyError(
-            f"{name} has no champions of the task coverage whose networks see {', '.join(_PAPER_INPUTS)}, as targets "
-            "show it. Name other results, or `random`."
-        )
     return found
 
 
-def _of_study(name: str | Path, n: int, seed: int) -> list[_Champion]:
+def _of_study(name: str | Path, n: int, seed: int, allow_code: bool) -> list[_Champion]:
     study = load_study(name, seed=seed, replicates=n)
-    for condition in study.conditions:
-        if _is_of_use(condition) and not condition.is_physical:
+    for condition in _coverage_first(study.conditions):
+        if condition.selection != "random" and not condition.is_physical:
+            condition = allowed_task(condition, allow_code)
             rows = run_replicates(condition, 0, n)
             return [_Champion(condition, row) for row in _best_of_runs(condition, rows)]
     raise StudyError(
-        f"The study {name} has no condition of the task coverage that can be computed and whose networks see "
-        f"{', '.join(_PAPER_INPUTS)}. Name another, or `random`."
+        f"The study {name} has no condition with selection that can be computed. Name another, or `random`."
     )
 
 
-def _is_of_use(condition: Condition) -> bool:
-    inputs = tuple(name for name in condition.network_inputs if name != "bias")
-    return condition.coverage is not None and condition.selection != "random" and inputs == _PAPER_INPUTS
+def _coverage_first(conditions: Sequence[Condition]) -> list[Condition]:
+    """Return conditions in their order, but those of the paper's task before the others."""
+    return sorted(conditions, key=lambda each: each.coverage is None)
+
+
+def _column_of(condition: Condition) -> str:
+    """Return the column of the score for which a condition selects, or, with novelty, of its task's."""
+    return "task_fitness" if condition.coverage is None else f"coverage_{condition.counted_cells}"
 
 
 def _best_of_runs(condition: Condition, rows: pl.DataFrame) -> Iterator[dict[str, Any]]:
     """The first of the best in each run."""
-    column = f"coverage_{condition.counted_cells}"
+    column = _column_of(condition)
     best = rows.filter(pl.col(column) == pl.col(column).max().over("replicate"))
     return best.unique("replicate", keep="first", maintain_order=True).iter_rows(named=True)
 
@@ -162,26 +198,19 @@ def _with_fresh_scores(champions: list[_Champion]) -> list[Controller]:
     found: list[Controller] = []
     for champion in champions:
         controller, condition, row = champion.controller, champion.condition, champion.row
-        if condition.platform not in ("jyro", "sim"):
+        if not condition.on.is_simulator:
             found.append(controller)
             continue
-        batch = retry_genomes(
-            condition.simulated_on,
+        _, scores = score_genomes(
+            condition.on,
             condition.arena.arena(),
             [controller.genome],
+            condition.task_of_trials,
             noise=condition.noise,
             noise_keys=[NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"])],
             repeats=range(1, FRESH_TRIALS + 1),
             inputs=condition.network_inputs,
+            partners=[partners_of(condition, row)],
         )
-        fresh = float(getattr(batch, f"coverage_{condition.counted_cells}").mean())
-        found.append(
-            Controller(
-                controller.genome,
-                controller.name,
-                selected_score=controller.selected_score,
-                fresh_score=fresh,
-                selected_on=controller.selected_on,
-            )
-        )
+        found.append(replace(controller, fresh_score=float(scores.mean())))
     return found

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from realitygap._interrupts import kept_interrupts
+from realitygap.platforms import close_twins, release_twins
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
-from realitygap.trials import close_twins, release_twins, usable_processors
+from realitygap.trials import usable_processors
 
 __all__ = ["ChunkTask", "Executor", "Listener", "Threads", "usable_processors"]
 

@@ -13,9 +13,19 @@ from pydantic import BaseModel, ValidationError
 from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
 from realitygap.errors import StudyError, did_you_mean
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.robots import ARENA, JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform, as_numbers
+from realitygap.platforms import (
+    ARENA,
+    Platform,
+    as_numbers,
+    built_in_platforms,
+    platform_class,
+    platform_names,
+    split_spec,
+    study_platforms,
+)
 from realitygap.runs import Condition
-from realitygap.tasks import CoverageTask, task_model
+from realitygap.settings import MISSING
+from realitygap.tasks import ControllerSettings, CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
 from ._named_files import find_files
@@ -23,19 +33,20 @@ from ._problems import Problems
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
-PLATFORMS: dict[str, type[BaseModel]] = {
-    "jyro": JyroPlatform,
-    "sim": SimPlatform,
-    "twin": TwinPlatform,
-    "scribbler": ScribblerPlatform,
-}
 SECTIONS: dict[str, type[BaseModel]] = {
     "arena": ArenaSettings,
     "task": CoverageTask,
+    "controller": ControllerSettings,
     "neat": NeatSettings,
     "novelty": NoveltySettings,
-    **PLATFORMS,
 }
+
+
+def platform_sections() -> dict[str, type[Platform]]:
+    """Return the settings of each platform that conditions can be on; those of other packages are not imported."""
+    return {model.name: model for model in built_in_platforms() if model.is_for_studies}
+
+
 _OWN_KEYS = ("name", "selection", "platform", "noise")
 
 
@@ -130,11 +141,7 @@ def _randomized(study: Study, randomize: str) -> Study:
         raise StudyError(f"randomize is {randomize!r}, expected no or posterior.")
 
     def changed(condition: Condition) -> Condition:
-        sim = condition.sim
-        if condition.platform != "sim" or not sim.draws:
-            return condition
-        values = {name: getattr(sim, name) for name in SimPlatform.model_fields}
-        return condition.model_copy(update={"sim": SimPlatform(**{**values, "randomize": randomize})})
+        return condition.model_copy(update={"on": condition.on.randomized(randomize)})
 
     conditions = tuple(changed(condition) for condition in study.conditions)
     if randomize == "posterior" and conditions == study.conditions and not any(map(_is_drawn, conditions)):
@@ -146,7 +153,7 @@ def _randomized(study: Study, randomize: str) -> Study:
 
 
 def _is_drawn(condition: Condition) -> bool:
-    return condition.platform == "sim" and condition.sim.randomize == "posterior"
+    return condition.on.is_randomized
 
 
 def _plain(number: Any) -> Any:
@@ -156,7 +163,7 @@ def _plain(number: Any) -> Any:
 
 
 def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) -> Study | None:
-    known = {"study", "report", "trials", "platform", "condition", "arena", "task", "neat", "novelty"}
+    known = {"study", "report", "trials", "platform", "condition", *SECTIONS}
     for key in data:
         if key not in known:
             problems.add(key, f"unknown section. {did_you_mean(key, known)}")
@@ -168,19 +175,16 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     about = problems.check(StudySection, about_values, "study") if is_table else None
     report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")
     trials = problems.check(TrialsSection, problems.table("trials", data.get("trials", {})), "trials")
-    base = {
-        section: problems.table(section, data.get(section, {}))
-        for section in SECTIONS
-        if section not in PLATFORMS
-    }
+    base = {section: problems.table(section, data.get(section, {})) for section in SECTIONS}
     platforms = problems.table("platform", data.get("platform", {}))
-    for key, value in platforms.items():
-        if key in PLATFORMS:
-            base[key] = problems.table(f"platform.{key}", value)
-        else:
-            problems.add(f"platform.{key}", f"unknown platform. {did_you_mean(key, PLATFORMS)}")
     for section, values in base.items():
-        _check_section(section, values, _place(section), problems)
+        _check_section(section, values, section, problems)
+    for key, value in platforms.items():
+        if key in study_platforms():
+            base[key] = problems.table(f"platform.{key}", value)
+            problems.check(platform_class(key), base[key], f"platform.{key}", is_part=True)
+        else:
+            problems.add(f"platform.{key}", f"unknown platform. {did_you_mean(key, study_platforms())}")
     listed = data.get("condition", [])
     if not isinstance(listed, list) or not listed:
         problems.add("condition", "expected at least one [[condition]] (two brackets), with a name.")
@@ -216,10 +220,6 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     return Study(about=about, report=report, trials=trials, conditions=tuple(conditions), notes=tuple(notes))
 
 
-def _place(section: str) -> str:
-    return f"platform.{section}" if section in PLATFORMS else section
-
-
 def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:
     """Note the mistakes of one section alone, so that each is said where it was made."""
     if section == "neat":
@@ -229,7 +229,7 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
                 f"{place}.settings", f"unknown set {name!r}. {did_you_mean(str(name), NAMED_SETTINGS)}"
             )
             values = {**values, "settings": DEFAULT_NEAT}
-    model = SECTIONS[section]
+    model = SECTIONS.get(section) or platform_class(section)
     if section == "task":
         try:
             model = task_model(values)
@@ -238,7 +238,7 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
             return
         if model is CoverageTask:
             values = {key: value for key, value in values.items() if key != "kind"}
-    problems.check(model, values, place)
+    problems.check(model, values, place, is_part=section not in SECTIONS)
 
 
 def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
@@ -248,14 +248,14 @@ def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> di
     ):
         return above
     merged = {**below, **above}
-    if section == "sim" and isinstance(below.get("set"), dict) and isinstance(above.get("set"), dict):
+    if isinstance(below.get("set"), dict) and isinstance(above.get("set"), dict):
         merged["set"] = {**below["set"], **above["set"]}
     return merged
 
 
-def _check_arena_numbers(merged: dict[str, Any], place: str, problems: Problems) -> None:
-    """Note what is wrong with the arena's numbers among those of `sim`, which a condition looks at last."""
-    given = merged["sim"].get("set")
+def _check_arena_numbers(platform: str, merged: dict[str, Any], place: str, problems: Problems) -> None:
+    """Note what is wrong with the arena's numbers among those of the platform, which a condition looks at last."""
+    given = merged[platform].get("set")
     try:
         arena = ArenaSettings(**merged["arena"]).arena()
         numbers, _ = as_numbers(given if isinstance(given, dict) else {})
@@ -266,7 +266,7 @@ def _check_arena_numbers(merged: dict[str, Any], place: str, problems: Problems)
     except ValueError as error:
         for line in str(error).split("\n"):
             said = line.removeprefix("ArenaFile").lstrip(".: ").replace("mean '", f"mean '{ARENA}")
-            problems.add(f"{place}.sim.set", ARENA + said)
+            problems.add(f"{place}.{platform}.set", ARENA + said)
 
 
 def _condition(
@@ -277,7 +277,8 @@ def _condition(
     problems: Problems,
 ) -> tuple[Condition | None, ConditionNotes | None]:
     before = len(problems.lines)
-    known = [*_OWN_KEYS, *ConditionNotes.model_fields, *SECTIONS]
+    platform = split_spec(str(values.get("platform", "jyro")))[0]
+    known = [*_OWN_KEYS, *ConditionNotes.model_fields, *SECTIONS, *platform_names()]
     for key in values:
         if key not in known:
             problems.add(f"{place}.{key}", f"unknown setting. {did_you_mean(key, known)}")
@@ -287,12 +288,12 @@ def _condition(
     note_values = {key: values[key] for key in ConditionNotes.model_fields if key in values}
     notes = problems.check(ConditionNotes, note_values, place)
     merged: dict[str, Any] = {}
-    platform = str(values.get("platform", "jyro")).partition(":")[0]
-    for section in SECTIONS:
-        if section in PLATFORMS and section in values and platform in PLATFORMS and section != platform:
+    for section in platform_names():
+        if section in values and platform in study_platforms() and section != platform:
             problems.add(
                 f"{place}.{section}", f"of no meaning here: the condition's platform is {platform!r}."
             )
+    for section in (*SECTIONS, platform):
         changed = problems.table(f"{place}.{section}", values.get(section, {}))
         if changed:
             checked = _laid_over(section, base.get(section, {}), changed) if section == "task" else changed
@@ -300,16 +301,19 @@ def _condition(
         merged[section] = _laid_over(section, base.get(section, {}), changed)
     merged["neat"] = {"settings": DEFAULT_NEAT, **merged["neat"]}
     if "name" in own:
-        problems.check(Condition, own, place)
-    if len(problems.lines) > before or about is None:
+        is_known = platform in study_platforms()
+        problems.check(Condition, {k: v for k, v in own.items() if not (k == "platform" and is_known)}, place)
+    if len(problems.lines) > before or about is None or platform not in study_platforms():
         return None, notes
     try:
         condition = Condition.model_validate({**own, "seed": about.seed, "pair": about.pair, **merged})
     except ValidationError as error:
         for problem in error.errors():
+            if problem["type"] == "missing":
+                problems.add(".".join((place, *map(str, problem["loc"]))), MISSING)
             if not problem["loc"]:  # what is wrong within a section was noted there
                 problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
-        if any(problem["loc"][:1] == ("sim",) for problem in error.errors()):
-            _check_arena_numbers(merged, place, problems)
+        if any(problem["loc"][:1] == (platform,) for problem in error.errors()):
+            _check_arena_numbers(platform, merged, place, problems)
         return None, notes
     return condition, notes

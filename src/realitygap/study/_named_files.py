@@ -8,6 +8,7 @@ from typing import Any
 
 from realitygap._limits import is_file
 from realitygap.errors import TaskError
+from realitygap.platforms import Platform, built_in_platforms, platform_class, platform_names, split_spec
 from realitygap.tasks import PYTHON, read_task_file
 
 from ._problems import Problems
@@ -23,11 +24,13 @@ def find_files(data: dict[str, Any], folder: Path, problems: Problems) -> None:
     """
     platforms = data.get("platform")
     if isinstance(platforms, dict):
-        _find(platforms.get("sim"), "robot", folder)
+        _find_settings(platforms, folder, _platforms_in(data))
     for table in _tables(data):
         _find(table.get("arena"), "file", folder)
-        _find(table.get("sim"), "robot", folder)
-        _find(table, "platform", folder, "sim:")
+        _find_settings(table, folder, _platforms_in(data))
+        for model in _platforms_in(data):
+            if model.rest_setting in model.file_settings:
+                _find(table, "platform", folder, f"{model.name}:")
         if isinstance(task := table.get("task"), dict):
             _read_task(task, folder, problems)
 
@@ -57,6 +60,22 @@ def _tables(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for condition in conditions if isinstance(conditions, list) else []:
         if isinstance(condition, dict):
             yield condition
+
+
+def _platforms_in(data: dict[str, Any]) -> list[type[Platform]]:
+    """The platforms of realitygap, and those of other packages that the study names."""
+    tables = data.get("platform")
+    named = set(tables) if isinstance(tables, dict) else set()
+    named |= {split_spec(str(table.get("platform")))[0] for table in _tables(data)}
+    own = [model.name for model in built_in_platforms()]
+    return [platform_class(name) for name in (*own, *sorted(named - set(own))) if name in platform_names()]
+
+
+def _find_settings(tables: dict[str, Any], folder: Path, models: list[type[Platform]]) -> None:
+    """Find the files that the settings of platforms name."""
+    for model in models:
+        for setting in model.file_settings:
+            _find(tables.get(model.name), setting, folder)
 
 
 def _find(table: Any, key: str, folder: Path, prefix: str = "") -> None:

@@ -6,24 +6,29 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from realitygap.errors import LedgerError, RobotError, StudyError
-from realitygap.records import Generation, Individual, Ledger, Trial, complete_runs
-from realitygap.robots import Robot, ScribblerPlatform
+from realitygap.errors import LedgerError, RobotError, StudyError, TaskError
+from realitygap.platforms import Platform
+from realitygap.records import ROBOT, Generation, Individual, Ledger, Score, Trial, complete_runs, sees
+from realitygap.robots import Robot
 from realitygap.runs import Condition, Evolution
+from realitygap.tasks import score_observed
 from realitygap.trials import (
     Card,
     DrivenTrial,
     EndReason,
     Operator,
     TrialInterrupted,
+    Verdict,
     drive_trial,
     preflight,
 )
 
 from ._blocks import Block, blocks_of, turns_of
+from ._ledger_trial import observed_of_ledger
 from ._study import Study
+from ._targets import SEEN_AS, WOULD_SEE
 
-OpenRobot = Callable[[ScribblerPlatform], Robot]
+OpenRobot = Callable[[Platform], Robot]
 """Opens the robot at the port, with the settings of a condition."""
 
 
@@ -71,7 +76,7 @@ class PhysicalStudy:
         self._open_robot = open_robot
         self._port = port
         self._robot: Robot | None = None
-        self._opened_with: ScribblerPlatform | None = None
+        self._opened_with: Platform | None = None
         self._sitting = 0
         self._evolutions: dict[tuple[str, int], Evolution] = {}
         self._is_looked_at = False
@@ -86,7 +91,7 @@ class PhysicalStudy:
         Raises:
             RobotError: The robot failed; what became of the trial in flight is asked when the study goes on.
             LedgerError: The ledger cannot be written or trusted.
-            StudyError: The operator did not accept the pre-flight.
+            StudyError: The operator did not accept the pre-flight, or nobody sees what a task is scored by.
             TrialInterrupted: The program is being stopped.
         """
         for condition in self._conditions:
@@ -104,6 +109,15 @@ class PhysicalStudy:
         finally:
             self._let_go()
         return ""
+
+    def _refuse_unseen(self, condition: Condition) -> None:
+        """Refuse a task whose score the operator cannot see, before anything is driven."""
+        task = condition.task_of_trials
+        if not sees(self._operator.observes, task.observe):
+            raise StudyError(
+                f"Condition {condition.name!r}: task {task.name!r} is scored by {SEEN_AS[task.observe]}, and nobody "
+                f"beside the robot sees them. {WOULD_SEE[task.observe]}"
+            )
 
     # blocks
 
@@ -169,7 +183,8 @@ class PhysicalStudy:
             if is_closed and generation >= evolution.generation:
                 self._check_planned(condition, replicate, generation)
                 rows = self._ledger.individuals(condition.name, replicate, generation)
-                told = evolution.tell([row["cells"] for row in rows])
+                cells = [row["cells"] for row in rows]
+                told = evolution.tell(self._scores(condition, [row["trial"] for row in rows], cells), cells)
                 if list(told.fitness) != [row["fitness"] for row in rows]:
                     raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
         return evolution
@@ -202,16 +217,30 @@ class PhysicalStudy:
             for each in self._ledger.trials(condition.name, replicate, generation)
             if each.state == "scored"
         ]
-        cells = [each.cells or () for each in sorted(trials, key=lambda trial: trial.individual)]
+        trials.sort(key=lambda trial: trial.individual)
+        cells = [each.cells or () for each in trials]
         if len(cells) != condition.neat.population:
             raise LedgerError(
                 f"{self._ledger.path}: a score was taken back while its generation was being closed. Run the same "
                 "command again."
             )
-        told = evolution.tell(cells)
+        told = evolution.tell(self._scores(condition, [each.trial for each in trials], cells), cells)
         self._ledger.close_generation(
             condition.name, replicate, generation, told.fitness, told.novelty, cells=cells
         )
+
+    def _scores(
+        self, condition: Condition, trials: Sequence[int], cells: Sequence[Sequence[int]]
+    ) -> list[float]:
+        """The scores of trials by the condition's task; coverage is that of the counted cells."""
+        arena = condition.arena.arena()
+        if condition.coverage is not None:
+            return [len(set(each)) / arena.grid.n_cells for each in cells]
+        observed = [observed_of_ledger(self._ledger, number) for number in trials]
+        try:
+            return [float(each) for each in score_observed(condition.task_of_trials, observed, arena)]
+        except TaskError as error:
+            raise LedgerError(f"{self._ledger.path}: {error}") from error
 
     # trials
 
@@ -264,21 +293,27 @@ class PhysicalStudy:
     def _settle(self, trial: Trial) -> None:
         problem = trial.problem or "the program ended while the trial was running"
         (card,) = self._cards([trial])
-        self._ledger.settle(trial.trial, self._operator.settle(card, problem), problem)
+        can_count = self._condition(trial).coverage is not None  # other tasks score whole trials alone
+        verdict: Verdict = self._operator.settle(card, problem) if can_count else "void"
+        self._ledger.settle(trial.trial, verdict, problem)
 
     def _drive(self, trial: Trial, n_left: int) -> None:
         condition = self._condition(trial)
-        robot = self._ready(condition.scribbler)
+        robot = self._ready(condition.on)
         (card,) = self._cards([trial], n_left)
         self._operator.place(card)
-        network = self._evolution(condition, trial.replicate).ask()[trial.individual].genome.network()
+        genome = self._evolution(condition, trial.replicate).ask()[trial.individual].genome
+        network = genome.network()
+        task = condition.task_of_trials
         self._ledger.start(trial.trial, self._sitting)
         try:
             driven = drive_trial(
                 robot,
                 network,
-                condition.scribbler.steps,
+                condition.on.steps,
+                interface=genome.interface,
                 watch=lambda step, seen, command: self._operator.watch(card, step, seen, command),
+                sees_end=task.needs_trace,
             )
         except TrialInterrupted as error:
             self._interrupt(trial, error.driven)
@@ -290,12 +325,19 @@ class PhysicalStudy:
             except BaseException:
                 self._interrupt(trial, replace(driven, problem="it was driven, and nobody said what it drew"))
                 raise
-            self._ledger.finish(trial.trial, driven.end, driven.steps, stalls=driven.stalls, score=score)
+            if score is None and not sees(task.observe, "cells"):
+                score = Score((), ROBOT)
+            if sees(task.observe, "track") and (score is None or score.path is None):
+                self._interrupt(trial, replace(driven, problem="it was driven, and nobody saw where"))
+                return
+            self._ledger.finish(
+                trial.trial, driven.end, driven.steps, stalls=driven.stalls, score=score, last=driven.last
+            )
             return
         self._interrupt(trial, driven)
         if driven.end is EndReason.LOST:
             raise RobotError(
-                f"Trial {trial.trial}, step {len(driven.steps)} of {condition.scribbler.steps}: {driven.problem} "
+                f"Trial {trial.trial}, step {len(driven.steps)} of {condition.on.steps}: {driven.problem} "
                 "Nothing that was scored is lost. Put the robot right, then run the same command again: it asks what "
                 "becomes of this trial."
             )
@@ -314,18 +356,23 @@ class PhysicalStudy:
             Card(
                 trial=trial,
                 title=trial.code if settings.blind else trial.name,
-                pen=settings.pens[trial.pen % len(settings.pens)],
-                n_steps=self._condition(trial).scribbler.steps,
+                pen=settings.pens[trial.pen % len(settings.pens)] if self._draws(trial) else "none",
+                n_steps=self._condition(trial).on.steps,
                 n_left=n_left,
                 key=self._condition(trial).key,
                 arena=self._condition(trial).arena.arena(),
+                observe=self._condition(trial).task_of_trials.observe,
             )
             for trial in trials
         ]
 
+    def _draws(self, trial: Trial) -> bool:
+        """Whether the cells of a trial's line have to be counted."""
+        return self._condition(trial).task_of_trials.observe == "cells"
+
     # the robot
 
-    def _ready(self, platform: ScribblerPlatform) -> Robot:
+    def _ready(self, platform: Platform) -> Robot:
         """The robot, opened and looked at; opened anew where a condition wants other settings."""
         wanted = platform.model_copy(update={"steps": 1})
         if self._robot is not None and self._opened_with == wanted:
@@ -337,6 +384,8 @@ class PhysicalStudy:
 
     def _begin_sitting(self, robot: Robot) -> None:
         self._operator.meet(robot)
+        for condition in self._conditions:
+            self._refuse_unseen(condition)
         found = preflight(robot, self._ledger.robots())
         if (found.problems or not self._is_looked_at) and not self._operator.accept(found):
             said = "; ".join(found.problems) or "the operator stopped there"

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from realitygap.settings import mistakes, shown
+from realitygap.settings import MISSING, mistakes, shown
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -31,11 +31,15 @@ class Problems:
         self.add(place, f"expected a table, came {shown(value)}.")
         return {}
 
-    def check(self, model: type[M], values: Mapping[str, Any], place: str) -> M | None:
-        """The values as a model; None after noting every mistake in them."""
+    def check(
+        self, model: type[M], values: Mapping[str, Any], place: str, *, is_part: bool = False
+    ) -> M | None:
+        """The values as a model; None after noting every mistake in them, of a part all but what is missing."""
         try:
             return model.model_validate(dict(values), strict=True)
         except ValidationError as error:
             for field, text in mistakes(error, model, values):
+                if is_part and text == MISSING:
+                    continue
                 self.add(f"{place}.{field}" if place and field else place or field, text)
             return None

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from realitygap._version import __version__
 from realitygap.evolution import NeatSettings
-from realitygap.kernels._network import Networks, make_networks
-from realitygap.kernels._peak import peak_flops
-from realitygap.kernels._sim import run_sim_trials
-from realitygap.kernels._sim_lanes import SimRules, make_sim_room, make_sim_trace
-from realitygap.kernels._sim_shape import half_width, make_sim_shape, sim_table, substeps_for
+from realitygap.kernels.math.peak import peak_flops
+from realitygap.kernels.neat.network import Networks, make_networks
+from realitygap.kernels.sim.lanes import SimRules, make_sim_room, make_sim_trace
+from realitygap.kernels.sim.shape import half_width, make_sim_shape, sim_table, substeps_for
+from realitygap.kernels.sim.trial import run_sim_trials
 from realitygap.world import Arena, load_arena, load_robot, paper_arena
 
 from ._bench import MOST_SECONDS

@@ -1,4 +1,4 @@
-"""Carrying out a study: chunks on threads or on a cluster, published as they are done; then what a robot drives."""
+"""Running a study: chunks on threads or on a cluster, published as they are done; or what a robot drives."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class StudyResult:
 
     Attributes:
         folder: Its results.
-        n_runs: Simulated runs in the study.
+        n_runs: Simulated runs of the study; 0 if a robot was driven.
         n_computed: Runs computed in this sitting; the others were there.
         seconds: Computing took [s].
         physical: How far the conditions are that a robot drives; None where the study has none.
@@ -79,11 +79,9 @@ def run_study(
     fresh: bool = False,
     cluster: str | None = None,
     tell: Callable[[Progress], None] | None = None,
-    port: str | None = None,
-    operator: Operator | None = None,
     allow_code: AllowCode = False,
 ) -> StudyResult:
-    """Carry out a study, or what is missing of it; conditions on a robot only where its port is given.
+    """Compute the simulated conditions of a study, or what is missing of them; `drive_study` drives the others.
 
     What is in the folder already is kept: an interrupted study goes on, more replicates and new conditions
     extend it. Interrupt it (Ctrl-C) at any moment; runs that were published are safe, and the results do not
@@ -102,10 +100,6 @@ def run_study(
             system, set up in the user's Dask configuration; `slurm:20` asks for 20 jobs. All workers must
             see `out` under the same path.
         tell: Called with the progress after each chunk.
-        port: Of the robot that drives the conditions on the platform `scribbler`, such as `/dev/rfcomm0`, `COM3`,
-            `socket://HOST:PORT`, or `emulator://s2?speed=off`, an emulated one in this program.
-        operator: Who places the robot and says what it drew; the emulator's witness when not given, which only an
-            emulated robot in this program has.
         allow_code: Whether Python files of tasks (`kind = "python:FILE.py:FUNCTION"`) may run that the user has not
             allowed before; or a function that gets the `PythonTask` and returns whether its file may run.
 
@@ -114,73 +108,99 @@ def run_study(
         StudyError: The study cannot be carried out as written, or the folder holds another one: the
             difference is shown.
         RecordError: The folder holds something that cannot be trusted, or cannot be written.
-        RealityGapError: The cluster or the robot cannot be reached, or the robot failed; what was scored is safe.
+        RealityGapError: The cluster cannot be reached.
         TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.
     """
     threads = None if threads is None else whole_number("threads", threads, 1)
     chunk = None if chunk is None else whole_number("chunk", chunk, 1)
-    if not isinstance(study, Study):
-        study = load_study(study, seed=seed, replicates=replicates)
-    elif seed is not None or replicates is not None:
-        raise ValueError("seed and replicates go with a study's name or path; this study has its own.")
-    if port is not None:
-        refuse_port_without_robot(study)
-    path = Path(out) if out is not None else Path("results") / study.about.name
-    if not fresh and (path / "study.json").exists():
-        _refuse_other_settings(ResultsFolder.open(path), study)
-    study = with_code_allowed(study, allow_code)
+    study, path = _resolved(study, out, seed, replicates, allow_code, fresh=fresh)
     with _executor(threads, cluster) as executor:
         folder = _open_folder(path, study, fresh=fresh)
         with folder.locked():
             _adopt(folder, study)
             progress = _carry_out(study, folder, executor, chunk, tell)
-            physical = _drive(study, folder, port, operator) if study.n_physical else None
+            physical = _physical_result(study, folder, 0, "") if study.n_physical else None
     return StudyResult(folder, progress.n_runs, progress.n_computed, progress.seconds, physical)
 
 
-def refuse_port_without_robot(study: Study) -> None:
-    """Refuse a robot's port for a study that drives none.
+def drive_study(
+    study: Study | str | Path,
+    port: str,
+    out: str | Path | None = None,
+    *,
+    seed: int | None = None,
+    replicates: int | None = None,
+    operator: Operator | None = None,
+    open_robot: OpenRobot | None = None,
+    allow_code: AllowCode = False,
+) -> StudyResult:
+    """Drive the conditions of a study that are on a robot, or what is missing of them.
+
+    Each trial is in the folder's ledger as soon as it is known. Interrupt it (Ctrl-C) at any moment: the same call
+    resumes.
+
+    Args:
+        study: A study, the name of one that comes with realitygap, or the path of a study file.
+        port: The robot's, such as `/dev/rfcomm0`, `COM3`, `socket://HOST:PORT`, or `emulator://s2?speed=off`, an
+            emulated robot in this program.
+        out: Folder for the results; `results/NAME` when not given.
+        seed: Replaces the study's, if the study is given by name or path.
+        replicates: Replaces the study's, likewise.
+        operator: Places the robot and reports what it drew; the emulator's witness when not given, which only an
+            emulated robot in this program has.
+        open_robot: Called with the settings of a condition when a trial is to be driven; opens `port` when not given.
+        allow_code: As in `run_study`.
 
     Raises:
-        StudyError: The study has no condition on the platform `scribbler`.
+        StudyError: No condition of the study is on a robot, nobody places the robot, or the folder holds another
+            study.
+        RealityGapError: The robot cannot be reached, or failed; what was scored is safe.
+    """
+    study, path = _resolved(study, out, seed, replicates, allow_code)
+    check_has_robot(study)
+    operator = operator or default_operator(port)
+    folder = _open_folder(path, study)
+    with folder.locked():
+        _adopt(folder, study)
+        ledger_path = path / LEDGER_NAME
+        with Ledger.open(ledger_path) if ledger_path.exists() else Ledger.create(ledger_path) as ledger:
+            physical = PhysicalStudy(study, ledger, operator, open_robot or connect_robot(port), port)
+            waiting = physical.carry_out()
+        return StudyResult(folder, 0, 0, 0.0, _physical_result(study, folder, physical.n_driven, waiting))
+
+
+def check_has_robot(study: Study) -> None:
+    """Raise an error if no condition of a study is on a robot.
+
+    Raises:
+        StudyError: The study has no such condition.
     """
     if not study.n_physical:
         raise StudyError(
-            f"A port is given, and study {study.about.name!r} has no condition with platform 'scribbler'. Leave it out."
+            f"No condition of study {study.about.name!r} is on a robot (platform 'scribbler'). "
+            "`realitygap run` computes it."
         )
 
 
-def _drive(
-    study: Study, folder: ResultsFolder, port: str | None, operator: Operator | None
-) -> PhysicalResult:
-    """Carry out what a robot drives, in a folder that is locked; without a port, say what is left."""
-    if port is None:
-        return _physical_result(study, folder, 0, "")
-    return drive_study(study, folder, operator or default_operator(port), connect_robot(port), port)
-
-
-def drive_study(
-    study: Study, folder: ResultsFolder, operator: Operator, open_robot: OpenRobot, port: str
-) -> PhysicalResult:
-    """Carry out the conditions of a study that a robot drives, or what is missing of them.
-
-    Args:
-        study: As resolved; the folder has its description.
-        folder: Of its results.
-        operator: Who places the robot and says what it drew.
-        open_robot: Called with the settings of a condition when a trial is to be driven.
-        port: What to call the robot's port in the ledger.
-
-    Raises:
-        RealityGapError: As `run_study`.
-    """
-    with folder.locked():
-        path = folder.path / LEDGER_NAME
-        with Ledger.open(path) if path.exists() else Ledger.create(path) as ledger:
-            physical = PhysicalStudy(study, ledger, operator, open_robot, port)
-            waiting = physical.carry_out()
-    return _physical_result(study, folder, physical.n_driven, waiting)
+def _resolved(
+    study: Study | str | Path,
+    out: str | Path | None,
+    seed: int | None,
+    replicates: int | None,
+    allow_code: AllowCode,
+    *,
+    fresh: bool = False,
+) -> tuple[Study, Path]:
+    """Return a study that may run, and the folder of its results, which holds no other study unless `fresh`."""
+    if not isinstance(study, Study):
+        study = load_study(study, seed=seed, replicates=replicates)
+    elif seed is not None or replicates is not None:
+        raise ValueError("seed and replicates go with a study's name or path; this study has its own.")
+    path = Path(out) if out is not None else Path("results") / study.about.name
+    if not fresh and (path / "study.json").exists():
+        _refuse_other_settings(ResultsFolder.open(path), study)
+    return with_code_allowed(study, allow_code), path
 
 
 def _physical_result(study: Study, folder: ResultsFolder, n_driven: int, waiting: str) -> PhysicalResult:
@@ -266,7 +286,7 @@ def processor_name() -> str:
     return platform.processor() or platform.machine()
 
 
-def _open_folder(path: Path, study: Study, *, fresh: bool) -> ResultsFolder:
+def _open_folder(path: Path, study: Study, *, fresh: bool = False) -> ResultsFolder:
     if not (path / "study.json").exists():
         return ResultsFolder.create(path, study.description())
     folder = ResultsFolder.open(path)
@@ -401,9 +421,9 @@ def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) ->
 
 
 def _chunk_size(condition: Condition, replicates: int) -> int:
-    if condition.platform == "twin":  # whose trials take a hundred times as long
+    if condition.on.is_slow:
         return 1
-    steps = condition.neat.generations * condition.neat.population * condition.simulated_on.steps
+    steps = condition.neat.generations * condition.neat.population * condition.on.steps
     by_time = CHUNK_STEPS // steps
     by_progress = -(-replicates // CHUNKS_PER_CONDITION)
     return max(1, min(by_time, by_progress, LARGEST_CHUNK))

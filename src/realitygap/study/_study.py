@@ -159,7 +159,7 @@ class Study(Settings):
                 {
                     "name": condition.name,
                     "label": condition.label,
-                    **({"drawn": list(condition.drawn_names)} if condition.platform == "sim" else {}),
+                    **({"drawn": list(condition.drawn_names)} if condition.on.records_draws else {}),
                     "hash": condition.hash(),
                     **notes.model_dump(mode="json"),
                     "settings": condition.settings(),

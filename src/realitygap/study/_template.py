@@ -15,7 +15,7 @@ from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import is_hidden
 from realitygap.world import RobotModel
 
-from ._file import DEFAULT_NEAT, PLATFORMS, SECTIONS
+from ._file import DEFAULT_NEAT, SECTIONS, platform_sections
 from ._study import ConditionNotes, ReportSection, StudySection, TrialsSection
 
 WIDTH = 100
@@ -47,21 +47,21 @@ def study_template(name: str) -> str:
         ),
         _section("study", StudySection, {"name": name, "seed": 1, "replicates": 100}),
     ]
-    for section, model in SECTIONS.items():
-        place = f"platform.{section}" if section in PLATFORMS else section
+    tables = SECTIONS | {f"platform.{name}": model for name, model in platform_sections().items()}
+    for section, model in tables.items():
         written: dict[str, Any] = {}
         defaults: Mapping[str, Any] = {}
         if section == "neat":
             written = {"settings": DEFAULT_NEAT}
             defaults = NAMED_SETTINGS[DEFAULT_NEAT]
-        parts.append(_section(place, model, written, defaults))
+        parts.append(_section(section, model, written, defaults))
     parts.append(_section("trials", TrialsSection, {}))
     parts.append(_section("report", ReportSection, {}))
     parts.append(
         _comment(
             "One [[condition]] for each cell of the design. What differs from the sections above goes into "
-            "[condition.arena], [condition.task], [condition.neat], [condition.novelty], and [condition.jyro], "
-            "[condition.sim] or [condition.scribbler], whichever its platform is."
+            "[condition.arena], [condition.task], [condition.controller], [condition.neat], [condition.novelty], and "
+            "[condition.jyro], [condition.sim] or [condition.scribbler], whichever its platform is."
         )
     )
     own = ["name", "selection", "platform", "noise"]
@@ -126,4 +126,4 @@ def _toml(value: Any) -> str:
         value = value.name
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
-    return repr(value)
+    return repr(list(value) if isinstance(value, tuple) else value)

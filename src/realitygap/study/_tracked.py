@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import StudyError
+from realitygap.platforms import DEFAULT_ROBOT, FULL_SCALE
 from realitygap.records import (
     LEDGER_NAME,
     Ledger,
@@ -23,13 +24,10 @@ from realitygap.records import (
     Step,
     read_observations,
 )
-from realitygap.robots import DEFAULT_ROBOT
 from realitygap.runs import Condition, genome_of
-from realitygap.trials import PATH_PARTS, cell_at
+from realitygap.trials import PATH_PARTS
 from realitygap.vision import Beginning, Track, Tracked, find_beginning
 from realitygap.world import Arena, Grid
-
-from ._targets import FULL_SCALE
 
 Floats = NDArray[np.float64]
 
@@ -106,7 +104,7 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
     )
     port = f"scribbler:{sittings[-1]['port']}" if sittings else "scribbler"
     head = ObservationsHead(
-        port, label or "REAL", DEFAULT_ROBOT, arena.to_dict(), condition.scribbler.wait_s, "track"
+        port, label or "REAL", DEFAULT_ROBOT, arena.to_dict(), condition.on.command_s, "track"
     )
     return TrialToTrack(head, observed, times, arena)
 
@@ -181,7 +179,7 @@ def score_along(track: Track, times: Floats, grid: Grid, who: str) -> Score:
     rows = np.arange(len(times), dtype=np.float64)
     fine = np.interp(np.arange((len(rows) - 1) * PATH_PARTS + 1) / PATH_PARTS, rows, times)
     cells = track.between(float(times[0]), float(times[-1])).cells(grid)
-    ends = {cell_at(grid, x, y) for x, y, _ in track.at(times).tolist()} - {None}
+    ends = {grid.cell_at(x, y) for x, y, _ in track.at(times).tolist()} - {None}
     return Score(cells, who, n_ends=len(ends), path=np.round(track.at(fine), 6).tolist())
 
 

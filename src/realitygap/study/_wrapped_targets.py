@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Literal, Protocol, Self
 
 import numpy as np
 
+from realitygap._closing import ClosedOnExit
 from realitygap.calibration import ruled
 from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
-from realitygap.trials import Target, TrialPlan, is_taken_back, is_whole, taken_back
+from realitygap.trials import Operator, Target, TrialPlan, is_taken_back, is_whole, taken_back
 
 from ._targets import refuse_lost
 
@@ -26,19 +25,7 @@ class StoppedByPerson(Exception):  # noqa: N818 - nothing is wrong
     """Somebody wants to go on another time; what was recorded is kept."""
 
 
-class Guide(Protocol):
-    """Who puts a robot where a plan wants it, and measures where it ends."""
-
-    def place(self, plan: TrialPlan, number: int, n: int) -> Literal["go", "redo", "stop"]:
-        """Put the robot at the start of plan `number` of n: go on, take the one before back, or stop for today."""
-        ...
-
-    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
-        """The trial with what a person measured of it; None: it is to be driven again."""
-        ...
-
-
-class _Around:
+class _Around(ClosedOnExit):
     """A target that passes everything on."""
 
     def __init__(self, target: Target) -> None:
@@ -46,6 +33,7 @@ class _Around:
         self.name, self.label, self.arena = target.name, target.label, target.arena
         self.identity = target.identity
         self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
+        self.is_paced, self.inputs = target.is_paced, target.inputs
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
@@ -56,14 +44,6 @@ class _Around:
     def close(self) -> None:
         """Let go of the platform."""
         self.target.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class CountingTarget(_Around):
@@ -123,12 +103,12 @@ class RuledTarget(_Around):
         return trials
 
 
-class GuidedTarget(_Around):
+class OperatedTarget(_Around):
     """A person puts the robot at each start, and measures what no camera sees."""
 
-    def __init__(self, target: Target, guide: Guide) -> None:
+    def __init__(self, target: Target, operator: Operator) -> None:
         super().__init__(target)
-        self._guide = guide
+        self._operator = operator
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
@@ -141,7 +121,7 @@ class GuidedTarget(_Around):
         trials: dict[int, ObservedTrial] = {}
         k = 0
         while k < len(plans):
-            answer = self._guide.place(plans[k], k, len(plans))
+            answer = self._operator.lead(plans[k], k, len(plans))
             if answer == "stop":
                 raise StoppedByPerson
             if answer == "redo":
@@ -150,7 +130,7 @@ class GuidedTarget(_Around):
                     tell(k, taken_back(trials.pop(k)))
                 continue
             (trial,) = self.target.carry_out([plans[k]], observe)
-            measured = self._guide.measure(plans[k], trial)
+            measured = self._operator.measure(plans[k], trial)
             if measured is None:
                 continue
             trials[k] = measured

@@ -5,21 +5,25 @@ from ._avoid import AvoidTask
 from ._classical import CLASSICAL_TASKS, ClassicalTask
 from ._coverage import CoverageTask
 from ._goal import GoalTask
+from ._inputs import ControllerSettings
 from ._kinds import TASKS, as_task, task_model
 from ._light import LightTask
 from ._mazes import MAZE_TASKS, MazeAgent, MazeTask
+from ._observed import observed_trajectories, score_observed
 from ._python import PYTHON, PythonTask, not_allowed, read_task_file
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
-from ._wall import WallTask
+from ._wall import WALL_SIDES, WallTask, wall_outlines
 
 __all__ = [
     "CLASSICAL_TASKS",
     "MAZE_TASKS",
     "PYTHON",
     "TASKS",
+    "WALL_SIDES",
     "AvoidTask",
     "ClassicalTask",
+    "ControllerSettings",
     "CoverageTask",
     "GoalTask",
     "LightTask",
@@ -33,8 +37,11 @@ __all__ = [
     "as_task",
     "is_allowed",
     "not_allowed",
+    "observed_trajectories",
     "read_task_file",
     "remember_allowed",
+    "score_observed",
     "source_hash",
     "task_model",
+    "wall_outlines",
 ]

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from realitygap.kernels._scores import avoid_scores
-from realitygap.settings import Settings
+from realitygap.kernels.tasks.scores import avoid_scores
+from realitygap.records import Observe
 from realitygap.world import Arena
 
 from ._inputs import Inputs
+from ._step_task import StepTask
 from ._trajectories import Trajectories
 
 
-class AvoidTask(Settings):
+class AvoidTask(StepTask):
     """Floreano & Mondada's product V (1 - sqrt(dv)) (1 - i), its mean over steps, 0 to 1.
 
     V is the mean of the wheels' speeds without their signs and dv half of their difference with them, both as parts of
@@ -35,15 +36,8 @@ class AvoidTask(Settings):
         "place then pays, too. Without it V is the mean of the wheels' speeds, and at least 0.",
     )
 
-    @property
-    def name(self) -> str:
-        """As `[task] kind` has it."""
-        return self.kind
-
-    @property
-    def needs_trace(self) -> bool:
-        """Always: every step counts."""
-        return True
+    observe: ClassVar[Observe] = "readings"
+    score_name: ClassVar[str] = "avoidance score"
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """(n,) the product, 0 (still, turning on the spot or pressed to a wall) to 1 (straight on in the open)."""

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, ClassVar, Literal, Self
 
-from pydantic import Field
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from realitygap.records import Observe
 from realitygap.settings import Settings
+from realitygap.world import Arena
+
+from ._inputs import Inputs
+from ._trajectories import Trajectories
+
+PAPER_INPUTS = ("obstacle", "stall", "time")
 
 
 class CoverageTask(Settings):
@@ -31,10 +40,40 @@ class CoverageTask(Settings):
         "of time'; no alternative is offered.",
     )
 
+    inputs: Inputs = Field(
+        PAPER_INPUTS,
+        description="Older name of controller.inputs, without the constant input: see bias_input.",
+        json_schema_extra={"hidden": True},
+    )
+
+    name: ClassVar[str] = "coverage"
+    needs_trace: ClassVar[bool] = False
+    score_name: ClassVar[str] = "coverage"
+    score_range: ClassVar[tuple[float, float]] = (0.0, 1.0)
+    output_names: ClassVar[tuple[str, str]] = ("move", "turn")
+
+    @model_validator(mode="after")
+    def _has_no_constant(self) -> Self:
+        if "bias" in self.inputs:
+            raise ValueError("inputs: expected none named bias. Set bias_input: it adds the constant input")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_default_inputs(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Conditions with the paper's inputs keep their hashes."""
+        values: dict[str, Any] = handler(self)
+        if self.inputs == PAPER_INPUTS:
+            values.pop("inputs", None)
+        return values
+
     @property
-    def name(self) -> str:
-        """As `[task] kind` has it."""
-        return "coverage"
+    def observe(self) -> Observe:
+        """The crossed cells; its poses where cells count in which steps end."""
+        return "cells" if self.cells == "line" else "track"
+
+    def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
+        """(n,) visited share of the reachable cells, 0..1."""
+        return trajectories.coverage_line if self.cells == "line" else trajectories.coverage_ends
 
     def has_bias_input(self, selection: str) -> bool:
         """Whether the networks of a condition have the constant input."""
@@ -44,9 +83,4 @@ class CoverageTask(Settings):
 
     def input_names(self, selection: str) -> tuple[str, ...]:
         """What the network's inputs are, in order."""
-        return ("obstacle", "stall", "time", *(("bias",) if self.has_bias_input(selection) else ()))
-
-    @property
-    def output_names(self) -> tuple[str, ...]:
-        """What the network's outputs are, in order."""
-        return ("move", "turn")
+        return (*self.inputs, *(("bias",) if self.has_bias_input(selection) else ()))

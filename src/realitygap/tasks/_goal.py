@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from realitygap.errors import TaskError
-from realitygap.kernels._scores import goal_scores
-from realitygap.settings import Settings
+from realitygap.kernels.tasks.scores import goal_scores
 from realitygap.world import Arena, Goal
 
 from ._inputs import Inputs
+from ._step_task import StepTask
 from ._trajectories import Trajectories
 
 
-class GoalTask(Settings):
+class GoalTask(StepTask):
     """How much of the way to the arena's goal was made good at the end: 1 - d / d0, or 1 where it was reached.
 
     d is the straight distance from the goal at the end and d0 that at the start, whatever walls stand between; reached
@@ -38,15 +39,8 @@ class GoalTask(Settings):
         "bias",
     )
 
-    @property
-    def name(self) -> str:
-        """As `[task] kind` has it."""
-        return self.kind
-
-    @property
-    def needs_trace(self) -> bool:
-        """Always: the goal may be reached at any step."""
-        return True
+    score_name: ClassVar[str] = "share of the way to the goal"
+    score_range: ClassVar[tuple[float, float]] = (-math.inf, 1.0)
 
     def check_arena(self, arena: Arena) -> Goal:
         """Return the arena's goal.

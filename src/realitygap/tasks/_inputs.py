@@ -1,10 +1,12 @@
-"""What networks see, as a task's table names it."""
+"""The inputs and outputs of networks, as a study file declares them."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from realitygap.settings import Settings
 
 
 def _as_tuple(names: Any) -> Any:
@@ -17,8 +19,43 @@ Inputs = Annotated[
     Field(
         min_length=1,
         max_length=256,
-        description="What networks see, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
-        "encoder.K, goal_sector.K, goal_distance, last_move, last_turn. What there is of them says the robot.",
+        description="Older name of controller.inputs: what networks see, in order.",
     ),
 ]
 """Names of inputs, in order."""
+
+
+class ControllerSettings(Settings):
+    """The inputs and outputs of the networks of a study."""
+
+    inputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+        (),
+        max_length=256,
+        description="Names of the inputs of networks, in order: obstacle (the largest range reading), stall, time, "
+        "range.K, light.K, line.K, bump.K, encoder.K, goal_sector.K, goal_distance, last_move, last_turn. The "
+        "constant input is bias, the last one. The robot and the arena must have them. None: those of the task.",
+    )
+    outputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+        ("move", "turn"),
+        description="Outputs of networks, each -1..1: move and turn, or the wheel speeds left and right. Of wheel "
+        "speeds, half the sum is the move, and half of right less left is the turn.",
+    )
+
+    @model_validator(mode="after")
+    def _can_be_declared(self) -> Self:
+        if self.outputs not in (("move", "turn"), ("left", "right")):
+            raise ValueError(
+                f'outputs: expected ["move", "turn"] or ["left", "right"], came {list(self.outputs)}'
+            )
+        if not all(self.inputs) or "bias" in self.inputs[:-1]:
+            raise ValueError(
+                f"inputs: expected a name for each, and bias as the last, came {list(self.inputs)}"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_defaults(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Conditions that declare nothing keep their hashes."""
+        values: dict[str, Any] = handler(self)
+        defaults = ControllerSettings.model_fields
+        return {key: value for key, value in values.items() if getattr(self, key) != defaults[key].default}

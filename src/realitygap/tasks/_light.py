@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from realitygap.errors import TaskError
-from realitygap.kernels._scores import nearness_scores
-from realitygap.settings import Settings
+from realitygap.kernels.tasks.scores import nearness_scores
 from realitygap.world import Arena
 
 from ._inputs import Inputs
+from ._step_task import StepTask
 from ._trajectories import Trajectories
 
 
-class LightTask(Settings):
+class LightTask(StepTask):
     """How near to the nearest light a robot was on the whole, less what it spent blocked, 0 to 1.
 
     At each step 1 - d / d0, at least 0, with d the distance to the nearest light and d0 that of the start; its mean
@@ -30,15 +30,7 @@ class LightTask(Settings):
     kind: Literal["light"] = Field("light", description="Light seeking.")
     inputs: Inputs = ("light.0", "light.1", "bias")
 
-    @property
-    def name(self) -> str:
-        """As `[task] kind` has it."""
-        return self.kind
-
-    @property
-    def needs_trace(self) -> bool:
-        """Always: every step counts."""
-        return True
+    score_name: ClassVar[str] = "light-seeking score"
 
     def check_arena(self, arena: Arena) -> None:
         """Refuse an arena in which nothing can be sought.

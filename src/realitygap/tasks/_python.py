@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import linecache
+import math
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -11,10 +12,11 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap._limits import MOST_TOML_BYTES, read_file
 from realitygap.errors import TaskError
+from realitygap.records import Observe
 from realitygap.settings import Settings, visible
 from realitygap.world import Arena
 
@@ -45,6 +47,11 @@ class PythonTask(Settings):
         max_length=256,
         description="What networks see, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
         "encoder.K, goal_sector.K, goal_distance, last_move, last_turn.",
+    )
+    observe: Observe = Field(
+        "track",
+        description="The least that an observer has to see of a robot's trial for the function to score it: readings, "
+        "cells, encoders or track.",
     )
     source: str = Field(
         "",
@@ -111,6 +118,24 @@ class PythonTask(Settings):
     def needs_trace(self) -> bool:
         """Always: nobody knows what the function looks at."""
         return True
+
+    @property
+    def score_name(self) -> str:
+        """The name of the score in figures."""
+        return f"score of {self.function_name}"
+
+    @property
+    def score_range(self) -> tuple[float, float]:
+        """The least and the greatest score that there can be."""
+        return (-math.inf, math.inf)
+
+    @model_serializer(mode="wrap")
+    def _without_default_observation(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Conditions that observe all keep their hashes."""
+        values: dict[str, Any] = handler(self)
+        if self.observe == "track":
+            values.pop("observe", None)
+        return values
 
     @property
     def file(self) -> str:

@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.records import Observe
 from realitygap.world import Arena
 
 from ._trajectories import Trajectories
@@ -26,6 +27,9 @@ class Task(Protocol):
             `line.K`, `bump.K`, `encoder.K`, `goal_sector.K` (which pie slice the goal is in), `goal_distance`,
             `last_move`, `last_turn`.
         needs_trace: Whether `fitness` looks at single steps; where it does not, the arrays of steps have no rows.
+        observe: How much an observer has to see of a trial so that it can be scored.
+        score_range: The least and the greatest score that there can be; infinite where there is no limit.
+        score_name: What figures call the score, with its unit, such as `coverage` or `way along walls [m]`.
     """
 
     @property
@@ -36,6 +40,15 @@ class Task(Protocol):
 
     @property
     def needs_trace(self) -> bool: ...
+
+    @property
+    def observe(self) -> Observe: ...
+
+    @property
+    def score_name(self) -> str: ...
+
+    @property
+    def score_range(self) -> tuple[float, float]: ...
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """(n,) what each trial is worth, finite; more is better."""

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from realitygap.errors import TaskError
-from realitygap.kernels._scores import wall_scores
-from realitygap.settings import Settings
+from realitygap.kernels.tasks.scores import wall_scores
 from realitygap.world import Arena
 
 from ._inputs import Inputs
+from ._step_task import StepTask
 from ._trajectories import Trajectories
 
-SIDES = {"left": 1.0, "right": -1.0}
+WALL_SIDES = {"left": 1.0, "right": -1.0}
+"""The kernels' number for the side on which a robot keeps the wall."""
 
 
-class WallTask(Settings):
+class WallTask(StepTask):
     """How far a robot went along walls that it had near and on one side [m].
 
     A step counts with its part along the nearest wall or obstacle: forward with that on the right side, backward with
@@ -36,15 +38,8 @@ class WallTask(Settings):
         0.15, gt=0, le=100, description="Nearer than this to the robot's origin is near [m]."
     )
 
-    @property
-    def name(self) -> str:
-        """As `[task] kind` has it."""
-        return self.kind
-
-    @property
-    def needs_trace(self) -> bool:
-        """Always: every step counts."""
-        return True
+    score_name: ClassVar[str] = "way along walls [m]"
+    score_range: ClassVar[tuple[float, float]] = (-math.inf, math.inf)
 
     def check_arena(self, arena: Arena, drawn: Iterable[str] = ()) -> None:
         """Refuse an arena in which there is nothing to go along, or not at one place.
@@ -75,13 +70,13 @@ class WallTask(Settings):
         """
         self.check_arena(arena, trajectories.drawn)
         scores = np.empty(len(trajectories))
-        walls, side, within = outlines(arena), SIDES[self.side], float(self.within)
+        walls, side, within = wall_outlines(arena), WALL_SIDES[self.side], float(self.within)
         wall_scores(trajectories.arrays.poses, walls, side, within, scores)
         return scores
 
 
-def outlines(arena: Arena) -> NDArray[np.float64]:
-    """(w, 4) walls and the sides of obstacles, round ones in short lines, from the start [m]."""
+def wall_outlines(arena: Arena) -> NDArray[np.float64]:
+    """Return walls and sides of obstacles, round ones in short lines, (w, 4) from the start [m]."""
     walls = [*arena.walls]
     for obstacle in arena.obstacles:
         points = obstacle.outline()

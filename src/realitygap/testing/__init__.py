@@ -1,6 +1,7 @@
 """Helpers for people who add a robot, and films and photographs drawn by code; nothing else here imports them."""
 
 from ._filmed import Film, FilmedCamera, path_through, save_film
+from ._platform import PlatformContractError, check_platform
 from ._robot import RobotContractError, check_robot
 from ._sheet_drawing import Difficulty
 from ._sheet_photograph import SheetPhotograph, photograph_sheet
@@ -10,9 +11,11 @@ __all__ = [
     "Difficulty",
     "Film",
     "FilmedCamera",
+    "PlatformContractError",
     "RobotContractError",
     "SheetPhotograph",
     "cells_along_path",
+    "check_platform",
     "check_robot",
     "driven_paths",
     "path_through",

@@ -6,7 +6,16 @@ import math
 from typing import get_args
 
 from realitygap.errors import RealityGapError
-from realitygap.robots import Clock, Command, Label, Observation, Robot, SystemClock
+from realitygap.robots import (
+    Clock,
+    Command,
+    Label,
+    Observation,
+    Robot,
+    SystemClock,
+    channels_of,
+    select_channels,
+)
 
 GOOD = (Command(0.0, 0.0), Command(0.3, 0.0), Command(-0.3, 0.0), Command(0.0, 0.3), Command(0.2, -0.2))
 BAD = (Command(1.01, 0.0), Command(0.0, -2.0), Command(math.nan, 0.0), Command(0.0, math.inf))
@@ -41,6 +50,7 @@ class _Check:
         self.noise = noise
         self.problems: list[str] = []
         self.said: set[str] = set()
+        self.selected: tuple[str, ...] = ()
 
     def carry_out(self) -> None:
         if self.is_a_robot():
@@ -79,6 +89,9 @@ class _Check:
         self.expect(
             not missing, f"It has no {', '.join(missing)}; see realitygap.robots.Robot for what each does."
         )
+        if channels_of(self.robot) and not hasattr(self.robot, "select"):
+            missing.append("select")
+            self.problems.append("It has `channels` and no `select`, which chooses those to read; add it.")
         return not missing
 
     def attributes(self) -> None:
@@ -104,7 +117,9 @@ class _Check:
         self.closed()
 
     def trial(self) -> None:
-        for _ in range(2):
+        for names in (channels_of(self.robot), ()):
+            self.selected = names
+            select_channels(self.robot, names)
             self.robot.reset()
             self.observation("after reset")
             for command in GOOD:
@@ -157,6 +172,10 @@ class _Check:
         outside = [value for value in seen.readings if not low <= value <= high]
         said = f"readings {when} has {outside}, expected {low:g} to {high:g}; scale and limit them."
         self.once("range", not outside, said)
+        channels = dict(seen.channels)
+        expected = f"expected a number from -1 to 1 for each of {list(self.selected)}, those selected."
+        is_so = set(channels) == set(self.selected) and all(-1 <= value <= 1 for value in channels.values())
+        self.once("channels", is_so, f"channels {when} is {channels}, {expected}")
         said = f"stalled {when} is {seen.stalled!r}, expected True or False."
         self.once("stalled", isinstance(seen.stalled, bool), said)
 

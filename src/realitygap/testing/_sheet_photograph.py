@@ -69,7 +69,7 @@ def draw_sheet(
     """(h, w, 3) reflectance of the sheet, 4 pixels a millimeter."""
     import cv2
 
-    from realitygap.vision._raster import raster, to_pixels
+    from realitygap.vision import raster, to_pixels
 
     box, scale = layout.paper, TEXTURE_PX_PER_M
     printed = raster([*layout.thin_marks(), *layout.outer_marks()], box, scale)
@@ -134,7 +134,7 @@ def _seen_from(
     axis = np.array([np.cos(towards), np.sin(towards), 0.0]) * tilt
     import cv2
 
-    from realitygap.vision._raster import to_pixels
+    from realitygap.vision import to_pixels
 
     tilted = cv2.Rodrigues(axis)[0]
     turned = cv2.Rodrigues(np.array([0.0, 0.0, turn]))[0]

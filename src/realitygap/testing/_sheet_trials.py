@@ -33,8 +33,8 @@ def driven_paths(
         For each generation eight paths, each (12 steps + 1, 2) x and y [m].
     """
     from realitygap.evolution import NeatSettings, Population
-    from realitygap.robots import SimPlatform
-    from realitygap.trials import SimTarget, TrialPlan
+    from realitygap.platforms import SimPlatform, SimTarget
+    from realitygap.trials import TrialPlan
 
     population = Population(3, 2, NeatSettings.named("rosenzweig-remy"), seed=seed)
     rng = np.random.default_rng((seed, 0x4A4D))
@@ -79,6 +79,6 @@ def cells_along_path(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
         path: (n, 2) x and y [m].
         grid: Of cells.
     """
-    from realitygap.robots.twin._cells import cells_along
+    from realitygap.robots.twin import cells_along
 
     return cells_along(path, grid)

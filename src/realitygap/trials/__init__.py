@@ -1,126 +1,100 @@
 """One controller on one robot, or a population on a platform."""
 
-from ._attendant import Attendant, RobotsOwnSenses, WitnessAttendant
+from . import _picture  # noqa: F401  # registers the picture of a trajectory
 from ._batch import (
+    MOST_TEAMS,
     REAL,
     NoiseKey,
     PlatformTrials,
     Trajectory,
     TrialBatch,
+    Tried,
+    check_genomes,
     counters_of,
+    counters_of_individuals,
+    counters_of_robot,
+    kind_of,
     paper_inputs,
     poses_of,
 )
-from ._carry_out import Onlooker, TrialStopped, carry_out_on_robot
+from ._carry_out import TrialStopped, carry_out_on_robot
 from ._draws import Draws
-from ._ensemble import Play, Rehearsal, SimEnsemble
-from ._jyro import JyroTrials, jyro_rules, jyro_scene
-from ._jyro_robot import JyroRobot
-from ._maze_scene import maze_exit, maze_rules, maze_scene
-from ._onlooker import RobotOnlooker
-from ._open_twin import SimTwin, open_twin
-from ._operator import PATH_PARTS, Card, Operator, Verdict, WitnessOperator, cell_at, start_words, trial_seed
-from ._physical import (
+from ._ending import EndReason, is_taken_back, is_whole, taken_back, those_that_count
+from ._loop import (
+    Controller,
     DrivenTrial,
-    EndReason,
     TrialInterrupted,
+    controller_of,
     drive_trial,
-    is_taken_back,
-    is_whole,
-    taken_back,
-    those_that_count,
+    run_trial,
 )
+from ._maze_scene import maze_exit, maze_rules, maze_scene
+from ._observer import Observer, PortObserver, RobotObserver
+from ._operator import Card, Led, Operator, Verdict, start_words
 from ._preflight import Preflight, preflight
 from ._processors import usable_processors
-from ._repeats import retry_genomes
 from ._scene import SceneTrack, simulate_case, simulate_file
-from ._sim import SimTrials, sim_rules
-from ._sim_robot import SimRobot
-from ._sim_scene import SimScene, sim_scene
-from ._sim_world import SimWorld
-from ._sim_world_robot import SimWorldRobot
-from ._target import Target, TrialPlan
-from ._target_recorded import RecordedTarget
+from ._sheet_observer import SheetObserver
+from ._target import Target, TellTrial, TrialPlan, check_plans
 from ._target_robot import OnLost, PacedRobot, RobotTarget
-from ._target_sim import SimTarget
-from ._target_twin import TwinTarget
-from ._try import open_trials, trace_genome, trace_genomes, trajectories_of, try_genomes
-from ._twin_fleet import TwinRobots
-from ._twin_trials import close_twins, release_twins
+from ._witness_observer import PATH_PARTS, WitnessObserver, own_witness
 
 __all__ = [
+    "MOST_TEAMS",
     "PATH_PARTS",
     "REAL",
-    "Attendant",
     "Card",
+    "Controller",
     "Draws",
     "DrivenTrial",
     "EndReason",
-    "JyroRobot",
-    "JyroTrials",
+    "Led",
     "NoiseKey",
+    "Observer",
     "OnLost",
-    "Onlooker",
     "Operator",
     "PacedRobot",
     "PlatformTrials",
-    "Play",
+    "PortObserver",
     "Preflight",
-    "RecordedTarget",
-    "Rehearsal",
-    "RobotOnlooker",
+    "RobotObserver",
     "RobotTarget",
-    "RobotsOwnSenses",
     "SceneTrack",
-    "SimEnsemble",
-    "SimRobot",
-    "SimScene",
-    "SimTarget",
-    "SimTrials",
-    "SimTwin",
-    "SimWorld",
-    "SimWorldRobot",
+    "SheetObserver",
     "Target",
+    "TellTrial",
     "Trajectory",
     "TrialBatch",
     "TrialInterrupted",
     "TrialPlan",
     "TrialStopped",
-    "TwinRobots",
-    "TwinTarget",
+    "Tried",
     "Verdict",
-    "WitnessAttendant",
-    "WitnessOperator",
+    "WitnessObserver",
     "carry_out_on_robot",
-    "cell_at",
-    "close_twins",
+    "check_genomes",
+    "check_plans",
+    "controller_of",
     "counters_of",
+    "counters_of_individuals",
+    "counters_of_robot",
     "drive_trial",
     "is_taken_back",
     "is_whole",
-    "jyro_rules",
-    "jyro_scene",
+    "kind_of",
+    "limited",
     "maze_exit",
     "maze_rules",
     "maze_scene",
-    "open_trials",
-    "open_twin",
+    "own_witness",
     "paper_inputs",
     "poses_of",
     "preflight",
-    "release_twins",
-    "retry_genomes",
-    "sim_rules",
-    "sim_scene",
+    "run_trial",
     "simulate_case",
     "simulate_file",
     "start_words",
     "taken_back",
     "those_that_count",
-    "trace_genome",
-    "trace_genomes",
-    "trajectories_of",
-    "trial_seed",
-    "try_genomes",
     "usable_processors",
 ]

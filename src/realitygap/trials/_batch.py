@@ -10,13 +10,14 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.drawing import picture_of
 from realitygap.errors import whole_number
 from realitygap.evolution import Genome, paper_interface
-from realitygap.kernels._genome import NeatRules
-from realitygap.kernels._network import Networks
-from realitygap.kernels._philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
+from realitygap.kernels.math.philox import MAX_GENERATIONS, MAX_INDIVIDUALS, MAX_REPEATS, PURPOSE_NOISE
+from realitygap.kernels.neat.genome import NeatRules
+from realitygap.kernels.neat.network import Networks
 from realitygap.tasks import TraceArrays
-from realitygap.world import Arena, Pose
+from realitygap.world import MOST_ROBOTS, Arena, Pose
 
 REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
@@ -64,6 +65,18 @@ class TrialBatch:
         """(n,) visited share of the reachable cells at the ends of steps, 0..1."""
         return np.divide(self.n_ends, self.cells.shape[1])
 
+    def repeated(self, times: int) -> TrialBatch:
+        """Return the batch with each trial several times."""
+        rows = np.repeat(np.arange(len(self.n_line)), times)
+        return TrialBatch(
+            self.cells[rows],
+            self.n_line[rows],
+            self.n_ends[rows],
+            self.n_stalls[rows],
+            self.drawn[rows] if self.drawn_names else self.drawn,
+            self.drawn_names,
+        )
+
     def behavior(self, k: int) -> NDArray[np.uint8]:
         """The cells that trial k visited along its line, in order of first visit."""
         return self.cells[k, : self.n_line[k]]
@@ -89,6 +102,7 @@ class Trajectory:
         answer_names: (a,) names of these, such as `light.0`.
         drawn: (d,) what was drawn for the trial, of the numbers in `drawn_names`.
         drawn_names: (d,) dotted names.
+        others: The other robots of the trial, if several were in the arena. Coverage and cells are those of all.
     """
 
     step_s: float
@@ -106,11 +120,24 @@ class Trajectory:
     answer_names: tuple[str, ...] = ()
     drawn: tuple[float, ...] = ()
     drawn_names: tuple[str, ...] = ()
+    others: tuple[Trajectory, ...] = ()
+
+    @property
+    def robots(self) -> tuple[Trajectory, ...]:
+        """All robots of the trial: this one first."""
+        return (self, *self.others)
+
+    @property
+    def n_stalls(self) -> int:
+        """Number of blocked steps of all robots."""
+        return sum(int(robot.stalled.sum()) for robot in self.robots)
 
     def _repr_svg_(self) -> str:
-        from ._picture import path_picture
+        return picture_of(self).to_svg(360.0)
 
-        return path_picture(self).to_svg(360.0)
+
+MOST_TEAMS = MAX_INDIVIDUALS // MOST_ROBOTS
+"""Individuals of a generation at most, with several robots in an arena."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +181,27 @@ def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
     counters[:, 1] = key.generation << 12 | key.repeat
     counters[:, 2] = key.replicate
     return counters
+
+
+def counters_of_robot(counters: NDArray[np.uint32], robot: int) -> NDArray[np.uint32]:
+    """(n, 3) the fixed words of the random numbers of one of several robots in each trial.
+
+    Robot 0 draws what it would draw alone, and robot k what individual k * 1,048,576 further on would.
+
+    Args:
+        counters: (n, 3) those of the trials.
+        robot: Number of the robot, from 0 on.
+
+    Raises:
+        ValueError: The trial of an individual from 1,048,576 on: its numbers would repeat.
+    """
+    if (counters[:, 0] >> 8).max(initial=0) >= MOST_TEAMS:
+        raise ValueError(
+            f"There are more than {MOST_TEAMS:,} individuals, the most with several robots in an arena."
+        )
+    words = counters.copy()
+    words[:, 0] += np.uint32(robot * MOST_TEAMS << 8)
+    return words
 
 
 class Tried(NamedTuple):
@@ -253,5 +301,13 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> No
 
 def kind_of(genome: Genome) -> dict[str, float]:
     """What all genomes of a call share: the kernels read it once."""
-    names = ("n_inputs", "bias_input", "activation", "activation_slope", "recurrent", "node_bias")
+    names = (
+        "n_inputs",
+        "bias_input",
+        "activation",
+        "activation_slope",
+        "recurrent",
+        "node_bias",
+        "drives_wheels",
+    )
     return {name: getattr(genome.rules, name) for name in names} | {"bias_value": genome.bias_value}

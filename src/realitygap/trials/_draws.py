@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels._draw import draw_units
-from realitygap.kernels._philox import PURPOSE_MODEL
+from realitygap.kernels.math.draw import draw_units
+from realitygap.kernels.math.philox import PURPOSE_MODEL
 from realitygap.world import Distribution
 
 
@@ -26,11 +26,6 @@ class Draws:
     def __init__(self, numbers: Mapping[str, float | Distribution]) -> None:
         self._drawn = {name: value for name, value in numbers.items() if isinstance(value, Distribution)}
         self.names = tuple(self._drawn)
-
-    @property
-    def differ(self) -> bool:
-        """Whether trials of one call may differ in them."""
-        return any(drawn.per != "study" for drawn in self._drawn.values())
 
     def draw(self, key: int, counters: NDArray[np.uint32]) -> NDArray[np.float64]:
         """(n, d) what is drawn for n trials.

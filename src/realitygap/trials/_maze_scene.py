@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from realitygap.kernels._maze import MazeRules, MazeScene
+from realitygap.kernels.tasks.maze import MazeRules, MazeScene
 from realitygap.tasks import MazeAgent
 from realitygap.world import Arena, Goal
 

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text
+from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
-if TYPE_CHECKING:
-    from ._batch import Trajectory
+from ._batch import Trajectory
 
 _MARGIN = 0.06  # around the path [m]
 _LEAST = 0.5  # shown from left to right, so that a robot that hardly moves looks so [m]
 _SCALE = 0.1  # length of the scale [m]
 
 
+@picture_of.register(Trajectory)
 def path_picture(trajectory: Trajectory) -> Picture:
     """The path of the robot's center from start to end, with the places where it was blocked and a scale of 0.1 m."""
     xs, ys = trajectory.poses[:, 0], trajectory.poses[:, 1]

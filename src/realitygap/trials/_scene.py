@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.kernels.jyro import scene as kernel
+from realitygap.world import Case, CaseBody, CaseDevice
+
 from ..errors import CaseError, RecordError
-from ..kernels import _scene as kernel
-from ..world._case import Case, CaseBody, CaseDevice
 
 _LIGHTS = {
     "linear": kernel.SENSOR_LIGHT_LINEAR,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, Observe, ObservedTrial, sees
 from realitygap.robots import Label
 from realitygap.world import Arena, Pose
 
@@ -28,6 +28,7 @@ class TrialPlan:
         steps: Commands in the trial of a controller.
         number: Of the trial: on simulated platforms its random numbers are a function of it.
         purpose: What it is for, such as controller, path, sensors, motion, contact.
+        sees_end: Whether the robot is looked at once more after the last command.
     """
 
     start: Pose | None = None
@@ -36,6 +37,11 @@ class TrialPlan:
     steps: int = 100
     number: int = 0
     purpose: str = "controller"
+    sees_end: bool = False
+
+
+TellTrial = Callable[[int, ObservedTrial], None]
+"""Called after each trial with the index of its plan."""
 
 
 class Target(Protocol):
@@ -50,6 +56,8 @@ class Target(Protocol):
         step_s: How long one command lasts [s].
         n_sensors: Range sensors.
         observes: The most that can be seen of it.
+        inputs: Names of what networks can see; None where trials are only looked up.
+        is_paced: Whether a command lasts as long as a robot's, so that a simulator can take its pace.
     """
 
     name: str
@@ -58,6 +66,12 @@ class Target(Protocol):
     step_s: float
     n_sensors: int
     observes: Observe
+    is_paced: bool
+
+    @property
+    def inputs(self) -> tuple[str, ...] | None:
+        """As above."""
+        ...
 
     @property
     def identity(self) -> str:
@@ -65,10 +79,7 @@ class Target(Protocol):
         ...
 
     def carry_out(
-        self,
-        plans: Sequence[TrialPlan],
-        observe: Observe,
-        tell: Callable[[int, ObservedTrial], None] | None = None,
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[ObservedTrial]:
         """Carry out trials; what is seen of plan k is entry k.
 
@@ -99,7 +110,6 @@ def check_plans(
     observe: Observe,
     target: Target,
     most_number: int,
-    inputs: Sequence[str] | None = None,
 ) -> None:
     """Refuse plans that a target cannot carry out.
 
@@ -108,7 +118,6 @@ def check_plans(
         observe: How much of them is to be seen.
         target: By whom.
         most_number: The greatest number of a trial.
-        inputs: What networks can see there; anything where trials are only looked up.
 
     Raises:
         ControllerError: A controller sees what is not there.
@@ -116,7 +125,7 @@ def check_plans(
     """
     if observe not in OBSERVATIONS:
         raise ValueError(f"observe is {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
-    if OBSERVATIONS.index(observe) > OBSERVATIONS.index(target.observes):
+    if not sees(target.observes, observe):
         raise ValueError(
             f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
             "or name a witness that sees more."
@@ -131,7 +140,7 @@ def check_plans(
             np.abs(plan.commands) <= 1
         ):  # so that no number is refused, too
             raise ValueError(f"The commands of plan {k} are not all numbers from -1 to 1.")
-        if plan.genome is not None and inputs is not None:
-            plan.genome.interface.check(inputs, "The controller", target.name)
+        if plan.genome is not None and target.inputs is not None:
+            plan.genome.interface.check(target.inputs, "The controller", target.name)
         whole_number(f"number of plan {k}", plan.number, 0, most_number)
         whole_number(f"steps of plan {k}", plan.steps, 1, 100_000)

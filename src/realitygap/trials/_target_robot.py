@@ -6,21 +6,21 @@ import contextlib
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
-from realitygap.evolution import inputs_of_ranges
+from realitygap.evolution import inputs_of_robot
 from realitygap.records import Observe, ObservedTrial
-from realitygap.robots import Clock, Command, Label, Observation, Robot
+from realitygap.robots import Clock, Command, Label, Observation, Robot, channels_of, select_channels
 from realitygap.world import Arena, Pose
 
-from ._attendant import Attendant
 from ._carry_out import TrialStopped, carry_out_on_robot
-from ._physical import EndReason
-from ._target import TrialPlan, check_plans
+from ._ending import EndReason
+from ._observer import PortObserver
+from ._target import TellTrial, TrialPlan, check_plans
 
 OnLost = Literal["retry", "skip", "stop"]
 """What follows a trial in which the link was lost: the same again, once; the next one; or nothing."""
@@ -30,7 +30,7 @@ LATE = 0.02
 """How much longer than said most commands of a trial may take before what they took is kept instead."""
 
 
-class PacedRobot:
+class PacedRobot(ClosedOnExit):
     """A robot whose commands follow each other in time: what its readings take counts as a part of the command.
 
     So a command takes effect that much after its readings, and lasts `step_s` all the same. Where readings take longer
@@ -48,8 +48,13 @@ class PacedRobot:
         self.label: Label = robot.label
         self.step_s = step_s
         self.n_sensors: int = robot.n_sensors
+        self.channels = channels_of(robot)
         self._due = 0.0
         self._lasted: list[float] = []
+
+    def select(self, names: Sequence[str]) -> None:
+        """Choose the sensors to read besides range sensors."""
+        select_channels(self._robot, names)
 
     def reset(self, pose: Pose | None = None) -> None:
         """As `Robot.reset`; a robot on a port stays where it was put."""
@@ -88,17 +93,9 @@ class PacedRobot:
         """Stop the motors and let go of it."""
         self._robot.close()
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-class RobotTarget:
-    """A robot on a port, and who stands beside it.
+class RobotTarget(ClosedOnExit):
+    """A robot on a port, and its observer.
 
     Where the link is lost in a trial, what was seen of it is told as a trial that ended as LOST, and the link is opened
     anew. The motors are stopped on every way out.
@@ -106,54 +103,60 @@ class RobotTarget:
     Args:
         open_robot: Opens the robot.
         arena: Where.
-        attendant: Who places it and says what it drew.
+        observer: Places it and says what it drew.
         name: As the user named it.
         step_s: How long a command lasts [s].
         on_lost: What follows a trial in which the link was lost.
 
     Raises:
-        RobotError: The robot cannot be reached, or not attended to.
+        RobotError: The robot cannot be reached, or not observed.
     """
+
+    is_paced = True
 
     def __init__(
         self,
         open_robot: Callable[[], Robot],
         arena: Arena,
-        attendant: Attendant,
+        observer: PortObserver,
         *,
         name: str,
         step_s: float = 0.5,
         on_lost: OnLost = "retry",
     ) -> None:
         self.name, self.arena, self.step_s = name, arena, step_s
-        self._open_robot, self._attendant, self._on_lost = open_robot, attendant, on_lost
+        self._open_robot, self._observer, self._on_lost = open_robot, observer, on_lost
         self._robot: PacedRobot | None = None
         robot = self._ready()
         self.label: Label = robot.label
         self.n_sensors = robot.n_sensors
-        self.observes: Observe = attendant.observes
-        self.identity = attendant.identity
+        self._inputs = inputs_of_robot(robot.n_sensors, robot.channels)
+        self.observes: Observe = observer.observes
+        self.identity = observer.identity
 
     def _ready(self) -> PacedRobot:
         """The robot, opened where it is not."""
         if self._robot is None:
             robot = self._open_robot()
             try:
-                clock = self._attendant.meet(robot, self.arena)
+                self._observer.meet(robot, self.arena)
+                clock = self._observer.clock(robot)
             except BaseException:
                 robot.close()
                 raise
             self._robot = PacedRobot(robot, self.step_s, clock)
         return self._robot
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what networks can see."""
+        return self._inputs
+
     def carry_out(
-        self,
-        plans: Sequence[TrialPlan],
-        observe: Observe,
-        tell: Callable[[int, ObservedTrial], None] | None = None,
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
-        check_plans(plans, observe, self, MOST_NUMBER, inputs_of_ranges(self.n_sensors))
+        check_plans(plans, observe, self, MOST_NUMBER)
         trials = []
         try:
             for k, plan in enumerate(plans):
@@ -188,9 +191,9 @@ class RobotTarget:
         self, plan: TrialPlan, observe: Observe, tell: Callable[[ObservedTrial], None] | None
     ) -> tuple[ObservedTrial, str]:
         robot, start = self._ready(), plan.start or self.arena.start
-        self._attendant.place(plan, start)
+        self._observer.place(plan, self.arena, observe)
         try:
-            trial, problem = carry_out_on_robot(robot, plan, observe, self._attendant, start)
+            trial, problem = carry_out_on_robot(robot, plan, observe, self._observer, start)
         except TrialStopped as stopped:
             if tell is not None:
                 tell(stopped.trial)
@@ -203,11 +206,3 @@ class RobotTarget:
             robot, self._robot = self._robot, None
             with contextlib.suppress(RobotError):
                 robot.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

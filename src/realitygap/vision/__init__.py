@@ -14,25 +14,25 @@ from ._ink import ink_density
 from ._layout import PEN_NAMES, SheetLayout
 from ._lens import View
 from ._overlay import overlay_png
-from ._path import trace_path
 from ._pens import PenMaps, separate_pens
 from ._photo import photo_bytes, photo_hash, read_photo
 from ._print import PAPERS, sheet_pdf, sheet_tiles
+from ._raster import raster, to_pixels
 from ._score import SheetScore, TraceScore, score_sheet
 from ._sheet_trials import SheetTrials, trials_on_sheet
 from ._tag_family import CORNER_FAMILY, FAMILIES, tag_bits
 from ._tag_layout import CORNER_SIZE_M, RobotTag, corner_tags
 from ._tag_print import print_tags
-from ._trace import Trace, follow_trace, follow_traces
-from ._track import Track, cells_along, track_of
-from ._track_align import Beginning, find_beginning
-from ._track_camera import Camera, fit_camera
-from ._track_lens import Lens, fit_lens, read_lens
-from ._track_live import LiveTrack
-from ._track_overlay import draw_overlay, save_overlay
-from ._track_source import CameraDevice, Source, VideoFile, open_source
-from ._track_video import Marks, Tracked, track_video
-from ._tracker import Sightings, Tracker, gray_of
+from ._trace import Trace, follow_traces
+from .track._align import Beginning, find_beginning
+from .track._camera import Camera, fit_camera
+from .track._lens import Lens, fit_lens, read_lens
+from .track._live import LiveTrack
+from .track._overlay import draw_overlay, save_overlay
+from .track._source import CameraDevice, Source, VideoFile, open_source
+from .track._track import Track, cells_along, track_of
+from .track._tracker import Sightings, Tracker, gray_of
+from .track._video import Marks, Tracked, track_video
 
 __all__ = [
     "CORNER_FAMILY",
@@ -69,7 +69,6 @@ __all__ = [
     "find_sheet",
     "fit_camera",
     "fit_lens",
-    "follow_trace",
     "follow_traces",
     "gray_of",
     "ink_density",
@@ -78,6 +77,7 @@ __all__ = [
     "photo_bytes",
     "photo_hash",
     "print_tags",
+    "raster",
     "read_lens",
     "read_photo",
     "rectify",
@@ -87,7 +87,7 @@ __all__ = [
     "sheet_pdf",
     "sheet_tiles",
     "tag_bits",
-    "trace_path",
+    "to_pixels",
     "track_of",
     "track_video",
     "trials_on_sheet",

@@ -26,7 +26,6 @@ ONE_PAGE = "arena"
 UNPRINTABLE = 0.010  # of a page's edge [m]
 BLEED = 0.004  # beyond the line where a page is cut [m]
 CROP = 0.005  # length of the marks that say where [m]
-FOOT = 0.004  # height of capitals of what is said below a page [m]
 POINTS = 72 / INCH  # of type, a meter
 CAPITAL = 0.72  # height of a capital in sizes of type
 

@@ -1,6 +1,7 @@
 """Plain descriptions of arenas, bodies and sensors; nothing here moves."""
 
 from ._arena import (
+    MOST_ROBOTS,
     NAMED_STARTS,
     Arena,
     Grid,
@@ -9,15 +10,33 @@ from ._arena import (
 )
 from ._arena_file import ArenaFile
 from ._calibration import Calibration, Fitted
-from ._case import Case
+from ._case import Case, CaseBody, CaseDevice
 from ._distribution import Distribution
 from ._drawn_places import check_drawn_starts
 from ._floor import BARE_FLOOR, Floor, FloorImage
-from ._library import arena_names, load_arena, load_calibration, load_robot, read_calibration, robot_names
-from ._obstacle import Goal, Light, Obstacle, distance_to_segment
-from ._part import Part
-from ._pictures import arena_picture, floor_shapes, goal_shapes, light_shapes, obstacle_shapes, robot_picture
-from ._placing import check_start, is_inside
+from ._library import (
+    arena_names,
+    load_arena,
+    load_calibration,
+    load_robot,
+    read_calibration,
+    read_toml,
+    robot_names,
+)
+from ._numbers import in_si
+from ._obstacle import Goal, Light, Obstacle, Segment, distance_to_segment
+from ._part import MOST_CORNERS, Part, rounded, why_no_part
+from ._pictures import (
+    arena_picture,
+    dimension_line,
+    floor_shapes,
+    goal_shapes,
+    length_text,
+    light_shapes,
+    obstacle_shapes,
+    robot_picture,
+)
+from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RangeSensor, RobotModel
 from ._robot_picture import model_picture
@@ -28,6 +47,8 @@ __all__ = [
     "BARE_FLOOR",
     "INCH",
     "JYRO_SCRIBBLER",
+    "MOST_CORNERS",
+    "MOST_ROBOTS",
     "NAMED_STARTS",
     "Arena",
     "ArenaFile",
@@ -35,6 +56,8 @@ __all__ = [
     "Body",
     "Calibration",
     "Case",
+    "CaseBody",
+    "CaseDevice",
     "Distribution",
     "Fitted",
     "Floor",
@@ -48,14 +71,19 @@ __all__ = [
     "RangeSensor",
     "RangeSensors",
     "RobotModel",
+    "Segment",
     "arena_names",
     "arena_picture",
     "check_drawn_starts",
     "check_start",
+    "dimension_line",
     "distance_to_segment",
+    "enclosing_walls",
     "floor_shapes",
     "goal_shapes",
+    "in_si",
     "is_inside",
+    "length_text",
     "light_shapes",
     "load_arena",
     "load_calibration",
@@ -64,6 +92,9 @@ __all__ = [
     "obstacle_shapes",
     "paper_arena",
     "read_calibration",
+    "read_toml",
     "robot_names",
     "robot_picture",
+    "rounded",
+    "why_no_part",
 ]

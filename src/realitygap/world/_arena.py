@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
+
+from realitygap.drawing import picture_of
 
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor
 from ._obstacle import Goal, Light, Obstacle, Segment
 from ._units import INCH
+
+MOST_ROBOTS = 16
+"""Robots in an arena at once, at most."""
 
 
 class Pose(NamedTuple):
@@ -44,6 +49,13 @@ class Grid:
         """How many cells there are."""
         return self.columns * self.rows
 
+    def cell_at(self, x: float, y: float) -> int | None:
+        """The number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
+        column, row = int((x - self.x) // self.cell), int((y - self.y) // self.cell)
+        if 0 <= column < self.columns and 0 <= row < self.rows:
+            return self.columns * row + column
+        return None
+
 
 @dataclass(frozen=True)
 class Arena:
@@ -59,6 +71,7 @@ class Arena:
         floor: What is on the floor.
         goal: What is to be reached; None where nothing is.
         vary: Which of its numbers are drawn, by dotted name ("arena.start.x"); the fields have their centers.
+        others: Starts of the other robots, where several are in it at once.
     """
 
     name: str
@@ -70,6 +83,22 @@ class Arena:
     floor: Floor = BARE_FLOOR
     goal: Goal | None = None
     vary: Mapping[str, Distribution] = field(default_factory=dict, hash=False)
+    others: tuple[Pose, ...] = ()
+
+    @property
+    def starts(self) -> tuple[Pose, ...]:
+        """Starts of all robots: that of the first one first."""
+        return (self.start, *self.others)
+
+    @property
+    def n_robots(self) -> int:
+        """Number of robots in it."""
+        return 1 + len(self.others)
+
+    @property
+    def alone(self) -> Arena:
+        """The same arena with one robot."""
+        return replace(self, others=()) if self.others else self
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -109,6 +138,8 @@ class Arena:
             values["goal"] = asdict(self.goal)
         if self.vary:
             values["vary"] = {name: drawn.to_dict() for name, drawn in self.vary.items()}
+        if self.others:
+            values["others"] = [tuple(pose) for pose in self.others]
         return values
 
     def numbers(self) -> dict[str, float | Distribution]:
@@ -128,12 +159,10 @@ class Arena:
         """
         from ._arena_file import ArenaFile
 
-        return ArenaFile.of(self).with_arena_numbers(values).arena()
+        return replace(ArenaFile.of(self).with_arena_numbers(values).arena(), others=self.others)
 
     def _repr_svg_(self) -> str:
-        from ._pictures import arena_picture
-
-        return arena_picture(self).to_svg()
+        return picture_of(self).to_svg()
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Arena:
@@ -152,6 +181,7 @@ class Arena:
             Floor.from_dict(values.get("floor", {})),
             Goal(**values["goal"]) if "goal" in values else None,
             {name: Distribution(**drawn) for name, drawn in values.get("vary", {}).items()},
+            tuple(Pose(*pose) for pose in values.get("others", ())),
         )
 
 

@@ -44,7 +44,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from .._limits import MOST_JSON_BYTES, parse_json, read_file
 from ..errors import CaseError, did_you_mean
 from ._case_mistakes import contradictions, explained, listed, objects, place_of, shown
-from ._jyro_stock import (
+from .jyro_stock import (
     CONTROLLERS,
     DEVICES,
     INPUTS,

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ._jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES, complete_device, device_ranges
+from .jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES, complete_device, device_ranges
 
 MAX_VALUES = 100_000_000  # numbers in one result: 800 MB, beyond which a slip is likelier than an intent
 MAX_LISTED = 40  # mistakes named one by one

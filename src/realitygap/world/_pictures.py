@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
+from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
 from ._arena import Arena, Pose
 from ._floor import BARE_FLOOR, Floor, FloorImage
@@ -23,6 +23,7 @@ LIGHT, LIGHT_GLOW = "#e0a100", "#f6e3a1"
 _WHOLE = 1e-6  # a length this near to whole inches was meant so [in]
 
 
+@picture_of.register(Arena)
 def arena_picture(
     arena: Arena, body: Body | RobotModel | None = None, sensors: RangeSensors | None = None
 ) -> Picture:
@@ -43,23 +44,24 @@ def arena_picture(
     shapes += [shape for light in arena.lights for shape in light_shapes(light)]
     if arena.goal is not None:
         shapes += goal_shapes(arena.goal)
-    if sensors is not None:
-        shapes += _rays(sensors, arena.start)
-    if isinstance(body, RobotModel):
-        shapes += _model_shapes(body, arena.start)
-    elif body is not None:
-        shapes += _outline(body, arena.start)
-    shapes += _start(arena.start, size)
+    for start in arena.starts:
+        if sensors is not None:
+            shapes += _rays(sensors, start)
+        if isinstance(body, RobotModel):
+            shapes += _model_shapes(body, start)
+        elif body is not None:
+            shapes += _outline(body, start)
+        shapes += _start(start, size)
     gap = 0.05 * size
-    shapes += _measure(left, bottom - gap, right, bottom - gap, _length(right - left), size=size)
-    shapes += _measure(left - gap, bottom, left - gap, top, _length(top - bottom), size=size)
+    shapes += dimension_line(left, bottom - gap, right, bottom - gap, length_text(right - left), size=size)
+    shapes += dimension_line(left - gap, bottom, left - gap, top, length_text(top - bottom), size=size)
     over = cells_top + 0.028 * size
-    shapes += _measure(cells_right - grid.cell, over, cells_right, over, "", color=Ink.REACH, size=size)
+    shapes += dimension_line(cells_right - grid.cell, over, cells_right, over, "", color=Ink.REACH, size=size)
     shapes.append(
         Text(
             cells_right - grid.cell - 0.02 * size,
             cells_top + 0.034 * size,
-            f"{grid.columns} × {grid.rows} cells of {_length(grid.cell)}",
+            f"{grid.columns} × {grid.rows} cells of {length_text(grid.cell)}",
             7.5,
             "end",
             color=Ink.REACH,
@@ -124,6 +126,7 @@ def _cells(arena: Arena) -> list[Shape]:
 def _arena_in_words(arena: Arena, width: float, height: float) -> str:
     grid, start = arena.grid, arena.start
     things = [
+        (len(arena.others), "other robot"),
         (len(arena.obstacles), "obstacle"),
         (len(arena.lights), "light"),
         (len(arena.floor.tape), "strip of tape"),
@@ -135,8 +138,8 @@ def _arena_in_words(arena: Arena, width: float, height: float) -> str:
         if n
     ]
     return (
-        f"Arena {arena.name}, {_length(width)} by {_length(height)}, with {grid.columns} by {grid.rows} "
-        f"reachable cells of {_length(grid.cell)}{', ' if there else ''}{', '.join(there)}. Trials begin at "
+        f"Arena {arena.name}, {length_text(width)} by {length_text(height)}, with {grid.columns} by {grid.rows} "
+        f"reachable cells of {length_text(grid.cell)}{', ' if there else ''}{', '.join(there)}. Trials begin at "
         f"({start.x:.4g}, {start.y:.4g}) m, heading {start.heading:.4g} rad."
     )
 
@@ -217,18 +220,19 @@ def robot_picture(name: str, body: Body, sensors: RangeSensors) -> Picture:
     shapes = [*_rays(sensors, here), *_outline(body, here), *_start(here)]
     far = max((forward for forward, _, _ in sensors.mounts), default=front) + sensors.max_range
     offset = max((left for _, left, _ in sensors.mounts), default=0.0)
-    shapes += _measure(back, low - 0.03, front, low - 0.03, _length(front - back))
-    shapes += _measure(back - 0.03, low, back - 0.03, high, _length(high - low))
-    shapes += _measure(front, low - 0.03, far, low - 0.03, f"sees {_length(sensors.max_range)}")
+    shapes += dimension_line(back, low - 0.03, front, low - 0.03, length_text(front - back))
+    shapes += dimension_line(back - 0.03, low, back - 0.03, high, length_text(high - low))
+    shapes += dimension_line(front, low - 0.03, far, low - 0.03, f"sees {length_text(sensors.max_range)}")
     if offset > 0:
-        shapes += _measure(far + 0.025, 0.0, far + 0.025, offset, "")
-        shapes.append(Text(far + 0.04, offset / 2, _length(offset), 7.5, "start"))
+        shapes += dimension_line(far + 0.025, 0.0, far + 0.025, offset, "")
+        shapes.append(Text(far + 0.04, offset / 2, length_text(offset), 7.5, "start"))
     n = len(sensors.mounts)
     shapes.append(Text(back, high + 0.025, name, 8.0, "start", bold=True))
+    size = f"{length_text(front - back)} long, {length_text(high - low)} wide"
     return Picture(
         f"Robot {name}",
-        f"Outline of {name} seen from above, facing right: {_length(front - back)} long, {_length(high - low)} wide, "
-        f"with {n} rays that see {_length(sensors.max_range)}.",
+        f"Outline of {name} seen from above, facing right: {size}, "
+        f"with {n} rays that see {length_text(sensors.max_range)}.",
         back - 0.1,
         low - 0.1,
         max(far, front) + 0.13,
@@ -266,10 +270,10 @@ def _start(pose: Pose, size: float = 1.0) -> list[Shape]:
     return [shaft, head, Disc(pose.x, pose.y, 2.6, fill=Ink.OURS)]
 
 
-def _measure(
+def dimension_line(
     x1: float, y1: float, x2: float, y2: float, text: str, color: str = Ink.TEXT, size: float = 1.0
 ) -> list[Shape]:
-    """A dimension line along an axis, its text outside: below a level one, left of an upright one."""
+    """Return a dimension line along an axis. Its text is outside: below a level line, left of an upright one."""
     level = y1 == y2
     tick = _TICK * size
     ends = [
@@ -298,7 +302,8 @@ def _measure(
     return shapes
 
 
-def _length(value: float) -> str:
+def length_text(value: float) -> str:
+    """Return a length [m] in meters, and also in inches if these are whole."""
     inches = value / INCH
     metric = f"{value:.3f}".rstrip("0").rstrip(".") + " m"
     if abs(inches - round(inches)) < _WHOLE * max(1.0, inches) and round(inches) > 0:

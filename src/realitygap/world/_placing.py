@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ._arena import Arena, Pose
-from ._obstacle import Segment
+from ._obstacle import Segment, distance_to_segment
 from ._robot import Body
 
 if TYPE_CHECKING:
@@ -41,6 +41,39 @@ def check_start(arena: Arena, robot: Body | RobotModel) -> None:
         for what, other in _solids(arena):
             if _overlap(outline, other):
                 raise ValueError(f"{start}: its body would overlap {what}. Move the start away from it.")
+
+
+def roomiest_starts(arena: Arena, n: int) -> tuple[Pose, ...]:
+    """Return n starts for further robots, each where it has most room; they face as the arena's start does.
+
+    Each is the center of the reachable cell whose distance to walls and obstacles, or half of whose distance to the
+    starts before it, whichever is less, is largest. Of several alike it is the first.
+    """
+    grid, starts = arena.grid, [arena.start]
+    centers = [
+        (grid.x + (column + 0.5) * grid.cell, grid.y + (row + 0.5) * grid.cell)
+        for row in range(grid.rows)
+        for column in range(grid.columns)
+    ]
+    room = [
+        min(
+            [distance_to_segment(x, y, wall) for wall in arena.walls]
+            + [obstacle.distance(x, y) for obstacle in arena.obstacles],
+            default=math.inf,
+        )
+        for x, y in centers
+    ]
+    for _ in range(n):
+        before = starts[-1]
+        room = [
+            min(free, math.hypot(x - before.x, y - before.y) / 2)
+            for free, (x, y) in zip(room, centers, strict=True)
+        ]
+        # Rounding must not decide between cells that have as much room.
+        most = max(round(free, SAME_DIGITS) for free in room)
+        where = next(k for k, free in enumerate(room) if round(free, SAME_DIGITS) == most)
+        starts.append(Pose(*centers[where], arena.start.heading))
+    return tuple(starts[1:])
 
 
 def is_inside(arena: Arena, x: float, y: float) -> bool:

@@ -6,8 +6,9 @@ import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from realitygap.drawing import picture_of
 from realitygap.settings import Settings
 
 from ._numbers import Described, NotNegative, Number, Positive, Share
@@ -119,15 +120,18 @@ class RangeSensor(Settings):
         1,
         ge=1,
         le=63,
-        description="Spread over the cone: 1, or an odd number. linear and table answer to the nearest, ir and pulses "
-        "to the light of all.",
+        description="Spread over the cone: 1, or an odd number; with lorentz 1 or 3. Responses linear and table use "
+        "the nearest one, the others the light of all.",
     )
-    response: Literal["linear", "ir", "table", "pulses"] = Field(
+    response: Literal["linear", "ir", "table", "pulses", "lorentz"] = Field(
         "linear",
         description="linear: 1 - d / reach; ir: amplitude * exp(-d / decay); table: read from `table`; pulses: the "
-        "share of `pulses` seen, as many as ir states less those missed, each with the probability of drop_*.",
+        "share of `pulses` seen, as many as ir states less those missed, each with the probability of drop_*; lorentz: "
+        "amplitude * (W^2 - P^2) / (d^2 - 2 P d + W^2), with W = half_width and P = peak, and 0 from the reach on.",
     )
-    amplitude: NotNegative = Field(1.0, description="A of ir and pulses: the reading at no distance.")
+    amplitude: NotNegative = Field(
+        1.0, description="A of ir and pulses: the reading at no distance; of lorentz: at `peak`."
+    )
     decay: Positive = Field(0.1, description="L of ir and pulses: where it has fallen to 1/e [m].")
     pulses: int = Field(10, ge=1, le=1000, description="Sent for one reading, with response pulses.")
     table: tuple[Sample, ...] = Field(
@@ -151,6 +155,13 @@ class RangeSensor(Settings):
         description="k of ir and pulses: what a ray meets at an angle a to its normal sends back c / (c + k (1 - c)) "
         "of the light, c = cos a. 0: all; 1: as a matt surface does (Lambert).",
     )
+    half_width: Positive = Field(
+        0.1, description="W of lorentz: the distance at which a reading is half of that at a peak of 0 [m]."
+    )
+    peak: Number = Field(
+        0.0,
+        description="P of lorentz: the distance at which a reading is largest [m]; nearer it stays so. Less than W.",
+    )
 
     @model_validator(mode="after")
     def _has_what_its_response_needs(self) -> Self:
@@ -167,7 +178,26 @@ class RangeSensor(Settings):
         far = [sample.distance for sample in self.table]
         if any(a >= b for a, b in pairwise(far)):
             raise ValueError("expected the table's rows by growing distance, each once")
+        if self.response == "lorentz":
+            self._check_lorentz()
         return self
+
+    def _check_lorentz(self) -> None:
+        if self.rays > 3:
+            raise ValueError(f"rays is {self.rays}, expected 1 or 3 with response 'lorentz'")
+        if self.rays == 3 and self.cone >= math.pi / 2:
+            raise ValueError(f"cone is {self.cone:g}, expected less than pi / 2 with response 'lorentz'")
+        if abs(self.peak) >= self.half_width:
+            raise ValueError(
+                f"peak is {self.peak:g}, expected less than half_width, {self.half_width:g}, with response 'lorentz'"
+            )
+
+    @model_serializer(mode="wrap")
+    def _without_unused_lorentz(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The numbers of lorentz came later: without it they are left out, so that conditions keep their hashes."""
+        values: dict[str, Any] = handler(self)
+        unused = {} if self.response == "lorentz" else {"half_width": 0.1, "peak": 0.0}
+        return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
 
 
 class LightSensor(Settings):
@@ -281,9 +311,7 @@ class RobotModel(Described):
         }
 
     def _repr_svg_(self) -> str:
-        from ._robot_picture import model_picture
-
-        return model_picture(self).to_svg()
+        return picture_of(self).to_svg()
 
     @property
     def radius(self) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import textwrap
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
+from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
-from ._pictures import _length, _measure
+from ._pictures import dimension_line, length_text
 from ._robot_model import LightSensor, RangeSensor, RobotModel
 
 WIDTH = 480.0  # of the picture when its texts have their sizes [pt]
@@ -20,6 +20,7 @@ WHEEL = "#565d67"
 SHELL = "#eef0f3"
 
 
+@picture_of.register(RobotModel)
 def model_picture(model: RobotModel) -> Picture:
     """A robot from above, facing right: outline, wheels, sensors and their reach, dimensions, sources.
 
@@ -40,12 +41,14 @@ def model_picture(model: RobotModel) -> Picture:
     left, right, bottom, top = _around(shapes)
     pad = 0.08 * size
     bottom, left = min(bottom, low) - pad, min(left, back) - pad
-    shapes += _measure(back, bottom, front, bottom, _length(front - back), size=size / 0.6)
-    shapes += _measure(left, low, left, high, _length(high - low), size=size / 0.6)
+    shapes += dimension_line(back, bottom, front, bottom, length_text(front - back), size=size / 0.6)
+    shapes += dimension_line(left, low, left, high, length_text(high - low), size=size / 0.6)
     if model.drive.mixing == "wheels":
         half = model.drive.track / 2
         far = max(right, front) + 2 * pad
-        shapes += _measure(far, -half, far, half, f"track {_length(model.drive.track)}", size=size / 0.6)
+        shapes += dimension_line(
+            far, -half, far, half, f"track {length_text(model.drive.track)}", size=size / 0.6
+        )
         right = far
     left, right, top = left - 1.4 * pad, max(right, front) + pad, max(top, high) + pad
     return _with_words(model, shapes, left, bottom - 1.4 * pad, right, top)
@@ -92,7 +95,7 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
         same = len({(sensor.x, sensor.y, sensor.direction) for sensor in model.range}) == 1
         where = " at one place" if same and len(model.range) > 1 else ""
         shorter = ", drawn shorter" if first.reach > FARTHEST * _size(model) else ""
-        how = f"{kinds}, reach {_length(first.reach)}{shorter}{cone}"
+        how = f"{kinds}, reach {length_text(first.reach)}{shorter}{cone}"
         found.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
     if model.light:
         found.append((_count(len(model.light), "light sensor"), Ink.TEXT, Ink.PEN5))

@@ -20,9 +20,9 @@ from pydantic import (
 from realitygap.errors import DescriptionError
 from realitygap.settings import Settings
 
-from ._arena import NAMED_STARTS, Arena, Pose, paper_arena
+from ._arena import MOST_ROBOTS, NAMED_STARTS, Arena, Pose, paper_arena
 from ._library import arena_names, load_arena
-from ._placing import enclosing_walls, is_inside
+from ._placing import enclosing_walls, is_inside, roomiest_starts
 
 StartName = Literal["corner", "center", "left"]
 
@@ -53,6 +53,28 @@ class ArenaSettings(Settings):
         "junction of cells, which belongs to the upper right one; left: middle of the left side, on a border of "
         "cells, which belongs to the upper one. The paper says only that it is always the same. Names go with the "
         "paper's arena; any other begins where its file says.",
+    )
+
+    robots: int = Field(
+        1,
+        ge=1,
+        le=MOST_ROBOTS,
+        description="Robots that are in the arena at once, on platform sim. They collide, and their range sensors see "
+        "each other. Coverage counts the cells that any of them visits; other tasks score each robot, and count the "
+        "mean.",
+    )
+    other_starts: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = Field(
+        default_factory=list,
+        description="Starts of the robots after the first, [x, y, heading] each. Not given: each at the center of the "
+        "cell that has most room, facing as the first does.",
+    )
+
+    networks: Literal["one", "each"] = Field(
+        "one",
+        description="Networks of several robots. one: all have the same network, whose fitness is that of "
+        "the team. each: every robot has another network of the generation. Each network drives once in each place, "
+        "with partners that are drawn. Its fitness is the mean of these trials (Waibel, Keller & Floreano 2009: "
+        "homogeneous and heterogeneous teams with team-level selection).",
     )
 
     @model_validator(mode="before")
@@ -118,9 +140,16 @@ class ArenaSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Of an arena by name there is no file: conditions keep the hash that they had before files."""
+        """Settings that came later are left out where they change nothing: conditions keep their hashes."""
         values: dict[str, Any] = handler(self)
-        return {key: value for key, value in values.items() if value or key not in ("file", "read")}
+        unused: dict[str, Any] = {
+            "file": "",
+            "read": None,
+            "robots": 1,
+            "other_starts": [],
+            "networks": "one",
+        }
+        return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
 
     def pose(self) -> Pose:
         """Where trials begin."""
@@ -131,7 +160,14 @@ class ArenaSettings(Settings):
         )
 
     def arena(self) -> Arena:
-        """The arena."""
+        """The arena, with the starts of all robots."""
+        arena = self._arena_alone()
+        if self.robots == 1:
+            return arena
+        given = tuple(Pose(x, y, heading) for x, y, heading in self.other_starts)
+        return replace(arena, others=given or roomiest_starts(arena, self.robots - 1))
+
+    def _arena_alone(self) -> Arena:
         if not self.file and self.preset == "paper":
             return paper_arena(self.pose())
         arena = _arena_of(self.preset, self.read)

@@ -10,14 +10,14 @@ from starlette.requests import Request
 
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.robots import DEFAULT_ROBOT
+from realitygap.platforms import DEFAULT_ROBOT
 from realitygap.world import load_arena
 
-from ._frame import attempt, framed, hint, section, text_of, visitor_of, watching, whole_of
+from ._frame import framed, hint, section, text_of, visitor_of, whole_of
 from ._grid import CellGrid
 from ._handover import show_holder
-from ._notices import notify
-from ._part import Part
+from ._notices import attempt, notify
+from ._part import Part, watching
 
 _KINDS = {
     "path": "path: the paper's, five full steps ahead and five turning",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 from nicegui import run, ui
@@ -15,9 +17,9 @@ from realitygap.lab._photos import Photos
 from realitygap.lab._proposals import Proposal
 from realitygap.records import ScoreRole
 
-from ._frame import attempt, hint, section, text_of
+from ._frame import hint, section, text_of
 from ._grid import CellGrid, ink_of
-from ._notices import notify
+from ._notices import attempt
 
 _ROLES: dict[ScoreRole, str] = {
     "score": "The count that selection uses.",
@@ -157,8 +159,8 @@ class Counting:
                     )
 
     async def _undo(self, number: int) -> None:
-        if await attempt(lambda: self._counts.undo(number)):
-            notify(f"The count of trial {number} is taken back; enter it anew.")
+        said = f"The count of trial {number} is taken back; enter it anew."
+        await attempt(lambda: self._counts.undo(number), said)
         self._lab.changed()
         await self.choose(number)
 
@@ -193,8 +195,15 @@ class Counting:
 
             def put(draft: Draft) -> None:
                 self._draft = draft
-                self._counts.keep(each.number, who, role, draft)
-                n_marked.text = self._said(arena.grid.n_cells)
+                text, loop = self._said(arena.grid.n_cells), asyncio.get_running_loop()
+
+                def show(saved: Future[None]) -> None:
+                    problem = saved.exception()
+                    shown = text if problem is None else f"{text}, not saved: {problem}"
+                    loop.call_soon_threadsafe(n_marked.set_text, shown)
+
+                # A count that is shown is on the disk.
+                self._counts.keep(each.number, who, role, draft).add_done_callback(show)
 
             grid = CellGrid(
                 arena,
@@ -257,14 +266,16 @@ class Counting:
         return f"{len(self._draft.cells)} of {n_cells} cells"
 
     async def _enter(self, each: CountedTrial, role: ScoreRole) -> None:
+        draft = self._draft
+
         def enter() -> None:
             self._counts.look()
             if self._counts.trial(each.number).trial.state != each.trial.state:
                 raise LedgerError(f"Somebody else has just changed trial {each.number}. Look again.")
-            self._counts.score(each.number, self._draft, self._who(), role)
+            self._counts.score(each.number, draft, self._who(), role)
 
-        if await attempt(enter):
-            notify(f"Trial {each.number}: {len(self._draft.cells)} cells are in the ledger.", type="positive")
+        said = f"Trial {each.number}: {len(draft.cells)} cells are in the ledger."
+        if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()
         await self.refresh()
@@ -275,13 +286,13 @@ class Counting:
             text = ui.input("What is to be said of this trial").props("outlined dense").classes("lab-wide")
 
             async def note() -> None:
-                if await attempt(lambda: self._counts.note(each.number, text_of(text), self._who())):
-                    notify("Noted.")
+                said, who = text_of(text), self._who()
+                if await attempt(lambda: self._counts.note(each.number, said, who), "Noted."):
                     self._lab.changed()
 
             async def void() -> None:
-                if await attempt(lambda: self._counts.void(each.number, text_of(text))):
-                    notify(f"Trial {each.number} is void; it will be driven again.")
+                said = f"Trial {each.number} is void; it will be driven again."
+                if await attempt(lambda: self._counts.void(each.number, text_of(text)), said):
                     self._lab.changed()
 
             with ui.row().classes("lab-row"):

@@ -5,29 +5,25 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections.abc import Callable, Iterator
-from inspect import isawaitable
+from collections.abc import Iterator
 from typing import Any
 from urllib.parse import unquote
 
-from nicegui import run, ui
+from nicegui import ui
 from starlette.requests import Request
 
-from realitygap.errors import RealityGapError
 from realitygap.lab._access import VISITOR
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.settings import shown
 
+from ._handover import show_request
 from ._notices import notify
+from ._part import watching
 from ._stop import Stop
 
 WHO = "realitygap_who"
 """The cookie with the name of who counts."""
 LONGEST_NAME = 60
-WRONG = (RealityGapError, ValueError, TypeError, OSError)
-"""What people can mend."""
-LOOK_S = 0.25
-"""How often a page looks whether something has changed [s]."""
 
 _PAGES = {"/": "Studies", "/new": "New study", "/robot": "Robot", "/calibrate": "Calibrate", "/gap": "Gap"}
 
@@ -41,8 +37,6 @@ def framed(lab: Lab, title: str, here: str) -> Iterator[None]:
         title: Of the page.
         here: Its path, as the way to the others has it.
     """
-    from ._handover import show_request  # which uses what is below
-
     ui.on_exception(_said_wrong)
     ui.page_title(f"{title} – realitygap lab")
     for sheet in ("lab-files/lab.css", "lab-player/player.css"):
@@ -77,21 +71,6 @@ def _said_wrong(error: Exception) -> None:
     )
 
 
-def watching(lab: Lab, show: Callable[[], Any]) -> None:
-    """Show something anew whenever the lab has changed; `show` may be a coroutine."""
-    seen = lab.version
-
-    async def look() -> None:
-        nonlocal seen
-        if lab.version != seen:
-            seen = lab.version
-            shown = show()
-            if isawaitable(shown):
-                await shown
-
-    ui.timer(LOOK_S, look)
-
-
 def text_of(field: Any) -> str:
     """What was entered, without space around it; empty where it is no text."""
     value = field.value
@@ -122,32 +101,6 @@ def whole_of(field: Any) -> int | None:
     if value is not None and value != int(value):
         raise ValueError(f"{field.label}: expected a whole number, came {shown(value)}.")
     return None if value is None else int(value)
-
-
-def told(act: Callable[[], Any]) -> bool:
-    """Do something that waits for nothing; what is wrong with it is shown. Whether it was done."""
-    try:
-        act()
-    except WRONG as error:
-        show_error(error)
-        return False
-    return True
-
-
-async def attempt(act: Callable[[], Any]) -> bool:
-    """Do something in a thread, because it may wait for a disk; show what is wrong with it. Whether it was done."""
-    try:
-        await run.io_bound(act)
-    except WRONG as error:
-        show_error(error)
-        return False
-    return True
-
-
-def show_error(error: Exception) -> None:
-    """Show what is wrong."""
-    close = {"label": "Close", "color": "white", "noCaps": True}
-    notify(str(error), type="negative", multi_line=True, timeout=8000, actions=[close])
 
 
 def visitor_of(request: Request) -> Visitor:

@@ -11,7 +11,9 @@ from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._gap_job import GapJob
 from realitygap.lab._lab import Lab
 
-from ._frame import attempt, framed, hint, number_of, section, text_of, watching, whole_of
+from ._frame import framed, hint, number_of, section, text_of, whole_of
+from ._notices import attempt
+from ._part import watching
 
 _QUESTIONS = {
     "effect": "to find a mean difference of (coverage)",

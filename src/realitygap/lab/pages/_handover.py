@@ -6,8 +6,8 @@ from nicegui import ui
 
 from realitygap.lab._lab import HANDOVER_S, Lab, RobotRequest, Visitor
 
-from ._frame import told, watching
-from ._part import Part
+from ._notices import told
+from ._part import Part, watching
 
 _UNANSWERED = f"Without an answer within {HANDOVER_S:.0f} s"
 

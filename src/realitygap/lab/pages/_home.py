@@ -8,7 +8,9 @@ from realitygap.lab._lab import Lab
 from realitygap.lab._studies import StudyState
 from realitygap.lab._study_job import StudyJob
 
-from ._frame import attempt, framed, hint, watching
+from ._frame import framed, hint
+from ._notices import attempt
+from ._part import watching
 
 DISK_S = 2.0
 """How often the studies' folders are looked at [s]: other programs may work in them."""

@@ -23,8 +23,8 @@ from realitygap.lab._form import (
 from realitygap.lab._lab import Lab
 from realitygap.study import named_studies
 
-from ._frame import attempt, framed, hint, section, text_of, told
-from ._notices import notify
+from ._frame import framed, hint, section, text_of
+from ._notices import attempt, notify, told
 
 BEGINNING = """[study]
 name = "my-study"

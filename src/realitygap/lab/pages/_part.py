@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from inspect import isawaitable
+from typing import Any, Generic, TypeVar
 
 from nicegui import ui
+
+from realitygap.lab._lab import Lab
+
+LOOK_S = 0.25
+"""How often a page looks whether something has changed [s]."""
 
 T = TypeVar("T")
 
@@ -43,3 +49,18 @@ class Part(Generic[T]):
         now = self._stand()
         self._show(now)
         self._shown = now  # only once it is shown: where that failed the next look tries again
+
+
+def watching(lab: Lab, show: Callable[[], Any]) -> None:
+    """Show something again whenever the lab has changed; `show` may be a coroutine."""
+    seen = lab.version
+
+    async def look() -> None:
+        nonlocal seen
+        if lab.version != seen:
+            seen = lab.version
+            shown = show()
+            if isawaitable(shown):
+                await shown
+
+    ui.timer(LOOK_S, look)

@@ -17,8 +17,8 @@ from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
 from realitygap.lab._photos import Photos, SheetPhoto
 
-from ._frame import attempt, hint
-from ._notices import notify
+from ._frame import hint
+from ._notices import attempt
 
 
 class PhotoInput(Element, component="photo_input.js"):
@@ -206,9 +206,10 @@ class SheetPhotos:
         return draft if draft is not None and draft.cells and draft.proposal == photo.mark else None
 
     async def _enter(self, photo: SheetPhoto) -> None:
-        await self.load()
-        found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
-        drafts = {number: draft for number, draft in found.items() if draft is not None}
-        if await attempt(lambda: self._counts.score_all(drafts, self._who())):
-            notify(f"{len(drafts)} trials are in the ledger.", type="positive")
+        with ui.context.client:  # the button that was pressed may be gone by then
+            await self.load()
+            found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
+            drafts = {number: draft for number, draft in found.items() if draft is not None}
+            said = f"{len(drafts)} trials are in the ledger."
+            await attempt(lambda: self._counts.score_all(drafts, self._who()), said, type="positive")
         self._lab.changed()

@@ -12,9 +12,11 @@ from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.robots.scribbler import PortGuess, find_ports
 
-from ._frame import attempt, framed, hint, section, text_of, visitor_of, watching
+from ._frame import framed, hint, section, text_of, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
+from ._notices import attempt
+from ._part import watching
 
 LIVE_S = 0.05
 """Between two looks at the senses: 20 a second."""

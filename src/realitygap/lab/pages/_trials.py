@@ -18,21 +18,10 @@ from realitygap.robots.scribbler import PortGuess, find_ports
 
 from ._counting import Counting
 from ._driving import Driving
-from ._frame import (
-    LONGEST_NAME,
-    WRONG,
-    attempt,
-    framed,
-    hint,
-    remember_who,
-    section,
-    text_of,
-    visitor_of,
-    watching,
-)
+from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
 from ._handover import show_holder
-from ._notices import notify
-from ._part import Part
+from ._notices import WRONG, attempt
+from ._part import Part, watching
 from ._photos import SheetPhotos
 from ._questions import show_question
 from ._videos import Videos
@@ -163,8 +152,9 @@ class _Page:
 
     async def _look_at(self, number: int) -> None:
         """Count this trial, below."""
-        await self._counting.choose(number)
-        ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})")
+        with ui.context.client:  # the button that was pressed may be gone by then
+            await self._counting.choose(number)
+            ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})")
 
     async def _named(self, who: str) -> None:
         self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
@@ -363,8 +353,11 @@ class _Page:
 
     async def _choose(self, number: Any) -> None:
         if type(number) is int:
-            await self._counting.choose(number)
-            ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'center'})")
+            with ui.context.client:  # the button that was pressed may be gone by then
+                await self._counting.choose(number)
+                ui.run_javascript(
+                    "document.querySelector('[data-counting]')?.scrollIntoView({block: 'center'})"
+                )
 
     def _show_note(self) -> None:
         ui.input("A note on the whole").props("outlined dense").classes("lab-wide").on(
@@ -380,9 +373,8 @@ class _Page:
         return str(len(each.trial.cells)) if is_seen else "counted"
 
     async def _note(self, field: Any) -> None:
-        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who)):
+        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Noted."):
             field.value = ""
-            notify("Noted.")
 
 
 @dataclass(frozen=True)

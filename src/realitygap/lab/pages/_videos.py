@@ -11,7 +11,8 @@ from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in
 
-from ._frame import attempt, hint, text_of
+from ._frame import hint, text_of
+from ._notices import attempt
 
 
 class Videos:

@@ -19,8 +19,9 @@ from realitygap.lab._study_job import StudyJob
 from realitygap.lab._watcher import Watcher
 
 from ._driving import Driving
-from ._frame import attempt, framed, hint, section, text_of, told, watching, whole_of
-from ._part import Part
+from ._frame import framed, hint, section, text_of, whole_of
+from ._notices import attempt, told
+from ._part import Part, watching
 from ._player import LivePlayer, Player
 
 MOST_FILES = 200
@@ -29,6 +30,7 @@ LOOK_S = 1.0
 """How often the study's folder is looked at [s]."""
 
 _TITLES = {
+    "scores": "Score by generation",
     "coverage": "Coverage by generation",
     "paths": "Best paths",
     "networks": "Networks",
@@ -209,7 +211,7 @@ class _Page:
         if not self._watcher.figures:
             ui.label("Figures come as soon as there are runs.")
         for name, figure in self._watcher.figures.items():
-            section(_TITLES.get(name, name))
+            section(_TITLES[name.partition("-")[0]])
             if "text" in figure:
                 hint(figure["text"])
                 continue

@@ -14,10 +14,11 @@
     // trials can stand on one arena where walls, cells and the length of a step are the same
     const scene = JSON.stringify([condition.walls, condition.grid, condition.trials[0][4]]);
     const made = { ...condition, scene };
-    made.trials = condition.trials.map(([generation, individual, line, ends, stepS, packed]) => ({
-      condition: made, generation, individual, line, ends, stepS, packed, n: condition.steps,
-      key: [condition.name, condition.run, generation, individual].map(encodeURIComponent).join("/"),
-    }));
+    made.trials = condition.trials.map(([generation, individual, line, ends, stepS, packed, ...others]) => {
+      const base = { condition: made, generation, individual, line, ends, stepS, n: condition.steps };
+      const key = [condition.name, condition.run, generation, individual].map(encodeURIComponent).join("/");
+      return { ...base, packed, key, others: others.map((other) => ({ ...base, packed: other })) };
+    });
     return made;
   });
   const count = (trial) => (data.measure === "ends" ? trial.ends : trial.line);
@@ -147,7 +148,9 @@
   function drawTrials() {
     const used = inUse();
     for (const layer of [frame.tiles, frame.trails, frame.robots, frame.words]) layer.replaceChildren();
-    drawn = used.map(({ trial, pen }) => {
+    // the robots of a trial have its pen; its cells and its numbers are drawn with the first one
+    const robots = used.flatMap(({ trial, pen }) => [{ trial, pen }, ...trial.others.map((other) => ({ trial: other, pen, isOther: true }))]);
+    drawn = robots.map(({ trial, pen, isOther = false }) => {
       unpack(trial);
       const { body, mounts } = trial.condition;
       const corners = body.map(([forward, side]) => `${short(forward * MM)},${short(-side * MM)}`).join(" ");
@@ -166,8 +169,8 @@
       const hits = mounts.map(() => make("circle", { class: "hit" }, robot));
       const letter = make("text", { "data-size": 13 }, frame.words);
       letter.textContent = LETTERS[pen];
-      const words = used.length === 1 ? mounts.map(() => make("text", { class: "reading", "data-size": 12 }, frame.words)) : [];
-      return { trial, pen, tile, trail, onward, blocked, robot, rays, hits, letter, words, step: -1 };
+      const words = used.length === 1 && !isOther ? mounts.map(() => make("text", { class: "reading", "data-size": 12 }, frame.words)) : [];
+      return { trial, pen, isOther, tile, trail, onward, blocked, robot, rays, hits, letter, words, step: -1 };
     });
     for (const text of frame.words.children) fit(text);
     frame.robots.classList.toggle("several", used.length > 1);
@@ -197,8 +200,8 @@
 
   // several trials share a cell: each has its own place in it, so that they differ without color as well
   function drawCells() {
-    const all = new Set(), several = drawn.length > 1;
-    for (const part of drawn) {
+    const firsts = drawn.filter((part) => !part.isOther), all = new Set(), several = firsts.length > 1;
+    for (const part of firsts) {
       const { trial, pen } = part;
       const [gx, gy, cell, columns] = trial.condition.grid;
       const side = cell * MM, across = 4, inset = side * 0.1, room = (side - 2 * inset) / across, size = room * 0.66;
@@ -233,7 +236,7 @@
     part.onward.setAttribute("x2", short(x));
     part.onward.setAttribute("y2", short(y));
     // letters around the center, each at its own place: at the start all robots stand on one spot
-    const around = drawn.length > 1 ? 48 : 0, angle = (part.pen / pens.length - 0.25) * 2 * Math.PI;
+    const around = drawn.some((other) => other.pen !== part.pen) ? 48 : 0, angle = (part.pen / pens.length - 0.25) * 2 * Math.PI;
     part.letter.setAttribute("x", short(x + around * Math.cos(angle)));
     part.letter.setAttribute("y", short(y + around * Math.sin(angle)));
     trial.condition.mounts.forEach(([forward, side, direction], k) => {

@@ -5,6 +5,7 @@ counter-clockwise from +x. The physics is that of `realitygap simulate` and comp
 your own is a class of a few lines (`Device`). Studies with many trials use the platform `jyro` instead.
 """
 
+from . import _picture  # noqa: F401  # registers the picture of a world
 from ._camera import Camera, Column, DepthCamera, LampSeen
 from ._device import Device, Edge, Mount
 from ._driven import DrivenRobot

@@ -1,27 +1,26 @@
-"""A `JyroWorld` as a file: a picture, or a movie."""
+"""Pictures of a `JyroWorld` as a file."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from realitygap.drawing import to_image, to_png
+from realitygap.drawing import Picture, to_image, to_png
 from realitygap.records import write_whole
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # Pillow takes a while to import
     from PIL.Image import Image
-
-    from ._world import JyroWorld
 
 _HUNDREDTH = 10  # of a second, the unit of time in a GIF [ms]
 
 
-def save_world(world: JyroWorld, path: str | Path, width: int = 720) -> Path:
-    """Write a picture of the world; an existing file gives way when all is written.
+def save_picture(picture: Picture, path: str | Path, width: int = 720) -> Path:
+    """Write a picture; an existing file is replaced when the new one is complete.
 
     Args:
-        world: As it is now.
+        picture: What to write.
         path: Ends in .svg or .png.
         width: Of a .png [pixels].
 
@@ -33,38 +32,28 @@ def save_world(world: JyroWorld, path: str | Path, width: int = 720) -> Path:
     ending = path.suffix.lower()
     if ending not in (".svg", ".png"):
         raise ValueError(f"{path} ends in {ending or 'nothing'}, expected .svg or .png.")
-    picture = world.picture()
     write_whole(path, [picture.to_svg().encode() if ending == ".svg" else to_png(picture, width)])
     return path
 
 
-def save_world_movie(
-    world: JyroWorld, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480
-) -> Path:
-    """Go on by some steps, and write what happens as a GIF that is as fast as the simulated time.
+def save_movie(pictures: Iterable[Picture], path: str | Path, each_s: float, width: int = 480) -> Path:
+    """Write pictures as a GIF.
 
     Args:
-        world: Goes on from where it is.
+        pictures: One or more, made while they are written.
         path: Ends in .gif.
-        n_steps: How many steps.
-        every: Steps from one picture to the next.
+        each_s: How long each picture is shown [s].
         width: Of the movie [pixels].
 
     Raises:
-        ValueError: The path ends in something else, or a number is below 1.
+        ValueError: The path ends in something else.
         RecordError: It cannot be written, or belongs to a study's results.
     """
     path = Path(path)
     if path.suffix.lower() != ".gif":
         raise ValueError(f"{path} ends in {path.suffix or 'nothing'}, expected .gif.")
-    if n_steps < 1 or every < 1:
-        raise ValueError(f"n_steps is {n_steps} and every {every}, expected 1 or more.")
-    images = [to_image(world.picture(), width)]
-    for step in range(n_steps):
-        world.step()
-        if (step + 1) % every == 0:
-            images.append(to_image(world.picture(), width))
-    write_whole(path, [_gif(images, round(100 * world.step_s * every) * _HUNDREDTH)])
+    images = [to_image(picture, width) for picture in pictures]
+    write_whole(path, [_gif(images, round(100 * each_s) * _HUNDREDTH)])
     return path
 
 

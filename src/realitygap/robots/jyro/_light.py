@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, get_args
 
 from realitygap.drawing import Disc, Shape
-from realitygap.kernels import _scene as kernel
+from realitygap.kernels.jyro import scene as kernel
 
 from ._mounted import MountedSensors
 

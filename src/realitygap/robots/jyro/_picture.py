@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
 
-from realitygap.drawing import Line, Picture, Shape, hex_of
+from realitygap.drawing import Line, Picture, Shape, hex_of, picture_of
 from realitygap.errors import did_you_mean
 
-if TYPE_CHECKING:
-    from ._world import JyroWorld
+from ._world import JyroWorld
 
 PARTS = ("boxes", "shapes", "lights", "walls", "trails", "rays", "bodies", "devices", "speech")
 """What a picture is made of."""
@@ -20,6 +18,7 @@ _FAR = 100.0  # what is further away is not shown: stored robots are [m]
 _ALONE = (-0.5, 0.5)  # what is shown of an empty world [m]
 
 
+@picture_of.register(JyroWorld)
 def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
     """Boxes, walls, lamps, robots with what they carry and see, to scale.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Picture, Point, Shape, Text, hex_of
 from realitygap.errors import RobotError
-from realitygap.kernels._scene import START_ENERGY
+from realitygap.kernels.jyro.scene import START_ENERGY
 from realitygap.world import Pose
 
 from ._device import Device, Edge

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from realitygap.drawing import Ink, Shape
-from realitygap.world._jyro_stock import ROBOT_BODIES
+from realitygap.world.jyro_stock import ROBOT_BODIES
 
 from ._robot import SceneRobot
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from realitygap.world._jyro_stock import DEVICES, SONAR_RANGE
+from realitygap.world.jyro_stock import DEVICES, SONAR_RANGE
 
 from ._light import LightMode, LightSensor
 from ._range import Bumper, RangeSensor

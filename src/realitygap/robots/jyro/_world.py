@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,11 +12,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import Ink, Line, Picture, Shape, hex_of
+from realitygap.drawing import Ink, Line, Picture, Shape, hex_of, picture_of
 from realitygap.errors import RobotError
-from realitygap.kernels import _scene as kernel
+from realitygap.kernels.jyro import scene as kernel
 from realitygap.world import Arena
 
+from ._files import save_movie, save_picture
 from ._robot import SceneRobot
 
 AnyRobot = TypeVar("AnyRobot", bound=SceneRobot)
@@ -357,24 +358,47 @@ class JyroWorld:
 
     def picture(self, hide: Collection[str] = ()) -> Picture:
         """The world from above, without the parts to hide: "rays", "trails", "devices" and so on."""
-        from ._picture import world_picture
-
-        return world_picture(self, hide)
+        return picture_of(self, hide=hide)
 
     def _repr_svg_(self) -> str:
         return self.picture().to_svg()
 
     def save(self, path: str | Path, width: int = 720) -> Path:
-        """Write the picture to a file that ends in .svg or .png; see `save_world`."""
-        from ._files import save_world
+        """Write the picture to a file that ends in .svg or .png.
 
-        return save_world(self, path, width)
+        Args:
+            path: The file; an existing one is replaced.
+            width: Of a .png [pixels].
+
+        Raises:
+            ValueError: The path ends in something else.
+            RecordError: It cannot be written, or belongs to a study's results.
+        """
+        return save_picture(self.picture(), path, width)
 
     def save_movie(self, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480) -> Path:
-        """Go on by some steps and write what happens as a GIF in real time; see `save_world_movie`."""
-        from ._files import save_world_movie
+        """Go on by some steps, and write what happens as a GIF that is as fast as the simulated time.
 
-        return save_world_movie(self, path, n_steps, every=every, width=width)
+        Args:
+            path: Ends in .gif.
+            n_steps: How many steps.
+            every: Steps from one picture to the next.
+            width: Of the movie [pixels].
+
+        Raises:
+            ValueError: The path ends in something else, or a number is below 1.
+            RecordError: It cannot be written, or belongs to a study's results.
+        """
+        if n_steps < 1 or every < 1:
+            raise ValueError(f"n_steps is {n_steps} and every {every}, expected 1 or more.")
+        return save_movie(self._pictures(n_steps, every), path, self.step_s * every, width)
+
+    def _pictures(self, n_steps: int, every: int) -> Iterator[Picture]:
+        yield self.picture()
+        for step in range(1, n_steps + 1):
+            self.step()
+            if step % every == 0:
+                yield self.picture()
 
     def to_dict(self) -> dict[str, Any]:
         """Time, what stands and what all robots are and do, as plain values."""

@@ -7,7 +7,7 @@ from realitygap.errors import RobotError, whole_number
 from . import _codec as codec
 from ._codec import fluke_request
 from ._device import Device
-from ._opcodes import COUNTED, Op
+from .opcodes import COUNTED, Op
 
 RESET_S = 3.0
 """How long a robot takes to begin anew [s]. Source: what Scribbler2-Python waits."""

@@ -12,7 +12,7 @@ from realitygap.errors import ProtocolError, did_you_mean, whole_number
 from . import _codec as codec
 from ._codec import Blob, Request, fluke_request
 from ._device import Device
-from ._opcodes import COUNTED, Op
+from .opcodes import COUNTED, Op
 
 if TYPE_CHECKING:
     from ._images import Pixels, Size

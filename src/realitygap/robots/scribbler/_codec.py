@@ -3,7 +3,7 @@
 Except that an answer that no robot gives is refused (`ProtocolError`): on a link without checksums, that is how a lost
 byte shows.
 
-Source: the protocol of Myro's firmware and clients (`_opcodes.py`).
+Source: the protocol of Myro's firmware and clients (`opcodes.py`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from realitygap.errors import ProtocolError
 
-from ._opcodes import FLUKE_2_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
+from .opcodes import FLUKE_2_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
 
 ANSWER_S = 2.0
 """How long an answer may take to begin [s]: an S1 in the dark takes 0.4 s; the rest is for Bluetooth."""
@@ -34,7 +34,7 @@ class Request:
     Attributes:
         name: What people call it.
         data: All of its bytes.
-        answer: Bytes of its answer after the echo, or one of the kinds in `_opcodes` (LINE, COUNTED ...).
+        answer: Bytes of its answer after the echo, or one of the kinds in `opcodes` (LINE, COUNTED ...).
         echoed: Whether the bytes come back first, as a robot's do; a Fluke's do not.
         repeatable: Whether sending it twice does what sending it once does.
         wait_s: How long the answer may take to begin [s].

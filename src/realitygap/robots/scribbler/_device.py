@@ -13,7 +13,7 @@ from realitygap.robots._contract import Label
 from . import _codec as codec
 from ._codec import Request, SensorBlock
 from ._link import Faults, Link
-from ._opcodes import Op
+from .opcodes import Op
 
 T = TypeVar("T")
 

@@ -10,7 +10,7 @@ from realitygap.errors import RobotError, whole_number
 from . import _codec as codec
 from ._codec import fluke_request, robot_request
 from ._device import Device
-from ._opcodes import Op
+from .opcodes import Op
 
 Ahead = Literal["fluke", "scribbler"]
 

@@ -26,8 +26,8 @@ from ._codec import Request
 from ._guardian import Guardian, descriptor_of
 from ._guardian_process import GIVE_UP_S, SILENT_S
 from ._holder import LOCKS, holder_of, holder_words
-from ._opcodes import COUNTED, JPEG_HEADER, PACKET, Op
 from ._reading import GAP_S, Fault, HangUp, Port, read_answer
+from .opcodes import COUNTED, JPEG_HEADER, PACKET, Op
 
 T = TypeVar("T")
 

@@ -10,7 +10,7 @@ from realitygap.errors import whole_number
 from . import _codec as codec
 from ._codec import MotorStats, Request, robot_request
 from ._device import Device
-from ._opcodes import Op
+from .opcodes import Op
 
 Length = Literal["mm", "half-mm"]
 Angle = Literal["deg", "units"]

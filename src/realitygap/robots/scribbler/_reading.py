@@ -7,7 +7,7 @@ from typing import Protocol
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 
 from ._codec import Request
-from ._opcodes import COUNTED, JPEG_SCAN, LINE, PACKET
+from .opcodes import COUNTED, JPEG_SCAN, LINE, PACKET
 
 GAP_S = 0.5
 """An answer that has begun and then is silent for so long has lost a byte [s]."""

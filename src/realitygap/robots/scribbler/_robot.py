@@ -18,14 +18,12 @@ from realitygap.world import Pose
 from . import _codec as codec
 from ._board import Board
 from ._camera import Camera
+from ._channels import Channels
 from ._device import RobotInfo
 from ._driving import Driving
 from ._exits import EXITS
-from ._identity import Identity
 from ._link import Link, is_serial_port, open_port
-from ._odometry import Odometry
 from ._ports import label_of, port_name
-from ._senses import Senses
 from ._sound import SoundAndLight
 from ._watchdog import Watchdog, WatchedClock
 
@@ -35,7 +33,7 @@ FAR = 99
 """What an S2's distance reads where nothing is seen."""
 
 
-class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Board):
+class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
 
     | command | least | most | unit |
@@ -139,15 +137,21 @@ class Scribbler(Driving, Senses, SoundAndLight, Identity, Camera, Odometry, Boar
             self._recorder.call("reset")
         self._noted("reset", super().stop)
         self._n_steps = 0
+        self._counted = None
         self.link.where = ""
 
     def observe(self) -> Observation:
-        """Read the sensors that look ahead, and whether the robot is blocked."""
+        """Read the sensors that look ahead, those selected, and whether the robot is blocked."""
         if self._recorder is None:
-            return self._observe()
-        seen = self._noted("observe", self._observe)
-        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw)
+            return self._observe_all()
+        seen = self._noted("observe", self._observe_all)
+        more = {"channels": seen.channels} if seen.channels else {}
+        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw, **more)
         return seen
+
+    def _observe_all(self) -> Observation:
+        seen = self._observe()
+        return seen._replace(channels=self._read_channels()) if self._selected else seen
 
     def _observe(self) -> Observation:
         if self.info.fluke != "none":

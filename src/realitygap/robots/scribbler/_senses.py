@@ -7,7 +7,7 @@ import struct
 from . import _codec as codec
 from ._codec import SensorBlock, fluke_request, robot_request
 from ._device import Device, limited
-from ._opcodes import Op
+from .opcodes import Op
 
 _ALL = robot_request("sensors", Op.GET_ALL)
 _IR = robot_request("ir", Op.GET_IR_ALL)

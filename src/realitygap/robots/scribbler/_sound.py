@@ -6,7 +6,7 @@ import struct
 
 from ._codec import robot_request
 from ._device import Device, limited
-from ._opcodes import Op
+from .opcodes import Op
 
 LONGEST_TONE_S = 8.191
 """What an S2 plays at most [s]."""

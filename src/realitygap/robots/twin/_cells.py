@@ -17,11 +17,11 @@ def cells_along(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
         path: (n, >= 2) x and y of its points [m].
         grid: Of cells.
     """
-    from realitygap.kernels._coverage import (
+    from realitygap.kernels.tasks.coverage import (  # compiled code takes a while to import
         to_grid,
         visit,
         visit_line,
-    )  # compiled code takes a while to import
+    )
 
     found = np.zeros(grid.n_cells, np.bool_)
     order = np.zeros(grid.n_cells, np.int64)

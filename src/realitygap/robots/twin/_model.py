@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap.settings import Settings
-from realitygap.world._part import MOST_CORNERS, why_no_part
+from realitygap.world import MOST_CORNERS, why_no_part
+
+from ._toml import toml_of
 
 MOST_MOUNTS = 16
 
@@ -230,6 +232,49 @@ class TwinEncoders(Settings):
     )
 
 
+class TwinLightMount(TwinMount):
+    """Place and direction of a light sensor."""
+
+
+class TwinLight(Settings):
+    """Sensors of ambient light."""
+
+    mount: tuple[TwinLightMount, ...] = Field(
+        (
+            TwinLightMount(x=-0.053, y=-0.018, direction=-2.7925),
+            TwinLightMount(x=-0.053, y=0.0, direction=3.1416),
+            TwinLightMount(x=-0.053, y=0.018, direction=2.7925),
+        ),
+        min_length=1,
+        max_length=MOST_MOUNTS,
+        description="Sensors in the order of their names; a Scribbler has them at the end without the caster.",
+    )
+    room: Annotated[float, Field(ge=0, le=100)] = Field(
+        1.0, description="Light of the room from all sides; a lamp of strength 1 at 1 m gives 1."
+    )
+    lobe: Annotated[float, Field(ge=0.1, le=20)] = Field(
+        2.0, description="Power of the cosine between sensor and lamp that light arrives with."
+    )
+    half: Annotated[float, Field(ge=0.001, le=100)] = Field(
+        1.0, description="Light at which the reading is one half: reading = 1 - half / (2 light), at least 0."
+    )
+    noise: Annotated[float, Field(ge=0, le=2)] = Field(
+        0.004, description="Standard deviation of the logarithm of the light from reading to reading."
+    )
+
+
+class TwinLine(Settings):
+    """Sensors below it, which see whether the floor is dark."""
+
+    mount: tuple[tuple[Offset, Offset], ...] = Field(
+        ((-0.05, -0.005), (-0.05, 0.005)),
+        min_length=1,
+        max_length=MOST_MOUNTS,
+        description="Ahead of the pen and to the left of it [m], in the order of their names.",
+    )
+    threshold: Share = Field(0.5, description="Brightness below which the floor is dark.")
+
+
 class TwinPatch(Settings):
     """A round spot of sticky floor."""
 
@@ -293,6 +338,8 @@ class TwinModel(Settings):
     ir: TwinIr = TwinIr()
     stall: TwinStall = TwinStall()
     encoders: TwinEncoders = TwinEncoders()
+    light: TwinLight | None = Field(None, description="Sensors of ambient light, if it has them.")
+    line: TwinLine | None = Field(None, description="Line sensors, if it has them.")
     oddities: TwinOddities = TwinOddities()
 
     @model_validator(mode="after")
@@ -305,8 +352,12 @@ class TwinModel(Settings):
             )
         return self
 
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A twin without these sensors is written as before there were any."""
+        values: dict[str, Any] = handler(self)
+        return {key: value for key, value in values.items() if value is not None}
+
     def to_toml(self) -> str:
         """The twin as a file, every number with its meaning; `load_twin` reads it."""
-        from ._file import toml_of
-
         return toml_of(self)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text
-from realitygap.world._part import rounded
-from realitygap.world._pictures import _length, _measure
+from realitygap.world import dimension_line, length_text, rounded
 
 from ._ir import places_of
 from ._model import TwinModel
@@ -37,17 +36,18 @@ def twin_picture(model: TwinModel) -> Picture:
     shapes.append(Disc(wheels.caster, 0.0, 2.4, fill=WHEEL))
     shapes.append(Disc(0.0, 0.0, 2.8, fill=Ink.OURS))
     far = max(front, *(x + ir.half for x, _ in places_of(model))) + PAD
-    shapes += _measure(back, low - PAD, front, low - PAD, _length(front - back))
-    shapes += _measure(back - PAD, low, back - PAD, high, _length(high - low))
+    shapes += dimension_line(back, low - PAD, front, low - PAD, length_text(front - back))
+    shapes += dimension_line(back - PAD, low, back - PAD, high, length_text(high - low))
     half = wheels.track / 2
-    shapes += _measure(far, -half, far, half, f"track {_length(wheels.track)}")
+    shapes += dimension_line(far, -half, far, half, f"track {length_text(wheels.track)}")
     words = (
         f"{model.name} (TWIN)",
-        f"half the pulses come back from {_length(ir.half)}; {model.body.mass:g} kg",
+        f"half the pulses come back from {length_text(ir.half)}; {model.body.mass:g} kg",
     )
     for k, text in enumerate(words):
         shapes.append(Text(back, high + PAD * (1.4 - 0.6 * k), text, 8.0 - k, "start", bold=not k))
-    said = f"{words[0]} from above, facing right: {_length(front - back)} long, {_length(high - low)} wide; {words[1]}."
+    size = f"{length_text(front - back)} long, {length_text(high - low)} wide"
+    said = f"{words[0]} from above, facing right: {size}; {words[1]}."
     return Picture(
         f"Twin {model.name}",
         said,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-DELAYS, WHEELS, LIGHT, ENCODERS, FAMILY = range(5)
+DELAYS, WHEELS, LIGHT, ENCODERS, FAMILY, AMBIENT = range(6)
 """What they are for."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,12 @@ from realitygap.robots._contract import Command, Label, Observation, check_comma
 from realitygap.robots._in_program import ProgramRobot
 from realitygap.world import Arena, Pose
 
+from ._ambient import Ambient, names_of
 from ._cells import cells_along
 from ._encoders import Encoders
 from ._ir import IrSensors
 from ._model import TwinModel
-from ._motors import TICK_S, PlainSpeeds, Servo, SpeedSteps
+from ._motors import NOMINAL, TICK_S, PlainSpeeds, Servo, SpeedSteps
 from ._physics import Physics
 from ._random import DELAYS, numbers_for
 from ._shape import STEP_S
@@ -61,6 +62,9 @@ class TwinRobot(ProgramRobot):
     | observation | from 0 | to 1 | raw |
     |---|---|---|---|
     | each infrared sensor, from left to right | no pulse came back | all did | 0 to 6400 |
+    | encoder.0, encoder.1: left, right wheel, if selected | -1: full speed back | full speed | |
+    | light.K, if the file has them and they are selected | dark | bright | |
+    | line.K, likewise | light floor | dark floor | |
 
     Args:
         model: The twin.
@@ -69,22 +73,24 @@ class TwinRobot(ProgramRobot):
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
-        ValueError: The twin's engine is sim, which `realitygap.trials.open_twin` opens.
+        ValueError: The twin's engine is sim, which `realitygap.platforms.open_twin` opens.
     """
 
     label: Label = "TWIN"
     _closed = "This twin is closed: make a new one."
+    _selected: tuple[str, ...] = ()
 
     def __init__(self, model: TwinModel, arena: Arena, *, number: int = 0) -> None:
         if model.engine != "mujoco":
             raise ValueError(
                 f"twin {model.name!r} has engine {model.engine!r}, expected 'mujoco'. Open it by "
-                "realitygap.trials.open_twin."
+                "realitygap.platforms.open_twin."
             )
         self.model, self.arena = model, arena
         self.number = number
         self.step_s = model.step_s
         self.n_sensors = len(model.ir.mount)
+        self.channels = (*names_of(model), "encoder.0", "encoder.1")
         self.clock = TwinClock(self.wait)
         self._physics = Physics(model, arena)
         self.reset()
@@ -98,6 +104,10 @@ class TwinRobot(ProgramRobot):
     def number(self, number: int) -> None:
         self._number = whole_number("number", number, 0, 2**63 - 1)
 
+    def select(self, names: Sequence[str]) -> None:
+        """Choose the sensors that `observe` reads besides infrared."""
+        self._selected = tuple(names)
+
     def reset(self, pose: Pose | None = None) -> None:
         """Begin trial `number` at a pose, or at the arena's start; the heading is that of the body's x."""
         self._check_open()
@@ -110,6 +120,7 @@ class TwinRobot(ProgramRobot):
         self._ir = IrSensors(model, number)
         self._idler = Idler(model, self._start)
         self._encoders = Encoders(model, number)
+        self._ambient = Ambient(model, self.arena, number)
         self._delays = numbers_for(model.seed, number, DELAYS)
         self._heard: deque[tuple[int, float, float]] = deque()  # steps of time, left, right
         self._steps = self._phase = 0
@@ -117,6 +128,7 @@ class TwinRobot(ProgramRobot):
         self._points = [tuple(self._start)]
         self._times = [0.0]
         self._seen: Observation | None = None
+        self._told = self._before = (0.0, 0.0)
         self.n_steps = 0
 
     def observe(self) -> Observation:
@@ -125,8 +137,21 @@ class TwinRobot(ProgramRobot):
         if self._seen is None:
             readings = self._ir.readings(self._physics, self._servo.volts, self.n_steps)
             raw = tuple((readings * FULL_SCALE).tolist())
-            self._seen = Observation(tuple(readings.tolist()), self._idler.stalled, raw)
+            channels = self._read_channels() if self._selected else {}
+            self._seen = Observation(tuple(readings.tolist()), self._idler.stalled, raw, channels)
         return self._seen
+
+    def _read_channels(self) -> dict[str, float]:
+        """Return the values of the selected sensors by name."""
+        values = self._ambient.values(self.pose, self.n_steps)
+        values |= {f"encoder.{k}": speed for k, speed in enumerate(self._wheel_speeds())}
+        return {name: values[name] for name in self._selected}
+
+    def _wheel_speeds(self) -> list[float]:
+        """Return what the encoders counted in the last command, as parts of that at an S2's full speed, -1..1."""
+        full = NOMINAL * self.step_s
+        counted = zip(self._told, self._before, strict=True)
+        return [min(max((now - before) / full, -1.0), 1.0) for now, before in counted]
 
     def drive(self, command: Command) -> None:
         """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1."""
@@ -135,6 +160,7 @@ class TwinRobot(ProgramRobot):
         self.order(_within(move - turn), _within(move + turn))
         self._advance(round(self.step_s / STEP_S))
         self.n_steps += 1
+        self._told, self._before = self.encoders, self._told
         self._seen = None
 
     def order(self, left: float, right: float) -> None:

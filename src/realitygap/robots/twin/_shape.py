@@ -10,10 +10,7 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from realitygap.world import Arena, Obstacle
-from realitygap.world._obstacle import Segment
-from realitygap.world._part import rounded
-from realitygap.world._placing import enclosing_walls, is_inside
+from realitygap.world import Arena, Obstacle, Segment, enclosing_walls, is_inside, rounded
 
 from ._model import TwinModel
 

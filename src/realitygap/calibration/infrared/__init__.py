@@ -1,0 +1,1 @@
+"""The calibration of infrared range sensors: where the robot stands, the likelihood of readings, and the fit."""

@@ -1,0 +1,161 @@
+"""The fit of one range sensor: its parameters with intervals, draws, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from realitygap.calibration._tempering import sample_posterior
+from realitygap.world import Fitted, RobotModel
+
+from ._checks import Independence, independence, predictive_check
+from ._mixture import MixtureReadings
+from ._pulses import PulseReadings
+from ._readings import Array, Placement, refuse_response
+from ._scales import BATTERY, Scale
+
+LEAST_PLACEMENTS = 3
+"""Below which the correlation of readings cannot be told from their placement."""
+
+ENDS = (0.05, 0.95)
+"""Of the 90 % interval."""
+
+IDENTIFIED = 1 / 3
+"""A parameter is identified where its interval is narrower than this part of what was thought possible."""
+
+CURVE = 60
+"""Distances of the fitted curve in a figure."""
+
+SensorModel = PulseReadings | MixtureReadings
+
+
+@dataclass(frozen=True)
+class SensorFit:
+    """What was fitted to the readings of a sensor.
+
+    Attributes:
+        name: Of the sensor, such as range.0.
+        fitted: Its parameters.
+        numbers: The estimate by dotted name.
+        draws: (n,) of each, by dotted name.
+        independence: Of its readings.
+        p: Of the posterior predictive check.
+        misfit: Share of the readings that are not where the fit has them, beyond chance.
+        curve: Distances to a wall ahead [m], mean, and ends of the 90 % band of readings.
+    """
+
+    name: str
+    fitted: tuple[Fitted, ...]
+    numbers: Mapping[str, float]
+    draws: Mapping[str, Array]
+    independence: Independence
+    p: float
+    misfit: float
+    curve: Mapping[str, Array]
+
+
+def fit_sensor(
+    robot: RobotModel,
+    number: int,
+    placements: list[Placement],
+    rng: np.random.Generator,
+    *,
+    n_draws: int = 500,
+) -> SensorFit:
+    """Fit a sensor to what it read where the robot stood.
+
+    Args:
+        robot: On whose numbers the fit builds; its response, reach, cone and pulses stay.
+        number: Of its range sensor.
+        placements: At least one.
+        rng: Random numbers.
+        n_draws: From the posterior.
+
+    Raises:
+        ValueError: No readings, or a sensor whose response is no infrared one.
+    """
+    sensor = robot.range[number]
+    refuse_response(robot, number, sensor.response)
+    placements = [placement for placement in placements if len(placement.readings)]
+    if not placements:
+        raise ValueError(f"There are no readings of range.{number}: expected those of a robot that stands.")
+    apart = independence(placements, rng)
+    model = _model(robot, number, placements, apart.weight)
+    places = sample_posterior(
+        lambda places: model.log_likelihood(_values(model, places)), len(model.scales), rng
+    )
+    values = _values(model, places)
+    chosen = rng.choice(len(values), n_draws, replace=n_draws > len(values))
+    name = f"range.{number}"
+    centers = {scale.name: scale.center(values[:, k]) for k, scale in enumerate(model.scales)}
+    is_own = {scale.name: scale is not BATTERY for scale in model.scales}
+    return SensorFit(
+        name,
+        tuple(_fitted(name, scale, places[:, k], values[:, k]) for k, scale in enumerate(model.scales))
+        + (() if model.places.battery_varied else (_unknown_battery(name),)),
+        {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
+        {
+            f"{name}.{scale.name}": values[chosen, k]
+            for k, scale in enumerate(model.scales)
+            if is_own[scale.name]
+        },
+        apart,
+        *predictive_check(model.probabilities(values[chosen]), model.counts, rng),
+        _curve(model, sensor.cone, sensor.rays, sensor.direction, values[chosen]),
+    )
+
+
+def _model(robot: RobotModel, number: int, placements: list[Placement], weight: float) -> SensorModel:
+    sensor = robot.range[number]
+    if sensor.response == "pulses":
+        return PulseReadings(placements, sensor.reach, sensor.pulses, weight)
+    return MixtureReadings(placements, sensor.reach, weight)
+
+
+def _values(model: SensorModel, places: Array) -> Array:
+    """(m, d) parameters at (m, d) places in the unit cube."""
+    return np.stack([scale.of(places[:, k]) for k, scale in enumerate(model.scales)], axis=1)
+
+
+def _fitted(name: str, scale: Scale, places: Array, values: Array) -> Fitted:
+    low, high = np.quantile(values, ENDS)
+    ends = np.quantile(places, ENDS)
+    identified = bool(np.ptp(ends) < IDENTIFIED * (ENDS[1] - ENDS[0]))
+    return Fitted(
+        name=f"{name}.{scale.name}",
+        estimate=scale.center(values),
+        low=float(low),
+        high=float(high),
+        prior_low=scale.low,
+        prior_high=scale.high,
+        identified=identified,
+        unit=scale.unit,
+        advice="" if identified else scale.advice,
+    )
+
+
+def _unknown_battery(name: str) -> Fitted:
+    """Nothing is known of what the battery does where it did not vary."""
+    return Fitted(
+        name=f"{name}.{BATTERY.name}",
+        estimate=0.0,
+        low=BATTERY.low,
+        high=BATTERY.high,
+        prior_low=BATTERY.low,
+        prior_high=BATTERY.high,
+        identified=False,
+        unit=BATTERY.unit,
+        advice=BATTERY.advice,
+    )
+
+
+def _curve(model: SensorModel, cone: float, rays: int, direction: float, values: Array) -> dict[str, Array]:
+    """What the fit reads before a wall that the robot faces."""
+    ahead = np.linspace(0.0, 1.1 * max(model.places.near.max(), 0.1), CURVE)
+    angles = direction + (np.linspace(-cone, cone, rays) if rays > 1 else np.zeros(1))
+    cosines = np.maximum(np.cos(angles), 1e-3)
+    distances = np.minimum(ahead[:, None] / cosines, model.places.reach)
+    mean, (low, high) = model.quantiles(values, distances, np.array(ENDS))
+    return {"distances_m": ahead, "mean": mean, "low": low, "high": high}

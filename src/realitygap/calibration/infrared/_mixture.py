@@ -1,0 +1,142 @@
+"""The likelihood of infrared readings that are any number in 0..1, as kernels/sim/noise.py draws them.
+
+A reading is the response times 1 + gain * N; what would be below 0 or above 1 is 0 or 1: it is censored there. With a
+probability that rises with distance it is 0 instead, and with another it is anything.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap import _special as special
+
+from ._readings import Array, Placement, Places, logistic
+from ._scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column
+
+STRAY = 1e-6
+"""Probability of any reading, so that one that the model cannot make is unlikely and not impossible."""
+
+FINEST = 1e-5
+"""Readings are taken to be rounded at least to multiples of this."""
+
+COARSE = 1e-3
+"""A step below this is none: readings that happen to be near each other have it, too."""
+
+BINS = 20
+"""Between 0 and 1, for checks and figures, of a sensor that answers in finer steps."""
+
+
+def step_of(readings: Array) -> float:
+    """The step in which a sensor answers: what all readings are multiples of, at least `FINEST`."""
+    values = np.unique(np.asarray(readings, np.float64))
+    apart = np.diff(values)
+    step = float(apart[apart > FINEST].min(initial=1.0))
+    is_coarse = step > COARSE and np.allclose(np.rint(values / step) * step, values, atol=FINEST)
+    return step if is_coarse else FINEST
+
+
+class MixtureReadings:
+    """Infrared readings at placements.
+
+    Args:
+        placements: Where, and what was read.
+        reach: Of the sensor [m].
+        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+    """
+
+    def __init__(self, placements: list[Placement], reach: float, weight: float = 1.0) -> None:
+        self.places = Places.of(placements, reach)
+        self.weight = weight
+        self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER)
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        self.step = step_of(np.concatenate([placement.readings for placement in placements]))
+        self._edges = _inner_edges(self.step)
+        self.counts = np.array([self.binned(placement.readings) for placement in placements])
+        self._rows = self._told_apart(placements)
+
+    def _told_apart(self, placements: list[Placement]) -> tuple[Array, Array, Array]:
+        """Distinct readings: of which placement, from where to where, and how many."""
+        which: list[int] = []
+        readings: list[float] = []
+        counts: list[int] = []
+        for k, placement in enumerate(placements):
+            clipped = np.clip(placement.readings, 0.0, 1.0)
+            rounded = np.where(clipped < 1.0, np.rint(clipped / self.step) * self.step, 1.0)
+            values, n = np.unique(np.minimum(rounded, 1.0), return_counts=True)
+            which += [k] * len(values)
+            readings += values.tolist()
+            counts += n.tolist()
+        return np.array(which), np.array(readings), np.array(counts, np.float64)
+
+    @property
+    def bins(self) -> Array:
+        """(b,) what each bin of readings stands for: 0, parts of what is between, 1."""
+        return np.concatenate([[0.0], (self._edges[1:] + self._edges[:-1]) / 2, [1.0]])
+
+    def binned(self, readings: Array) -> NDArray[np.int64]:
+        """(b,) how many readings in each bin."""
+        place = np.searchsorted(self._edges, np.clip(readings, 0.0, 1.0))
+        return np.bincount(place, minlength=len(self._edges) + 1)
+
+    def probabilities(self, values: Array) -> Array:
+        """(m, p, b) of each bin at each placement.
+
+        Args:
+            values: (m, d) of the parameters, in the order of `scales`.
+        """
+        return self._at(self.places, values)
+
+    def _at(self, places: Places, values: Array) -> Array:
+        back, spread, drop, out = _parts(places, self.scales, values)
+        edges = self._edges
+        below = special.ndtr((edges - back[..., None]) / spread[..., None])
+        below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
+        normal = np.diff(below, axis=2)
+        even = np.concatenate([[0.0], np.diff(edges), [0.0]])
+        rest = 1.0 - drop - out
+        mixed = rest[..., None] * normal + out[..., None] * even
+        mixed[..., 0] += drop
+        return np.asarray((1.0 - STRAY) * mixed + STRAY / mixed.shape[2])
+
+    def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
+        """(m,) of (m, d) parameters, with a probability of any reading at all."""
+        which, readings, counts = self._rows
+        back, spread, drop, out = (part[:, which] for part in _parts(self.places, self.scales, values))
+        half = self.step / 2
+        upper = np.where(readings >= 1.0, np.inf, readings + half)
+        lower = np.where(readings <= 0.0, -np.inf, readings - half)
+        normal = special.ndtr((upper - back) / spread) - special.ndtr((lower - back) / spread)
+        inside = (readings > 0.0) & (readings < 1.0)
+        chance = (1.0 - drop - out) * normal + out * np.where(inside, self.step, half)
+        chance = chance + drop * (readings <= 0.0)
+        chance = (1.0 - stray) * chance + stray * self.step
+        return np.asarray(self.weight * (np.log(chance) @ counts))
+
+    def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
+        """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
+        blank = [Placement(each, np.empty(0)) for each in distances]
+        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
+        summed = np.cumsum(chances, axis=1)
+        place = np.array([(summed < share).sum(axis=1) for share in shares])
+        return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
+
+
+def _parts(places: Places, scales: tuple[Scale, ...], values: Array) -> tuple[Array, Array, Array, Array]:
+    """(m, p) each: response, standard deviation, and probability of nothing and of anything."""
+    amplitude, decay, gain = values[:, :3].T
+    per_volt, incidence = (column(scales, values, scale) for scale in (BATTERY, INCIDENCE))
+    back, dim = places.response(amplitude, decay, per_volt, incidence)
+    spread = np.maximum(gain[:, None] * back, 1e-9)
+    drop = logistic(dim, *values[:, 3:6].T)
+    out = np.minimum(logistic(dim, *values[:, 6:9].T), 1.0 - drop)
+    return back, spread, drop, out
+
+
+def _inner_edges(step: float) -> Array:
+    """Edges of the bins between 0 and 1: what rounds to 0 is 0, and what rounds to 1 is 1."""
+    if step > 0.5 / BINS:
+        return np.arange(step / 2, 1.0, step)
+    edges = np.arange(BINS + 1) / BINS
+    edges[0], edges[-1] = step / 2, 1.0 - step / 2
+    return edges

@@ -1,0 +1,113 @@
+"""Where to put the robot for the calibration of its range sensors, and what it read there.
+
+Source: Rosenzweig & Remy, section 2.3: fifty readings at each distance, 3 in apart. Differs: at least three placements
+at each distance, in rounds, so that a battery that drains is not taken for distance, nor a crooked placement for the
+sensor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.records import ObservedTrial
+from realitygap.trials import TrialPlan
+from realitygap.world import INCH, Arena, Pose, RobotModel
+
+from ._readings import Placement, refuse_response
+
+READINGS = 50
+"""At each placement."""
+
+SPACING = 3 * INCH
+"""Between distances [m]."""
+
+PLACEMENTS = 3
+"""At each distance, where no budget says otherwise."""
+
+SENSORS = "sensors"
+"""The purpose of these trials."""
+
+Rays = Callable[[Pose], Sequence[NDArray[np.float64]]]
+"""Distances along the rays of each range sensor at a pose, to what is nearest [m]."""
+
+
+def sensor_distances(robot: RobotModel) -> list[float]:
+    """From the wall to the foremost range sensor: multiples of 3 in within its reach [m].
+
+    Raises:
+        ValueError: The robot has no range sensor, or one that sees less than 3 in.
+    """
+    reach = max((sensor.reach for sensor in robot.range), default=0.0)
+    distances = [k * SPACING for k in range(1, math.floor(reach / SPACING) + 1)]
+    if not distances:
+        raise ValueError(
+            f"Robot {robot.name!r} has no range sensor that sees {SPACING / INCH:g} in far: there is nothing to fit."
+        )
+    return distances
+
+
+def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[TrialPlan]:
+    """Placements before the arena's right wall, in rounds over the distances.
+
+    Args:
+        arena: With a wall at the greatest x.
+        robot: Whose foremost range sensor is at these distances from it.
+        n: Placements in all; three at each distance when not given.
+
+    Raises:
+        ValueError: The arena or the robot does not allow it.
+    """
+    for k, sensor in enumerate(robot.range):
+        refuse_response(robot, k, sensor.response)
+    distances = sensor_distances(robot)
+    if not arena.walls:
+        raise ValueError(f"Arena {arena.name!r} has no wall to stand before.")
+    xs = [x for wall in arena.walls for x in wall[::2]]
+    ys = [y for wall in arena.walls for y in wall[1::2]]
+    front = max(sensor.x for sensor in robot.range)
+    room = max(xs) - min(xs) - front - robot.radius
+    distances = [distance for distance in distances if distance <= room]
+    if not distances:
+        raise ValueError(
+            f"Arena {arena.name!r} is too short for a robot to stand {SPACING / INCH:g} in from a wall."
+        )
+    n = PLACEMENTS * len(distances) if n is None else n
+    middle = (min(ys) + max(ys)) / 2
+    return [
+        TrialPlan(
+            start=Pose(max(xs) - front - distances[k % len(distances)], middle, 0.0),
+            commands=np.zeros((READINGS, 2)),
+            number=k,
+            purpose=SENSORS,
+        )
+        for k in range(n)
+    ]
+
+
+def distance_of(plan: TrialPlan, arena: Arena, robot: RobotModel) -> float:
+    """From the foremost range sensor to the wall, in a plan of `sensor_plans` [m]."""
+    start = plan.start or arena.start
+    right = max(x for wall in arena.walls for x in wall[::2])
+    return right - start.x - max(sensor.x for sensor in robot.range)
+
+
+def placements_of(trials: Sequence[ObservedTrial], rays: Rays) -> list[list[Placement]]:
+    """(s,) the placements of each range sensor, of all trials in which the robot stood."""
+    placements: list[list[Placement]] = []
+    for trial in trials:
+        if not len(trial.readings) or np.any(trial.commands != 0):
+            continue
+        x, y, heading = trial.poses[0] if len(trial.poses) else trial.start
+        distances = rays(Pose(float(x), float(y), float(heading)))
+        if not placements:
+            placements = [[] for _ in distances]
+        for k, each in enumerate(distances):
+            readings = trial.readings[:, k]
+            placements[k].append(
+                Placement(np.asarray(each), readings, trial.battery_v, place=tuple(trial.start))
+            )
+    return placements

@@ -1,0 +1,119 @@
+"""The likelihood of readings that are counts of pulses, as kernels/sim/pulses.py draws them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap import _special as special
+
+from ._readings import Array, Placement, Places, logistic
+from ._scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column
+
+STRAY = 1e-6
+"""Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
+
+ROWS = 16
+"""Sets of parameters whose probabilities are computed together: their arrays fit into a processor's cache."""
+
+
+class PulseReadings:
+    """Counts of pulses at placements.
+
+    Args:
+        placements: Where, and what was read.
+        reach: Of the sensor [m].
+        pulses: Sent for one reading.
+        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+    """
+
+    def __init__(self, placements: list[Placement], reach: float, pulses: int, weight: float = 1.0) -> None:
+        self.places = Places.of(placements, reach)
+        self.pulses = pulses
+        self.weight = weight
+        self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        self.counts = np.array([self.binned(placement.readings) for placement in placements])
+
+    @property
+    def bins(self) -> Array:
+        """(b,) what each bin of readings stands for."""
+        return np.arange(self.pulses + 1) / self.pulses
+
+    def binned(self, readings: Array) -> NDArray[np.int64]:
+        """(b,) how many readings of each count."""
+        counts = np.clip(np.rint(np.asarray(readings) * self.pulses), 0, self.pulses).astype(np.int64)
+        return np.bincount(counts, minlength=self.pulses + 1)
+
+    def probabilities(self, values: Array) -> Array:
+        """(m, p, b) of each count at each placement.
+
+        Args:
+            values: (m, d) of the parameters, in the order of `scales`.
+        """
+        return self._at(self.places, values)
+
+    def _at(self, places: Places, values: Array, stray: float = STRAY) -> Array:
+        sent_back, missed = self._pulses(places, values)
+        counts = np.arange(self.pulses + 1)
+        burst = values[:, 5, None, None]
+        return self._chances(sent_back[..., None], missed[..., None], counts, burst, stray)
+
+    def _pulses(self, places: Places, values: Array) -> tuple[NDArray[np.int64], Array]:
+        """(m, p) each: pulses that come back if none is missed, and the probability that one is missed."""
+        amplitude, decay, most, at, width = values[:, :5].T
+        per_volt, incidence = (column(self.scales, values, scale) for scale in (BATTERY, INCIDENCE))
+        back, dim = places.response(amplitude, decay, per_volt, incidence)
+        back = np.clip(back, 0.0, 1.0)
+        missed = np.clip(logistic(dim, most, at, width), 1e-12, 1.0 - 1e-12)
+        return np.floor(back * self.pulses + 0.5).astype(np.int64), missed
+
+    def _chances(
+        self,
+        sent_back: NDArray[np.int64],
+        missed: Array,
+        counts: NDArray[np.int64],
+        burst: Array,
+        stray: float,
+    ) -> Array:
+        """Probability of each count; the arrays are broadcast against each other."""
+        left = sent_back - counts
+        logs = np.log(missed) * np.maximum(left, 0) + np.log1p(-missed) * counts
+        apart = np.where(left >= 0, _ways(self.pulses)[sent_back, counts] * np.exp(logs), 0.0)
+        shared = np.where(left == 0, 1.0 - missed, 0.0)
+        shared = shared + np.where(counts == 0, missed, 0.0)
+        mixed = burst * shared + (1.0 - burst) * apart
+        return np.asarray((1.0 - stray) * mixed + stray / (self.pulses + 1))
+
+    def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
+        """(m,) of (m, d) parameters, with a probability of any reading at all."""
+        which, counts = np.nonzero(
+            self.counts
+        )  # most placements have one reading: few counts of all were read
+        logs = np.empty(len(values))
+        for first in range(0, len(values), ROWS):
+            part = slice(first, first + ROWS)
+            sent_back, missed = self._pulses(self.places, values[part])
+            burst = values[part, 5, None]
+            chances = self._chances(sent_back[:, which], missed[:, which], counts, burst, stray)
+            logs[part] = np.einsum("mr,r->m", np.log(chances), self.counts[which, counts])
+        return np.asarray(self.weight * logs)
+
+    def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
+        """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
+        blank = [Placement(each, np.empty(0)) for each in distances]
+        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
+        summed = np.cumsum(chances, axis=1)
+        place = [(summed < share).sum(axis=1) for share in shares]
+        return chances @ self.bins, np.minimum(np.array(place), self.pulses) / self.pulses
+
+
+def _ways(pulses: int) -> Array:
+    """(e, k) in how many ways k of e pulses can be seen; 0 for more than e."""
+    e, k = np.mgrid[: pulses + 1, : pulses + 1]
+    left = np.maximum(e - k, 0)
+    return np.asarray(
+        np.where(
+            k <= e, np.exp(special.gammaln(e + 1) - special.gammaln(k + 1) - special.gammaln(left + 1)), 0.0
+        )
+    )

@@ -1,0 +1,125 @@
+"""Readings of one range sensor of a robot that stands before walls."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.world import RobotModel
+
+Array = NDArray[np.float64]
+
+SAME_V = 0.05
+"""Voltages that differ by less say nothing of a battery [V]."""
+
+SLANTED = 0.9
+"""Cosine of the angle to its normal from which on a wall counts as slanted."""
+
+
+def refuse_response(robot: RobotModel, number: int, response: str) -> None:
+    """Return where a range sensor is an infrared one.
+
+    Raises:
+        ValueError: It is another.
+    """
+    if response not in ("ir", "pulses"):
+        raise ValueError(
+            f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir or pulses: of others "
+            "there is no noise to fit."
+        )
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the robot was put once, and what the sensor read there.
+
+    Attributes:
+        distances: (rays,) along the sensor's rays to what is nearest [m], at most its reach.
+        readings: (n,) one after the other, 0..1.
+        battery_v: [V]; nan where it is not known.
+        cosines: (rays,) between each ray and the normal of what it meets; 1 for all where it is faced.
+        place: Which one was meant, equal for placements of one; by `distances` where nothing is said.
+    """
+
+    distances: Array
+    readings: Array
+    battery_v: float = math.nan
+    cosines: Array | None = None
+    place: tuple[float, ...] = ()
+
+    @property
+    def group(self) -> tuple[float, ...]:
+        """Equal for placements that were to be the same."""
+        return self.place or tuple(np.round(self.distances, 4).tolist())
+
+
+@dataclass(frozen=True)
+class Places:
+    """Placements as arrays.
+
+    Attributes:
+        distances: (p, rays) [m].
+        near: (p,) the least of each [m].
+        weights: (rays,) of the lobe; they add up to 1.
+        volts: (p,) battery less its mean; 0 where it is not known.
+        reach: Of the sensor [m].
+        cosines: (p, rays) between each ray and the normal of what it meets.
+    """
+
+    distances: Array
+    near: Array
+    weights: Array
+    volts: Array
+    reach: float
+    cosines: Array
+
+    @classmethod
+    def of(cls, placements: list[Placement], reach: float) -> Places:
+        """Those of placements."""
+        distances = np.array([placement.distances for placement in placements], np.float64)
+        volts = np.array([placement.battery_v for placement in placements], np.float64)
+        mean = volts[np.isfinite(volts)].mean() if np.isfinite(volts).any() else 0.0
+        rays = distances.shape[1]
+        weights = 1.0 - 0.5 * np.linspace(-1.0, 1.0, rays) ** 2 if rays > 1 else np.ones(1)
+        cosines = [np.ones(rays) if each.cosines is None else each.cosines for each in placements]
+        return cls(
+            distances, distances.min(axis=1), weights / weights.sum(), np.nan_to_num(volts - mean), reach,
+            np.array(cosines, np.float64),
+        )  # fmt: skip
+
+    @property
+    def battery_varied(self) -> bool:
+        """Whether the battery can be told from everything else."""
+        return float(np.ptp(self.volts)) > SAME_V
+
+    @property
+    def slanted(self) -> bool:
+        """Whether walls were met at such angles that what they send back at a slant shows."""
+        return float(self.cosines.min()) < SLANTED
+
+    def response(
+        self, amplitude: Array, decay: Array, per_volt: Array, incidence: Array
+    ) -> tuple[Array, Array]:
+        """(m, p) what comes back, not limited, and the distance that decides what is missed, for (m,) parameters.
+
+        As kernels/sim/ranges.py.
+        """
+        seen = (self.distances < self.reach) * self.weights
+        faced = np.exp(-self.distances[None] / decay[:, None, None]) * seen
+        back, dim = faced.sum(axis=2), self.near[None]
+        if self.slanted:
+            c = self.cosines
+            slanted = (faced * (c / (c + incidence[:, None, None] * (1.0 - c)))).sum(axis=2)
+            some = slanted > 0.0
+            ratio = np.where(some, back, 1.0) / np.where(some, slanted, 1.0)
+            back, dim = slanted, dim + np.log(ratio) * decay[:, None]
+        return np.asarray(back * amplitude[:, None] * np.exp(per_volt[:, None] * self.volts)), dim
+
+
+def logistic(far: Array, most: Array, at: Array, width: Array) -> Array:
+    """(m, p) a probability that rises with distance, at (m, p) or (1, p) distances [m]."""
+    past = (far - at[:, None]) / width[:, None]
+    return np.asarray(most[:, None] / (1.0 + np.exp(-np.clip(past, -500.0, 500.0))))

@@ -1,0 +1,104 @@
+"""The operator of a calibration at a terminal: puts the robot where it has to stand, and measures where it ends."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import typer
+
+from realitygap.errors import StudyError
+from realitygap.trials import Operator
+
+from ._keys import read_line
+
+if TYPE_CHECKING:
+    from realitygap.records import ObservedTrial
+    from realitygap.trials import Led, TrialPlan
+    from realitygap.world import Arena, RobotModel
+
+_KEYS = "Enter goes on, r takes the one before back, q stops for now: "
+
+
+class CalibrationOperator(Operator):
+    """Leads through the trials of a calibration.
+
+    Args:
+        arena: In which the robot stands.
+        robot: Which one it is.
+        ask: Prints a question and waits for the answer; a terminal when not given.
+        say: Prints.
+    """
+
+    def __init__(
+        self,
+        arena: Arena,
+        robot: RobotModel,
+        *,
+        ask: Callable[[str], str] | None = None,
+        say: Callable[[str], None] = typer.echo,
+    ) -> None:
+        super().__init__()
+        self._arena = arena
+        self._robot = robot
+        self._ask = ask or _ask_at_terminal
+        self._say = say
+
+    def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
+        """Say where the robot has to stand, and wait for Enter."""
+        from realitygap.study import placing_words
+
+        self._say(f"\nTrial {number + 1} of {n}: {placing_words(plan, self._arena, self._robot)}")
+        while True:
+            answer = self._ask(_KEYS).lower()
+            if not answer:
+                return "go"
+            if answer in ("q", "quit"):
+                return "stop"
+            if answer in ("r", "redo") and number:
+                return "redo"
+            self._say("There is none before." if answer in ("r", "redo") else f"{answer!r} is none of these.")
+
+    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+        """Ask where a path ended, unless an observer saw it; None has the trial driven again."""
+        from realitygap.study import with_ruled_end
+
+        if plan.purpose == "sensors":
+            means = "  ".join(f"{value:.2f}" for value in trial.readings.mean(axis=0))
+            self._say(f"{len(trial.readings)} readings, on average {means}")
+        if plan.purpose != "path" or len(trial.poses):
+            return trial
+        is_straight = plan.commands[0, 0] != 0
+        questions = ["How far ahead of its start does it stand [in]? ", "How far to the left of it [in]? "]
+        answers: list[float | None] = [0.0, 0.0]
+        if is_straight:
+            answers = [self._number(question) for question in questions]
+        answers.append(self._number("How far did it turn to the left, with all full turns [degrees]? "))
+        if None in answers:
+            return None
+        ahead, left, turned = (float(answer or 0.0) for answer in answers)
+        return with_ruled_end(trial, ahead, left, turned)
+
+    def _number(self, question: str) -> float | None:
+        """The measured number; None has the trial driven again."""
+        from realitygap.study import parse_length
+
+        while True:
+            answer = self._ask(f"{question}(r drives it again) ").lower()
+            if answer in ("r", "redo"):
+                return None
+            value = parse_length(answer)
+            if value is not None:
+                return value
+            self._say(f"{answer!r} is no number. Expected one such as 13.75, 13 3/4 or -2.")
+
+
+def _ask_at_terminal(question: str) -> str:
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise StudyError(
+            "There is no terminal in which to lead you through the trials. Name the witness of an emulator (--witness "
+            "HOST:PORT), or fit what was recorded before (--from FILE)."
+        )
+    typer.echo(question, nl=False)
+    return read_line()

@@ -1,0 +1,65 @@
+"""`realitygap platforms`: what can run trials."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from realitygap.errors import StudyError
+
+from ._code import AllowPlatforms
+
+
+def platforms(
+    check: Annotated[
+        str | None,
+        typer.Option(
+            "--check", metavar="PLATFORM", help="Try a platform out and report whether it keeps the contract."
+        ),
+    ] = None,
+    arena: Annotated[str, typer.Option(metavar="NAME", help="Arena for --check.")] = "paper",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
+    allow_code: AllowPlatforms = False,
+) -> None:
+    """List the platforms that can run trials.
+
+    The list has the platforms of realitygap and those that other packages add.
+
+    Example: realitygap platforms
+
+    Example: realitygap platforms --check python:mine.py:MyRobot --allow-code
+
+    In Python: realitygap.platforms.known_specs()
+    """
+    from realitygap.platforms import platform_class, platform_names, platform_of
+
+    if check is not None:
+        from realitygap.testing import check_platform
+        from realitygap.world import load_arena
+
+        platform = platform_of(check)
+        check_platform(platform, load_arena(arena))
+        only = (
+            " Its robot was not driven: realitygap.testing.check_robot does that."
+            if platform.is_physical
+            else ""
+        )
+        typer.echo(f"{check} keeps the contract of a platform.{only}")
+        return
+    models, problems = [], []
+    for name in platform_names():
+        try:
+            models.append(platform_class(name))
+        except StudyError as error:
+            problems.append(str(error))
+    if as_json:
+        listed = [{"name": each.name, "specs": each.specs(), "summary": each.summary} for each in models]
+        typer.echo(json.dumps(listed, indent=2))
+        return
+    width = max(len(" or ".join(each.specs())) for each in models)
+    for each in models:
+        typer.echo(f"{' or '.join(each.specs()):{width}}  {each.summary.partition(':')[0]}")
+    for problem in problems:
+        typer.echo(f"realitygap: {problem}", err=True)

@@ -1,0 +1,180 @@
+"""A network as C99, for robots that carry it without a computer."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from realitygap._version import __version__
+from realitygap.kernels.neat.network import IDENTITY_LIMIT
+
+from ._genome import Network
+
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+_ACTIVATIONS = {
+    "tanh": "return tanh{f}({slope} * x);",
+    "sigmoid": "return {one} / ({one} + exp{f}(-{slope} * x));",
+    "identity": "return x < -{limit} ? -{limit} : x > {limit} ? {limit} : x;",
+}
+
+_FRAME = """\
+// A network of realitygap {version} as C99. It needs nothing but math.h.
+{origin}//
+// Inputs: {inputs}.
+// Outputs: {outputs}.
+//
+//     {name} controller;
+//     {name}_reset(&controller);                  // before each trial
+//     {name}_step(&controller, inputs, outputs);  // in each step
+//
+// A robot limits the outputs to -1..1.
+
+#ifndef {guard}_H
+#define {guard}_H
+
+#include <math.h>
+
+typedef {real} {name}_real;
+
+enum {{ {input_names}, {guard}_INPUTS }};
+enum {{ {output_names}, {guard}_OUTPUTS }};
+
+typedef struct {{
+    {name}_real nodes[{n_nodes}]; // inputs, outputs, hidden nodes
+}} {name};
+
+static inline void {name}_reset({name} *self) {{
+    for (int k = 0; k < {n_nodes}; k++) self->nodes[k] = {zero};
+}}
+
+static inline {name}_real {name}_answer({name}_real x) {{
+    {activation}
+}}
+
+static inline void {name}_step({name} *self, const {name}_real inputs[{guard}_INPUTS],
+                               {name}_real outputs[{guard}_OUTPUTS]) {{
+    {name}_real *now = self->nodes;
+    {name}_real x;
+    for (int k = 0; k < {guard}_INPUTS; k++) now[k] = inputs[k];
+{body}
+    for (int k = 0; k < {guard}_OUTPUTS; k++) outputs[k] = now[{first_output} + k];
+}}
+
+#endif
+"""
+
+_BEFORE = """\
+    {name}_real before[{n_nodes}]; // a recurrent network sees other nodes as they were after the step before
+    for (int k = 0; k < {n_nodes}; k++) before[k] = now[k];"""
+
+
+def to_c(
+    network: Network,
+    input_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
+    *,
+    precision: Literal["double", "single"] = "double",
+    name: str = "network",
+    origin: Mapping[str, object] | None = None,
+) -> str:
+    """The network as a header of C99, which any C or C++ program can include.
+
+    It has a type for the state of the network, a function that resets it, and a function that computes one step. In
+    double precision the outputs are those of `Network.activate` but for rounding, below 1e-12; in single precision,
+    which suits small processors, below 1e-4 for a feed-forward network.
+
+    Args:
+        network: Of any genome; its memory is not exported.
+        input_names: Names of the inputs to be given, without the constant one; they become constants.
+        output_names: Names of the outputs.
+        precision: Type of all numbers: double or single (float).
+        name: Prefix of all types, functions and constants.
+        origin: Facts for the comment at the top, such as study and condition.
+
+    Raises:
+        TypeError: Something other than a network, such as a genome.
+        ValueError: Another number of names than of inputs or outputs, an unknown precision, or a name that C does not
+            take.
+    """
+    if not isinstance(network, Network):
+        raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
+    if precision not in ("double", "single"):
+        raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
+    if not _IDENTIFIER.fullmatch(name):
+        raise ValueError(f"name is {name!r}, expected a name that C takes, such as 'network'.")
+    if network.n_inputs == 0:
+        raise ValueError(
+            "This network has no inputs but the constant one, so its outputs are constants, too."
+        )
+    inputs = _names("input_names", input_names, network.n_inputs)
+    outputs = _names("output_names", output_names, network.n_outputs)
+    values = network.to_dict()
+    single = precision == "single"
+    guard = name.upper()
+    n_nodes = 1 + max([values["n_inputs"] - 1, *(node["node"] for node in values["nodes"])])
+    common = {"name": name, "guard": guard, "n_nodes": n_nodes}
+    activation = _ACTIVATIONS[values["activation"]].format(
+        f="f" if single else "",
+        slope=_number(values["activation_slope"], single),
+        one=_number(1.0, single),
+        limit=_number(IDENTITY_LIMIT, single),
+    )
+    return _FRAME.format(
+        **common,
+        version=__version__,
+        origin="".join(f"// {key}: {json.dumps(value)}.\n" for key, value in (origin or {}).items()),
+        inputs=", ".join(inputs) or "none",
+        outputs=", ".join(outputs),
+        real="float" if single else "double",
+        input_names=", ".join(_constants(guard, "IN", inputs)),
+        output_names=", ".join(_constants(guard, "OUT", outputs)),
+        zero=_number(0.0, single),
+        activation=activation,
+        body=_body(values, common, single=single),
+        first_output=values["n_inputs"],
+    )
+
+
+def _names(what: str, given: Sequence[str] | None, n: int) -> list[str]:
+    if given is not None and len(given) != n:
+        raise ValueError(f"{what} has {len(given)} names, expected {n}.")
+    return [f"{k}" for k in range(n)] if given is None else list(given)
+
+
+def _constants(guard: str, kind: str, names: Sequence[str]) -> list[str]:
+    """A constant for each input or output, numbered where two would be equal."""
+    found: list[str] = []
+    for k, name in enumerate(names):
+        word = f"{guard}_{kind}_" + re.sub(r"[^A-Z0-9]", "_", name.upper())
+        found.append(word if word not in found else f"{word}_{k}")
+    return found
+
+
+def _number(value: float, single: bool) -> str:
+    """A number of C that has the same value."""
+    text = str(np.float32(value)) + "f" if single else repr(float(value))
+    return text if "." in text or "e" in text else text.replace("f", ".0f")
+
+
+def _body(values: Mapping[str, Any], common: Mapping[str, Any], *, single: bool) -> str:
+    """The statements that compute all nodes in the order of their activation."""
+    constant = values["n_inputs"] - 1 if values["constant"] else -1
+    lines = []
+    if values["constant"]:
+        lines.append(f"    now[{constant}] = {_number(values['bias_value'], single)};")
+    seen = "before" if values["recurrent"] else "now"
+    if values["recurrent"]:
+        lines.append(_BEFORE.format(**common))
+    for node in values["nodes"]:
+        lines.append(f"    x = {_number(node['bias'], single)};")
+        lines += [
+            f"    x += {_number(weight, single)} * {seen}[{source}];"
+            for source, weight in zip(node["sources"], node["weights"], strict=True)
+        ]
+        lines.append(f"    now[{node['node']}] = {common['name']}_answer(x);")
+    return "\n".join(lines)

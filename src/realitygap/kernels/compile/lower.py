@@ -1,0 +1,273 @@
+"""Lower Numba's instructions to LLVM's, with less detour than Numba takes."""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from typing import Any
+
+from llvmlite import ir as llvm
+from numba import _dynfunc
+from numba.core import analysis, ir, lowering, types
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+from numba.np import arrayobj
+
+from . import parts
+from .parts import PartsBuilder
+
+# Of the symbol of a function that unpacks what Python calls with.
+PYTHON_WRAPPER = "_ZN7cpython"
+
+
+# Attributes of arrays that are members of Numba's struct.
+_MEMBERS = {"shape": parts.SHAPE, "size": parts.N_ITEMS}
+
+
+def _assigned_once(blocks: dict[int, Any]) -> set[str]:
+    """Variables with one assignment, which comes before all their uses on every way through `blocks`."""
+    assigned: Counter[str] = Counter()
+    home = {}
+    for label, block in blocks.items():
+        for assignment in block.find_insts(ir.Assign):
+            assigned[assignment.target.name] += 1
+            home[assignment.target.name] = label
+    once = {name for name, times in assigned.items() if times == 1} - analysis.must_use_alloca(blocks)
+    before = analysis.compute_cfg_from_blocks(blocks).dominators()
+    for label, used in analysis.compute_use_defs(blocks).usemap.items():
+        once -= {name for name in used & once if home[name] not in before[label] or home[name] > label}
+    return once
+
+
+class _Lower(lowering.Lower):
+    """Keeps variables as values where it can, and forgets them without a trace.
+
+    Numba gives a place on the stack to each variable that is used in several blocks, reads it before it is
+    written, to count down what it held, and clears it at the end. Kernels count nothing, and for a tuple
+    of a hundred arrays each of these takes LLVM thousands of instructions to see through.
+    """
+
+    def _find_singly_assigned_variable(self) -> None:
+        super()._find_singly_assigned_variable()
+        self._singly_assigned_vars |= _assigned_once(self.blocks)
+
+    def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
+        if name in self._singly_assigned_vars:
+            super().storevar(value, name, argidx)
+        else:
+            self._alloca_var(name, self.typeof(name))
+            self.builder.store(value, self.getvar(name))
+
+    def delvar(self, name: str) -> None:
+        pass
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)
+        self.builder = PartsBuilder(self.entry_block)
+
+    def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
+        array, indices = self.typeof(value.name), self._whole_numbers(index)
+        if indices and parts.is_plain(array) and len(indices[0]) <= array.ndim:
+            if len(indices[0]) == array.ndim or parts.is_plain(resty):
+                return parts.item(
+                    self.context, self.builder, resty, array, self.loadvar(value.name), *indices
+                )
+        return super().lower_getitem(resty, expr, value, index, signature)
+
+    def lower_setitem(self, target: Any, index: Any, value: Any, signature: Any) -> Any:
+        array, indices = self.typeof(target.name), self._whole_numbers(index)
+        if indices and parts.is_plain(array) and len(indices[0]) == array.ndim:
+            place = parts.locate(self.context, self.builder, array, self.loadvar(target.name), *indices)
+            number = self.context.cast(
+                self.builder, self.loadvar(value.name), self.typeof(value.name), array.dtype
+            )
+            return arrayobj.store_item(self.context, self.builder, array, number, place)
+        return super().lower_setitem(target, index, value, signature)
+
+    def _whole_numbers(self, index: Any) -> tuple[Any, Any] | None:
+        """Types and values of an index or of a tuple of them, if these are whole numbers."""
+        kind, value = self.typeof(index.name), self.loadvar(index.name)
+        if isinstance(kind, types.BaseTuple):
+            kinds = tuple(kind)
+            values = [self.builder.extract_value(value, k) for k in range(len(kinds))]
+        else:
+            kinds, values = (kind,), [value]
+        is_whole = kinds and all(isinstance(kind, types.Integer) for kind in kinds)
+        return (kinds, values) if is_whole else None
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        if expr.op == "getattr" and expr.attr in _MEMBERS and parts.is_plain(self.typeof(expr.value.name)):
+            return self.builder.extract_value(self.loadvar(expr.value.name), _MEMBERS[expr.attr])
+        if expr.op == "call" and isinstance(resty, types.RangeType) and not expr.kws and not expr.vararg:
+            numbers = [
+                self.context.cast(self.builder, self.loadvar(one.name), self.typeof(one.name), resty.dtype)
+                for one in expr.args
+            ]
+            return parts.make_range(self.context, resty, numbers)
+        if expr.op == "getiter":
+            value = self.loadvar(expr.value.name)
+            loop = parts.begin_loop(self.context, self.builder, self.typeof(expr.value.name), value)
+            if loop is not None:
+                return loop
+        if expr.op == "iternext" and isinstance(loop := self.loadvar(expr.value.name), parts.Loop):
+            return parts.next_of_loop(self.context, self.builder, resty, loop)
+        return super().lower_expr(resty, expr)
+
+    def lower_assign(self, ty: Any, inst: Any) -> Any:
+        if isinstance(ty, types.Dispatcher):
+            return self.context.get_dummy_value()
+        return super().lower_assign(ty, inst)
+
+
+class _LowerInner(_Lower):
+    """For calls from other kernels: with an argument for each number that the function uses."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        convention = self.call_conv
+        fndesc.mangled_name = getattr(self.library, "_symbol", fndesc.mangled_name)
+        kind = convention.get_function_type(fndesc.restype, ())
+        self.function = llvm.Function(self.module, kind, fndesc.mangled_name)
+        convention.decorate_function(self.function, (), ())
+        if fndesc.inline:
+            self.function.attributes.add("alwaysinline")
+        self.entry_block = self.function.append_basic_block("entry")
+        self.builder = PartsBuilder(self.entry_block)
+        self.call_helper = convention.init_call_helper(self.builder)
+        # Numba marks where it returns values as not shared with anything.
+        unshared = self.function.args[0].attributes if fndesc.noalias else ()
+        self._arguments = parts.Arguments(self.context, self.function, fndesc.argtypes, unshared)
+
+    def extract_function_arguments(self) -> Any:
+        self.fnargs = self._arguments.values
+        return self.fnargs
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        super().lower_normal_function(fndesc)
+        self.library._leaves = self._arguments.finish()
+        self.library._raises = parts.raises(self.function)
+
+
+def _lowering(inner: bool, context: Any, *arguments: Any, **named: Any) -> lowering.Lower:
+    if context.enable_nrt:
+        return lowering.Lower(context, *arguments, **named)
+    return (_LowerInner if inner else _Lower)(context, *arguments, **named)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LowerKernel(NativeLowering):
+    """Lowers a function as above, unless it makes arrays: then it is Numba's to count who holds them."""
+
+    _name = "lower_kernel"
+
+    @property
+    def lowering_class(self) -> Any:
+        """What lowers the instructions."""
+        return functools.partial(_lowering, isinstance(self, LowerForCallers))
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function; return whether anything changed."""
+        if state.library is None:
+            state.library = _make_library(state)
+        return super().run_pass(state)
+
+
+def _make_library(state: Any) -> Any:
+    """Return an empty library for a function."""
+    library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+    library.enable_object_caching()
+    library._optimize_functions = functools.partial(_tidy, library)
+    library.add_ir_module = functools.partial(_add_module, library)
+    return library
+
+
+def _add_module(library: Any, module: Any) -> None:
+    """Add what was lowered to a library.
+
+    A wrapper takes a hundred arguments apart once a call. Optimized, it took a quarter of the time of all.
+    """
+    for function in module.functions:
+        if function.name.startswith(PYTHON_WRAPPER) and function.blocks:
+            function.attributes.update(("noinline", "optnone"))
+    type(library).add_ir_module(library, module)
+
+
+def _tidy(library: Any, module: Any) -> None:
+    """Make functions small for the whole that they become part of, where LLVM spends its effort."""
+    codegen = library._codegen
+    module.data_layout = codegen._data_layout
+    for function in module.functions:
+        if function.is_declaration or function.name.startswith(PYTHON_WRAPPER):
+            continue
+        passes, builder = codegen._function_pass_manager(opt=1)
+        passes.run(function, builder)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LowerForCallers(LowerKernel):
+    """Lowers a function to what its callers link, and leaves optimizing and machine code to them.
+
+    Numba would optimize each function with all it calls, and again within each of its callers.
+    """
+
+    _name = "lower_for_callers"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function to a library that callers link; return that it changed."""
+        library = state.library = self._library(state)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        # Callers know it by this object; it cannot be called.
+        name = lowered.fndesc.qualname
+        function = _dynfunc.make_function(
+            lowered.fndesc.lookup_module(), name, "", 0, lowered.env, (library,)
+        )
+        if hasattr(library, "_leaves"):
+            can_raise = library._raises
+            register_call(
+                state.targetctx, function, lowered.fndesc, library._leaves, can_raise, self._linked(library)
+            )
+        else:
+            state.targetctx.insert_user_function(function, lowered.fndesc, [library])
+        state.reload_init.extend(getattr(library, "_reload_init", ()))  # Numba 0.62 has none
+        state["cr"] = lowered._replace(cfunc=function)
+        return True
+
+    def _library(self, state: Any) -> Any:
+        library = _make_library(state)
+        library._optimize_final_module = lambda: None
+        library._finalize_final_module = functools.partial(_finish_without_code, library)
+        return library
+
+    def _linked(self, library: Any) -> list[Any]:
+        """Return the libraries that become part of callers."""
+        return [library]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LowerShared(LowerForCallers):
+    """Lowers a function to machine code that all its callers call by its symbol."""
+
+    _name = "lower_shared"
+
+    def _library(self, state: Any) -> Any:
+        library = _make_library(state)
+        library._symbol = state.symbol
+        return library
+
+    def _linked(self, library: Any) -> list[Any]:
+        library.finalize()
+        return []
+
+
+def register_call(
+    context: Any, function: Any, fndesc: Any, leaves: Any, can_raise: bool, libraries: Any
+) -> None:
+    """Have kernels call a function with what it uses of its arguments."""
+    call = parts.caller_of(context, fndesc, leaves, can_raise, libraries)
+    context._defns[function].append(call, call.signature)
+
+
+def _finish_without_code(library: Any) -> None:
+    library._finalize_dynamic_globals()
+    library._finalized = True

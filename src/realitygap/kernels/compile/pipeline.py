@@ -1,0 +1,227 @@
+"""A faster way through Numba's compiler for kernels; `decorators` does without it if it is missing.
+
+It gives the results of Numba's own way, to the last bit. It knows parts of Numba that no document promises.
+"""
+
+from __future__ import annotations
+
+import functools
+import gc
+import hashlib
+from typing import Any
+
+from numba import _dynfunc
+from numba.core import itanium_mangler, lowering, types, typing
+from numba.core.compiler import CompilerBase, Flags, compile_result
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    IRLegalization,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    TranslateByteCode,
+)
+
+from .lower import LowerForCallers, LowerKernel, LowerShared, register_call
+
+
+class _Flags(Flags):
+    """Options that compare by those that were set; type inference compares them ten thousands of times."""
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, _Flags) and self._values == other._values)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+
+class _RememberedTyping:
+    """The typing context, with what operations on numbers and arrays give remembered."""
+
+    def __init__(self, context: Any, known: dict[Any, Any]) -> None:
+        self._context = context
+        self._known = known
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, function: Any, arguments: Any, named: Any) -> Any:
+        if type(function) is not types.Function or named:
+            return self._context.resolve_function_type(function, arguments, named)
+        key = (function.typing_key, arguments)
+        try:
+            owner, signature = self._known[key]
+        except KeyError:
+            signature = self._context.resolve_function_type(function, arguments, named)
+            if signature is not None:
+                self._known[key] = (function, signature)
+            return signature
+        if owner is not function:
+            function._impl_keys[signature.args] = owner._impl_keys[signature.args]
+        return signature
+
+
+_KNOWN: dict[Any, dict[Any, Any]] = {}
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class InferTypes(NopythonTypeInference):
+    """Numba's type inference, with the answers of its tables remembered."""
+
+    _name = "infer_types"
+
+    def run_pass(self, state: Any) -> bool:
+        """Infer the types of a function; return whether anything changed."""
+        context = state.typingctx
+        # An operation that Numba writes in Python is compiled with the options of its first caller.
+        known = _KNOWN.setdefault(state.flags, {})
+        state.typingctx = _RememberedTyping(context, known)
+        try:
+            return bool(super().run_pass(state))
+        finally:
+            state.typingctx = context
+
+
+# Of Numba's thirty steps those that kernels need: no closures, contexts, literals or formulas over whole arrays.
+BEFORE_LOWERING = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    GenericRewrites,
+    ReconstructSSA,
+    InferTypes,
+    PreLowerStripPhis,
+    IRLegalization,
+    AnnotateTypes,
+)
+
+
+@functools.cache
+def _digest(arguments: tuple[Any, ...]) -> str:
+    return hashlib.sha256(repr(arguments).encode()).hexdigest()[:24]
+
+
+def _short_name(name: str, arguments: Any, **options: Any) -> str:
+    """A symbol for a function and the types of its arguments, whose names can take 10 kB."""
+    return str(itanium_mangler.mangle(name, (_digest(tuple(arguments)),), **options))
+
+
+def _install_new(context: Any) -> None:
+    for registry in list(context._registries):
+        context.install_registry(registry)
+
+
+class _Entry(CompilerBase):
+    """For calls from Python."""
+
+    lowering = LowerKernel
+    may_alias = True
+
+    def define_pipelines(self) -> Any:
+        self.state.flags = _Flags(self.state.flags)
+        self.state.flags.noalias = not self.may_alias
+        context = self.state.targetctx
+        context.mangler = _short_name
+        # What can be new since the start of this compilation is what templates of ours brought with them.
+        context.refresh = functools.partial(_install_new, context)
+        manager = PassManager("kernel")
+        for step in (*BEFORE_LOWERING, self.lowering, NoPythonBackend):
+            manager.add_pass(step, step.__name__)
+        manager.finalize()
+        return [manager]
+
+    def compile_extra(self, function: Any) -> Any:
+        # Of the million objects that a compilation makes, nearly all live until it is done.
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(function)
+        finally:
+            if collecting:
+                gc.enable()
+
+
+class _Inner(_Entry):
+    """For calls from other kernels."""
+
+    lowering = LowerForCallers
+
+
+class _Shared(_Entry):
+    """For calls from other kernels, by symbol."""
+
+    lowering = LowerShared
+    cache: Any
+
+    def define_pipelines(self) -> Any:
+        self.state.symbol = self.cache.symbol(tuple(self.state.args), self.state.targetctx)
+        return super().define_pipelines()
+
+
+def share(dispatcher: Any, cache: Any, *, stage: bool) -> None:
+    """Have a dispatcher of Numba compile for calls from other kernels, once for all of them.
+
+    Args:
+        dispatcher: Of Numba.
+        cache: Its `SealedCache`.
+        stage: As in `shorten`.
+    """
+    shorten(dispatcher, inner=True, stage=stage)
+    attributes = {"may_alias": not stage, "cache": cache}
+    dispatcher._compiler.pipeline_class = type("_Pipeline", (_Shared,), attributes)
+    dispatcher.compile = functools.partial(_compile_shared, dispatcher, cache)
+
+
+def _compile_shared(dispatcher: Any, cache: Any, signature: Any) -> Any:
+    arguments = tuple(signature)
+    with global_compiler_lock:
+        if arguments not in dispatcher.overloads:
+            context = dispatcher.targetctx
+            stored = cache.load_shared(arguments, context)
+            if stored is None:
+                type(dispatcher).compile(dispatcher, signature)
+                result = dispatcher.overloads[arguments]
+                fndesc, library = result.fndesc, result.library
+                fndesc.typemap = fndesc.calltypes = None
+                stored = {"fndesc": fndesc, "leaves": library._leaves, "raises": library._raises}
+                cache.save_shared(arguments, context, library, stored)
+            else:
+                dispatcher.add_overload(_stored_result(dispatcher, stored))
+    return dispatcher.overloads[arguments].entry_point
+
+
+def _stored_result(dispatcher: Any, stored: dict[str, Any]) -> Any:
+    context, fndesc = dispatcher.targetctx, stored["fndesc"]
+    environment = lowering.Environment.from_fndesc(fndesc)
+    function = _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "", 0, environment, ())
+    register_call(context, function, fndesc, stored["leaves"], stored["raises"], [])
+    return compile_result(
+        typing_context=dispatcher.typingctx,
+        target_context=context,
+        entry_point=function,
+        signature=typing.signature(fndesc.restype, *fndesc.argtypes),
+        objectmode=False,
+        fndesc=fndesc,
+        environment=environment,
+    )
+
+
+def shorten(dispatcher: Any, *, inner: bool, stage: bool) -> None:
+    """Have a dispatcher of Numba compile this way.
+
+    Args:
+        dispatcher: Of Numba.
+        inner: Called by kernels alone.
+        stage: The arrays among its arguments never overlap: so loops over them can be taken side by side.
+    """
+    compiler = dispatcher._compiler
+    compiler.pipeline_class = type("_Pipeline", (_Inner if inner else _Entry,), {"may_alias": not stage})
+    compiler._customize_flags = _Flags

@@ -1,0 +1,1 @@
+"""NEAT and novelty search: genomes as arrays, networks, species, reproduction, and blocks of runs."""

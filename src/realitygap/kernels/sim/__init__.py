@@ -1,0 +1,1 @@
+"""The platform `sim`: trials in lanes, their physics, and their sensors."""

@@ -1,0 +1,393 @@
+"""What all sensors of a robot of the platform `sim` answer, in lanes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.kernels.compile.decorators import inlined, kernel, stage
+from realitygap.kernels.math.lanes import LANES, Rows, Words, copy_row, fill, zeros
+from realitygap.kernels.math.philox import (
+    PURPOSE_ENCODER,
+    PURPOSE_LIGHT,
+    PURPOSE_LINE,
+    PURPOSE_NOISE,
+    PURPOSE_PULSES,
+    PURPOSE_RANGE,
+)
+
+from .encoders import read_encoder, reckon
+from .floor import answer_line, lay_tape, place_point, sample_image
+from .light import add_light, answer_light, look_to, prepare_light
+from .noise import PER_BLOCK, gain_noise, mixture, second_word, uniform_noise
+from .pulses import count_pulses, pulse_words
+from .ranges import (
+    ir_response,
+    limit,
+    linear_response,
+    lorentz_response,
+    nearest_ray,
+    prepare_table,
+    rate_of,
+    slanted_response,
+    table_response,
+    widening_of,
+)
+from .shape import HALF_SHADOWS, IDLER, IR, LINEAR, LORENTZ, NO_SHADOWS, PULSES, RANGE_NUMBERS, TABLE
+from .sight import answer_bump, gap_of_point, shade_light
+from .stall import idler_stall, prepare_stall
+from .words import blocks_of, draw_words_of
+
+N_RANGE = len(RANGE_NUMBERS)
+# Places in RANGE_NUMBERS
+(
+    CONE,
+    REACH,
+    AMPLITUDE,
+    DECAY,
+    UNIFORM,
+    GAIN,
+    DROP,
+    DROP_WIDTH,
+    OUTLIER,
+    OUTLIER_WIDTH,
+    BURST,
+    INCIDENCE,
+    HALF_WIDTH,
+    PEAK,
+) = (
+    RANGE_NUMBERS.index(name)
+    for name in (
+        "cone",
+        "reach",
+        "amplitude",
+        "decay",
+        "noise_uniform",
+        "noise_gain",
+        "drop_most",
+        "drop_width",
+        "outlier_most",
+        "outlier_width",
+        "burst",
+        "incidence",
+        "half_width",
+        "peak",
+    )
+)
+
+
+class Senses(NamedTuple):
+    """What the sensors of a block of trials remember, and what follows from their numbers."""
+
+    range_rates: (
+        Rows  # (3 * s,) of the response, of dropouts, of outliers [1/m]; of lorentz 1 / cos(cone) first
+    )
+    noisy: NDArray[np.int32]  # (3,) whether any trial has the paper's noise, gain noise, a mixture
+    slanted: NDArray[np.int32]  # (1,) whether any trial has walls that send back less at a slant
+    near: Rows  # (s,) distance to what is nearest [m]
+    dim: Rows  # (s,) the distance at which it would send back as little if it were faced [m]
+    lobes: Rows  # (4 * l,) of `prepare_light`
+    words: Words
+    value: NDArray[np.uint32]  # (LANES,) room
+    spare: Rows  # (6,) room
+    was: Rows  # (4,) pose at the last step, of `idler_stall`
+    idled: Rows  # (3,) averages of `idler_stall`, and what a step leaves of them
+    idled_wheels: Rows  # (2,) what the wheels had driven at the last step [m]
+    encoded_wheels: Rows  # (2,)
+    counted: Rows  # (2,) what the encoders say [m]
+    counted_step: Rows  # (2,) what they say of the last step [m]
+    reckoned: Rows  # (3,) the pose from the encoders, from the start: x, y [m], heading [turns]
+
+
+@inlined
+def mixture_words(sensors):
+    """Random words of the mixture of so many range sensors."""
+    return 4 * ((sensors + PER_BLOCK - 1) // PER_BLOCK)
+
+
+def make_senses(shape, dtype):
+    """Room for the senses of a block of trials in a precision."""
+    s = shape.row_range.size
+    pulses = int(shape.range_pulses.max(initial=0))
+    words = max(
+        4 * blocks_of(n)
+        for n in (mixture_words(s), shape.row_light.size, shape.row_line.size, 2, pulse_words(pulses))
+    )
+
+    def rows(n):
+        return zeros((n, LANES), dtype)
+
+    return Senses(
+        range_rates=rows(3 * s),
+        noisy=np.zeros(3, np.int32),
+        slanted=np.zeros(1, np.int32),
+        near=rows(s),
+        dim=rows(s),
+        lobes=rows(4 * shape.row_light.size),
+        words=zeros((words, LANES), np.uint32),
+        value=zeros(LANES, np.uint32),
+        spare=rows(6),
+        was=rows(4),
+        idled=rows(3),
+        idled_wheels=rows(2),
+        encoded_wheels=rows(2),
+        counted=rows(2),
+        counted_step=rows(2),
+        reckoned=rows(3),
+    )
+
+
+@kernel
+def _any(row):
+    for lane in range(LANES):
+        if row[lane] != 0.0:
+            return np.int32(1)
+    return np.int32(0)
+
+
+@kernel
+def _start_range(shape, p, senses):
+    for k in range(senses.noisy.size):
+        senses.noisy[k] = 0
+    senses.slanted[0] = 0
+    for s in range(shape.row_range.size):
+        row = shape.row_range[s]
+        rate_of(p[row + DECAY], senses.range_rates[3 * s])
+        rate_of(p[row + DROP_WIDTH], senses.range_rates[3 * s + 1])
+        rate_of(p[row + OUTLIER_WIDTH], senses.range_rates[3 * s + 2])
+        if shape.range_response[s] == TABLE:
+            prepare_table(p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]])
+        if shape.range_response[s] == LORENTZ:
+            widening_of(p[row + CONE], senses.range_rates[3 * s])
+        senses.noisy[0] |= _any(p[row + UNIFORM])
+        senses.slanted[0] |= _any(p[row + INCIDENCE])
+        if shape.range_response[s] != PULSES:
+            senses.noisy[1] |= _any(p[row + GAIN])
+            senses.noisy[2] |= _any(p[row + DROP]) | _any(p[row + OUTLIER])
+
+
+@kernel
+def start_senses(shape, rules, lanes):
+    """Make the senses of a block ready, robots at their starts and their numbers in `lanes.p`."""
+    real = lanes.low.dtype.type
+    p, senses = lanes.p, lanes.senses
+    _start_range(shape, p, senses)
+    for k in range(shape.row_light.size):
+        row, lobe = shape.row_light[k], 4 * k
+        lobes = senses.lobes
+        prepare_light(p[row + 2], p[row + 3], lobes[lobe], lobes[lobe + 1], lobes[lobe + 2], lobes[lobe + 3])
+    prepare_stall(p[shape.row_stall + 2], rules.step_s, senses.idled[2])
+    for lane in range(LANES):
+        senses.was[0, lane] = lanes.pose.sine[lane]
+        senses.was[1, lane] = lanes.pose.cosine[lane]
+        senses.was[2, lane] = lanes.pose.x[lane]
+        senses.was[3, lane] = lanes.pose.y[lane]
+    for k in range(2):
+        fill(senses.idled[k], real(0.0))
+        fill(senses.idled_wheels[k], real(0.0))
+        fill(senses.encoded_wheels[k], real(0.0))
+        fill(senses.counted[k], real(0.0))
+        fill(senses.counted_step[k], real(0.0))
+    for k in range(3):
+        fill(senses.reckoned[k], real(0.0))
+    for k in range(lanes.readings.shape[0]):
+        fill(lanes.readings[k], real(0.0))
+
+
+@stage
+def _respond(shape, lanes, senses):
+    """What the range sensors would answer without noise."""
+    p = lanes.p
+    for s in range(shape.row_range.size):
+        row = shape.row_range[s]
+        rays = lanes.distances[shape.first_ray[s] : shape.first_ray[s + 1]]
+        near, reading = senses.near[s], lanes.readings[s]
+        nearest_ray(rays, near)
+        if senses.slanted[0] > 0:
+            copy_row(near, senses.dim[s])
+        kind = shape.range_response[s]
+        if kind == LINEAR:
+            linear_response(near, p[row + REACH], reading)
+        elif kind == TABLE:
+            table_response(near, p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]], reading)
+        elif kind == LORENTZ:
+            lorentz_response(
+                rays, p[row + REACH], p[row + AMPLITUDE], p[row + HALF_WIDTH], p[row + PEAK],
+                senses.range_rates[3 * s], reading,
+            )  # fmt: skip
+        elif senses.slanted[0] > 0:
+            slanted_response(
+                rays, lanes.rates[shape.first_ray[s] : shape.first_ray[s + 1]], p[row + REACH], p[row + AMPLITUDE],
+                senses.range_rates[3 * s], p[row + INCIDENCE], near, senses.spare[0], senses.dim[s], reading,
+            )  # fmt: skip
+        elif kind == IR or kind == PULSES:
+            ir_response(rays, p[row + REACH], p[row + AMPLITUDE], senses.range_rates[3 * s], reading)
+
+
+@stage
+def _mix(shape, key, lanes, senses, step):
+    """Gain noise, dropouts and outliers. Three sensors share a block of four words."""
+    p, words, value, n = lanes.p, senses.words, senses.value, shape.row_range.size
+    seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
+    draw_words_of(PURPOSE_RANGE, step, mixture_words(n), lanes.counters, key, words)
+    for s in range(n):
+        row, reading = shape.row_range[s], lanes.readings[s]
+        if shape.range_response[s] != PULSES:
+            block, place = 4 * (s // PER_BLOCK), s % PER_BLOCK
+            second_word(words[block + place], words[block + 3], place, value)
+            if senses.noisy[1] > 0:
+                gain_noise(value, p[row + GAIN], reading)
+            if senses.noisy[2] > 0:
+                mixture(
+                    seen_from[s], words[block + place], value, p[row + DROP : row + DROP + 2],
+                    senses.range_rates[3 * s + 1], p[row + OUTLIER : row + OUTLIER + 2],
+                    senses.range_rates[3 * s + 2], reading,
+                )  # fmt: skip
+            else:
+                limit(reading)
+
+
+@stage
+def _count_all_pulses(shape, key, lanes, senses, step):
+    """Sensor k takes its words from reading step * sensors + k of the stream."""
+    p, spare, n = lanes.p, senses.spare, shape.row_range.size
+    seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
+    for s in range(n):
+        if shape.range_response[s] == PULSES:
+            row, pulses = shape.row_range[s], shape.range_pulses[s]
+            draw_words_of(
+                PURPOSE_PULSES, step * n + s, pulse_words(pulses), lanes.counters, key, senses.words
+            )
+            count_pulses(
+                seen_from[s], pulses, senses.words, p[row + DROP : row + DROP + 2],
+                senses.range_rates[3 * s + 1], p[row + BURST], spare[0], spare[1], lanes.readings[s],
+            )  # fmt: skip
+
+
+@stage
+def _sense_range(shape, rules, key, lanes, senses, step):
+    p, n = lanes.p, shape.row_range.size
+    _respond(shape, lanes, senses)
+    if senses.noisy[1] + senses.noisy[2] > 0:
+        _mix(shape, key, lanes, senses, step)
+    _count_all_pulses(shape, key, lanes, senses, step)
+    if senses.noisy[0] > 0:
+        draw_words_of(PURPOSE_NOISE, step, n, lanes.counters, key, senses.words)
+        for s in range(n):
+            uniform_noise(senses.words[s], p[shape.row_range[s] + UNIFORM], lanes.readings[s])
+    for s in range(n):
+        if rules.clip or shape.range_response[s] != LINEAR:
+            limit(lanes.readings[s])
+
+
+@stage
+def _sense_light(shape, key, lanes, senses, step, first):
+    real = lanes.low.dtype.type
+    p, spare, lobes, n = lanes.p, senses.spare, senses.lobes, shape.row_light.size
+    draw_words_of(PURPOSE_LIGHT, step, n, lanes.counters, key, senses.words)
+    for k in range(n):
+        row, lobe, reading = shape.row_light[k], 4 * k, lanes.readings[first + k]
+        fill(reading, real(0.0))
+        for lamp in range(shape.n_lights):
+            light = shape.row_lamp + 3 * lamp
+            look_to(p[light], p[light + 1], p[row], p[row + 1], lanes.pose, spare[0], spare[1], spare[2])
+            if shape.light_shadows == NO_SHADOWS:
+                fill(spare[3], real(1.0))
+            else:
+                place_point(p[row], p[row + 1], lanes.pose, spare[4], spare[5])
+                shade = 0.5 if shape.light_shadows == HALF_SHADOWS else 0.0
+                shade_light(shape, p, spare[4], spare[5], p[light], p[light + 1], shade, spare[3])
+            add_light(
+                spare[0], spare[1], spare[2], p[light + 2], lobes[lobe], lobes[lobe + 1], lobes[lobe + 2],
+                lobes[lobe + 3], spare[3], reading,
+            )  # fmt: skip
+        answer_light(p[row + 4], p[row + 5], senses.words[k], reading)
+
+
+@stage
+def _sense_floor(shape, key, lanes, senses, step, first):
+    p, spare, n = lanes.p, senses.spare, shape.row_line.size
+    draw_words_of(PURPOSE_LINE, step, n, lanes.counters, key, senses.words)
+    for k in range(n):
+        row = shape.row_line[k]
+        place_point(p[row], p[row + 1], lanes.pose, spare[0], spare[1])
+        sample_image(shape.floor, shape.floor_grid, spare[0], spare[1], spare[2])
+        lay_tape(shape.tapes, spare[0], spare[1], spare[2])
+        answer_line(
+            spare[2], p[row + 2], p[row + 3], senses.words[k], shape.line_levels[k], lanes.readings[first + k]
+        )
+
+
+@stage
+def _sense_bumps(shape, lanes, senses, first):
+    p, spare = lanes.p, senses.spare
+    for k in range(shape.row_bump.size):
+        row = shape.row_bump[k]
+        place_point(p[row], p[row + 1], lanes.pose, spare[0], spare[1])
+        gap_of_point(shape, p, spare[0], spare[1], spare[2], spare[3], spare[4])
+        answer_bump(spare[4], p[row + 2], lanes.readings[first + k])
+
+
+@stage
+def answer(shape, rules, key, lanes, step):
+    """Write what the sensors answer into `lanes.readings`: range, light, line and bump sensors in turn.
+
+    Args:
+        shape, rules, key: Structure, how trials are run, and of the random numbers.
+        lanes: `distances` along the rays, poses, and the numbers of each trial are read.
+        step: Number of the reading: 0 at the start, k after k commands.
+    """
+    senses = lanes.senses
+    n_range, n_light, n_line = shape.row_range.size, shape.row_light.size, shape.row_line.size
+    if n_range > 0:
+        _sense_range(shape, rules, key, lanes, senses, step)
+    if n_light > 0:
+        _sense_light(shape, key, lanes, senses, step, n_range)
+    if n_line > 0:
+        _sense_floor(shape, key, lanes, senses, step, n_range + n_light)
+    if shape.row_bump.size > 0:
+        _sense_bumps(shape, lanes, senses, n_range + n_light + n_line)
+
+
+@stage
+def _tell(said, stalled, n_stalls):
+    for lane in range(LANES):
+        before = stalled[lane]
+        n_stalls[lane] = np.int32(n_stalls[lane] + np.int32(said[lane]) - np.int32(before))
+        stalled[lane] = said[lane]
+
+
+@stage
+def feel_motion(shape, rules, key, lanes, step):
+    """After a command was carried out: what the encoders count, and on an S2 whether it stalls.
+
+    Args:
+        shape, rules, key, lanes: As in `answer`; `wheels` and `pose` are read, `stalled` is changed.
+        step: Number of the command, from 0 on.
+    """
+    p, senses, words = lanes.p, lanes.senses, lanes.senses.words
+    if shape.stall == IDLER:
+        row = shape.row_stall
+        idler_stall(
+            senses.was, lanes.pose, lanes.wheels, senses.idled_wheels, p[row], p[row + 1], senses.idled[2],
+            senses.idled[0], senses.idled[1], senses.spare[0],
+        )  # fmt: skip
+        _tell(senses.spare[0], lanes.stalled, lanes.n_stalls)
+    if shape.encoders:
+        row, drive = shape.row_encoder, shape.row_drive
+        draw_words_of(PURPOSE_ENCODER, step, 2, lanes.counters, key, words)
+        for k in range(2):
+            read_encoder(
+                lanes.wheels[k], senses.encoded_wheels[k], p[row + k], p[row + 2], words[k], senses.counted[k],
+                senses.counted_step[k],
+            )  # fmt: skip
+        reckon(
+            senses.counted_step[0],
+            senses.counted_step[1],
+            p[drive + 1],
+            p[drive + 2],
+            p[row + 3],
+            senses.reckoned,
+        )

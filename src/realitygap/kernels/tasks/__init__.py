@@ -1,0 +1,1 @@
+"""Measurements of tasks: cells, scores, mazes, XOR, and poles on a cart."""

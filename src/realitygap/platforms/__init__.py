@@ -1,0 +1,110 @@
+"""Platforms: named ways to run trials."""
+
+from ._fleet import Array, Fleet, Outline, Points, limited_commands
+from ._platform import Opening, Platform
+from ._python import PYTHON, allow_code, load_platform
+from ._registry import GROUP, built_in_platforms, platform_class, platform_names, study_platforms
+from ._repeats import retry_genomes, score_genomes
+from ._simulated import SimTarget, SimulatedPlatform
+from ._spec import (
+    class_of,
+    described_platform,
+    is_physical,
+    known_specs,
+    names_a_port,
+    open_target,
+    platform_of,
+    split_spec,
+)
+from ._try import open_trials, scores_of, trace_genome, trace_genomes, traced_at_once, try_genomes
+from .enki._build import build_enki, harness_path
+from .enki._platform import EnkiPlatform
+from .jyro._platform import STEP_S, JyroPlatform
+from .jyro._robot import JyroRobot
+from .jyro._trials import JyroTrials, jyro_rules, jyro_scene
+from .recorded._platform import RecordedPlatform
+from .recorded._target import RecordedTarget
+from .scribbler._platform import FULL_SCALE, ScribblerPlatform
+from .sim._ensemble import Play, Rehearsal, SimEnsemble
+from .sim._platform import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform, as_numbers, as_sim
+from .sim._robot import SimRobot
+from .sim._scene import SimScene, sim_scene
+from .sim._trials import SimTrials
+from .sim._world import SimWorld
+from .sim._world_robot import SimWorldRobot
+from .twin._open import SimTwin, open_twin
+from .twin._platform import TwinPlatform
+from .twin._robots import TwinRobots
+from .twin._target import TwinTarget
+from .twin._trials import close_twins, release_twins
+
+__all__ = [
+    "ARENA",
+    "DEFAULT_ROBOT",
+    "FULL_SCALE",
+    "GROUP",
+    "NOISE",
+    "PYTHON",
+    "STEP_S",
+    "Array",
+    "EnkiPlatform",
+    "Fleet",
+    "JyroPlatform",
+    "JyroRobot",
+    "JyroTrials",
+    "Opening",
+    "Outline",
+    "Platform",
+    "Play",
+    "Points",
+    "RecordedPlatform",
+    "RecordedTarget",
+    "Rehearsal",
+    "ScribblerPlatform",
+    "SimEnsemble",
+    "SimPlatform",
+    "SimRobot",
+    "SimScene",
+    "SimTarget",
+    "SimTrials",
+    "SimTwin",
+    "SimWorld",
+    "SimWorldRobot",
+    "SimulatedPlatform",
+    "TwinPlatform",
+    "TwinRobots",
+    "TwinTarget",
+    "allow_code",
+    "as_numbers",
+    "as_sim",
+    "build_enki",
+    "built_in_platforms",
+    "class_of",
+    "close_twins",
+    "described_platform",
+    "harness_path",
+    "is_physical",
+    "jyro_rules",
+    "jyro_scene",
+    "known_specs",
+    "limited_commands",
+    "load_platform",
+    "names_a_port",
+    "open_target",
+    "open_trials",
+    "open_twin",
+    "platform_class",
+    "platform_names",
+    "platform_of",
+    "release_twins",
+    "retry_genomes",
+    "score_genomes",
+    "scores_of",
+    "sim_scene",
+    "split_spec",
+    "study_platforms",
+    "trace_genome",
+    "trace_genomes",
+    "traced_at_once",
+    "try_genomes",
+]

@@ -1,0 +1,110 @@
+"""What the environments ask of a platform's robots, all at the same step of their trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.trials import NoiseKey
+from realitygap.world import Arena, Body, RangeSensors, RobotModel
+
+Array = NDArray[np.float64]
+Points = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outline of a robot in pictures, ahead and to the left of its origin [m].
+
+    Attributes:
+        parts: Corners of each part of the body.
+        mounts: Place and direction [rad] of each range sensor.
+    """
+
+    parts: tuple[Points, ...]
+    mounts: tuple[tuple[float, float, float], ...]
+
+    @classmethod
+    def of_body(cls, body: Body, sensors: RangeSensors) -> Outline:
+        """Return the outline of a body of one part."""
+        return cls((body.corners,), sensors.mounts)
+
+    @classmethod
+    def of_model(cls, model: RobotModel) -> Outline:
+        """Return the outline of a robot from a file."""
+        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in model.range)
+        return cls(tuple(part.outline() for part in model.body), mounts)
+
+
+class Fleet(Protocol):
+    """n robots of one platform in one arena.
+
+    Attributes:
+        arena: Where.
+        n_steps: Of a trial.
+        step_s: Duration of a command [s].
+        outline: Of a robot.
+        cells: (n, c) uint8; the first of a row are the cells along the line in order of first visit.
+    """
+
+    arena: Arena
+    n_steps: int
+    step_s: float
+    outline: Outline
+    cells: NDArray[np.uint8]
+
+    @property
+    def counts(self) -> NDArray[np.int32]:
+        """(n, 2 or more) cells visited so far: along the line, at the ends of steps."""
+        ...
+
+    @property
+    def stalled(self) -> NDArray[np.bool_]:
+        """(n,) whether the last step was blocked."""
+        ...
+
+    @property
+    def ranges(self) -> Array:
+        """(n, s) what the range sensors answer, as tasks see it, 0..1; 1 is near."""
+        ...
+
+    def number(self, name: str, value: float) -> Array:
+        """(n,) a number of each trial: what was drawn for it, or the value if it is not drawn."""
+        ...
+
+    def bounds(self) -> NDArray[Any]:
+        """(2, i) the minimum and the maximum of each input."""
+        ...
+
+    def start(self, key: NoiseKey) -> None:
+        """Put all robots at the start; robot k draws the numbers of individual `key.individual` + k."""
+        ...
+
+    def step(self, commands: Array) -> None:
+        """Drive each robot by one command, (n, 2) each -1..1."""
+        ...
+
+    def observe(self) -> Array:
+        """(n, i) the inputs before the next step."""
+        ...
+
+    def facts(self) -> dict[str, Array]:
+        """`pose` (n, 3) and `readings` (n, s): distances without noise [m]."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the robots; safe to call twice."""
+        ...
+
+
+def is_signed(name: str) -> bool:
+    """Return whether an input is within -1..1, and not within 0..1."""
+    return name.partition(".")[0] in ("encoder", "last_move", "last_turn")
+
+
+def limited_commands(commands: Array) -> Array:
+    """Return commands within -1..1; what is no number becomes 0, as in a trial."""
+    return np.clip(np.where(np.isnan(commands), 0.0, commands), -1.0, 1.0)

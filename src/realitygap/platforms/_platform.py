@@ -1,0 +1,335 @@
+"""The contract of a platform: its settings, its capabilities, and how it is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from pydantic import Field
+
+from realitygap.drawing import Picture
+from realitygap.errors import StudyError
+from realitygap.evolution import ControllerInterface, inputs_of_robot
+from realitygap.settings import Settings
+from realitygap.trials import OnLost, PlatformTrials, PortObserver, RobotTarget, Target
+from realitygap.world import JYRO_SCRIBBLER, Arena, Body, RangeSensors, RobotModel, check_start, robot_picture
+
+if TYPE_CHECKING:
+    from realitygap.kernels.neat.block import RunRows, RunRules
+    from realitygap.kernels.neat.genome import NeatRules
+    from realitygap.robots import Robot
+
+    from ._fleet import Fleet
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Everything that opening a platform for trials one by one may need.
+
+    Attributes:
+        name: The platform as the user named it, such as `twin:worn-1.toml`.
+        noise: Level a: each reading is moved by a * U(-1, 1), on top of the robot's own noise.
+        key: Of the random numbers of a simulator.
+        processes: Number of processes of a twin; None: one for each processor.
+        witness: Address of the witness of an emulated robot in another program, HOST:PORT.
+        observer: Who places a robot and reports the cells that it crossed; None: its witness.
+        step_s: Duration of a robot's command [s].
+        on_lost: What follows a trial in which the link to a robot was lost.
+    """
+
+    name: str
+    noise: float = 0.0
+    key: int = 0
+    processes: int | None = None
+    witness: str | None = None
+    observer: PortObserver | None = None
+    step_s: float = 0.5
+    on_lost: OnLost = "retry"
+
+
+class Platform(Settings):
+    """A named way to run trials; the fields are its settings, `[platform.NAME]` of a study file.
+
+    A subclass needs `name` and either `open_robot`, from which everything else follows, or `open` and `prepare`.
+    Figures draw the paper's Scribbler unless a subclass has another `body`.
+
+    Attributes:
+        name: The part before the colon.
+        summary: What it is, in a few words, a colon, and more of them.
+        rest: What users write after the colon, such as FILE; empty if nothing may follow.
+        rest_setting: The setting that it fills.
+        needs_rest: Whether the name alone is no platform.
+        file_settings: Settings that may name a file beside the study file.
+        default_noise: The paper's level a, if a study does not set it.
+        takes_noise: Whether level a may be added to its readings.
+        is_physical: Whether a person has to place its robots: their trials go into a ledger.
+        is_simulator: Whether trials are computed, many in one call.
+        is_slow: Whether one run is enough work for a process.
+        is_paced: Whether a command lasts as long as a robot's command.
+        records_draws: Whether results have a column of the numbers that were drawn for each trial.
+        runs_whole: Whether `run_whole` computes whole evolutions of the task coverage.
+        is_for_studies: Whether a condition of a study can be on it.
+        channels: Names of the sensors that its robots have besides range sensors, such as `light.0`.
+        takes_several: Whether several robots can be tried in one arena.
+        version: Version of its code, if another package or a file adds it: results of another version are not extended.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str] = ""
+    rest: ClassVar[str] = ""
+    rest_setting: ClassVar[str] = ""
+    needs_rest: ClassVar[bool] = False
+    file_settings: ClassVar[tuple[str, ...]] = ()
+    default_noise: ClassVar[float] = 0.0
+    takes_noise: ClassVar[bool] = False
+    is_physical: ClassVar[bool] = False
+    is_simulator: ClassVar[bool] = False
+    is_slow: ClassVar[bool] = True
+    is_paced: ClassVar[bool] = True
+    records_draws: ClassVar[bool] = False
+    runs_whole: ClassVar[bool] = False
+    is_for_studies: ClassVar[bool] = True
+    channels: ClassVar[tuple[str, ...]] = ()
+    takes_several: ClassVar[bool] = False
+    version: ClassVar[str] = ""
+
+    steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")
+
+    @classmethod
+    def specs(cls) -> tuple[str, ...]:
+        """Return the ways in which users name it."""
+        alone = () if cls.needs_rest else (cls.name,)
+        return (*alone, f"{cls.name}:{cls.rest}") if cls.rest else alone
+
+    @classmethod
+    def from_rest(cls, rest: str) -> Self:
+        """Return the platform that `NAME:REST` names, with default settings.
+
+        Raises:
+            ValueError: There is no such file, or it cannot be used.
+        """
+        return cls(**({cls.rest_setting: rest} if rest else {}))
+
+    @property
+    def spec(self) -> str:
+        """The name of this platform as users write it."""
+        rest = getattr(self, self.rest_setting) if self.rest_setting else ""
+        return f"{self.name}:{rest}" if isinstance(rest, str) and rest else self.name
+
+    def identified(self) -> Self:
+        """Return the platform with the hash of each file that it does not store whole.
+
+        Raises:
+            ValueError: A file is missing, or cannot be read.
+        """
+        return self
+
+    @property
+    def label(self) -> str:
+        """The label of its figures: SIM, TWIN, EMULATED or REAL."""
+        return "SIM"
+
+    @property
+    def is_single(self) -> bool:
+        """Whether trials are computed and recorded in 32 bits."""
+        return getattr(self, "precision", "double") == "single"
+
+    @property
+    def command_s(self) -> float:
+        """Duration of a command [s]."""
+        return 0.5
+
+    @property
+    def body(self) -> Body:
+        """Outline of the robot in figures: the box of 0.18 x 0.16 m around the paper's Scribbler."""
+        return JYRO_SCRIBBLER
+
+    @property
+    def sensors(self) -> RangeSensors:
+        """Range sensors in figures: three rays from the front, as far as the paper trusts readings (9 in)."""
+        return RangeSensors(((0.09, 0.05, 0.0), (0.09, 0.0, 0.0), (0.09, -0.05, 0.0)), 0.2286)
+
+    @property
+    def title(self) -> str:
+        """Title of its picture."""
+        return f"{self.name} ({self.label})"
+
+    def picture(self) -> Picture:
+        """Return the robot from above, to scale, with its dimensions."""
+        return robot_picture(self.title, self.body, self.sensors)
+
+    def _repr_svg_(self) -> str:
+        return self.picture().to_svg(300.0)
+
+    @property
+    def needs_person(self) -> bool:
+        """Whether a person has to place its robot."""
+        return self.is_physical
+
+    @property
+    def robot_model(self) -> RobotModel | None:
+        """The robot file's model, whose numbers can be set and drawn; None if there is none."""
+        return None
+
+    @property
+    def arena_numbers(self) -> dict[str, Any]:
+        """Numbers of the arena that its settings change, by dotted name."""
+        return {}
+
+    @property
+    def is_randomized(self) -> bool:
+        """Whether its robots are drawn from a calibration."""
+        return False
+
+    def randomized(self, how: str) -> Self:
+        """Return the platform with robots drawn from their calibration, or not; itself if it has none."""
+        return self
+
+    def at_pace(self, step_s: float) -> Self:
+        """Return the platform with a robot whose commands last so long, unless its settings fix the duration [s]."""
+        return self
+
+    def in_double(self) -> Self:
+        """Return the platform with double precision, where it has a choice."""
+        return (
+            self.model_copy(update={"precision": "double"})
+            if "precision" in type(self).model_fields
+            else self
+        )
+
+    def inputs(self, arena: Arena) -> tuple[str, ...]:
+        """Return the names of all inputs that networks can have here."""
+        return inputs_of_robot(len(self.sensors.mounts), self.channels)
+
+    def drawn_names(self, arena: Arena, inputs: Sequence[str], noise: float) -> tuple[str, ...]:
+        """Return the dotted names of the numbers that are drawn for trials, in the order of the records."""
+        return ()
+
+    def check(self, arena: Arena, inputs: Sequence[str], noise: float) -> None:
+        """Raise an error if networks with these inputs cannot be tried here.
+
+        Raises:
+            ValueError: An input is missing, level a is not taken, or the arena cannot be used.
+        """
+        self.check_noise(noise)
+        ControllerInterface(tuple(inputs)).check(self.inputs(arena), "A network", f"platform {self.name!r}")
+
+    def check_noise(self, noise: float) -> None:
+        """Raise an error if level a cannot be added to its readings.
+
+        Raises:
+            ValueError: It cannot.
+        """
+        if noise and not self.takes_noise:
+            raise ValueError(
+                f"noise is {noise:g}, expected none with platform {self.name!r}: its readings are noisy by "
+                "themselves. Leave it out."
+            )
+
+    def check_robots(self, arena: Arena) -> None:
+        """Raise an error if there are several robots in the arena, and the platform takes one.
+
+        Raises:
+            ValueError: There are.
+        """
+        if arena.others and not self.takes_several:
+            raise ValueError(
+                f"arena.robots is {arena.n_robots}, expected 1 with platform {self.name!r}. Choose a platform that "
+                "takes several robots in an arena, such as sim."
+            )
+
+    def check_starts(self, arena: Arena) -> None:
+        """Raise an error if the robot does not fit at the start.
+
+        Raises:
+            ValueError: It does not.
+        """
+        check_start(arena, self.body)
+
+    @property
+    def outline_words(self) -> str:
+        """The origin of the outline in figures, for their captions."""
+        return "the box that holds a Scribbler’s"
+
+    def at_port(self, port: str) -> Self:
+        """Return the platform with the port of its robot.
+
+        Raises:
+            StudyError: It has no port.
+        """
+        raise StudyError(f"Platform {self.name!r} has no robot on a port.")
+
+    def connect(self) -> Robot:
+        """Connect to a physical robot, which a person places.
+
+        Raises:
+            RobotError: It cannot be reached.
+        """
+        raise StudyError(f"Platform {self.name!r} has no robot on a port.")
+
+    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
+        """Open one robot that is driven step by step.
+
+        Args:
+            arena: Where. A simulated robot is placed at its start by `reset`.
+            noise: Level a.
+
+        Raises:
+            StudyError: The platform has no robot that a program can place.
+            RobotError: The robot cannot be reached.
+        """
+        raise StudyError(f"Platform {self.name!r} has no robot that can be driven step by step.")
+
+    def open(self, arena: Arena, how: Opening) -> Target:
+        """Open the platform for trials one by one."""
+        from ._stepwise import StepwiseTarget
+
+        if not self.is_physical:
+            return StepwiseTarget(self, arena, how.noise, name=how.name)
+        if how.observer is None:
+            raise StudyError(
+                f"Who places the robot of {how.name} and reports the cells that it crossed? Give an observer."
+            )
+        return RobotTarget(
+            self.connect,
+            arena,
+            how.observer,
+            name=how.name,
+            step_s=how.step_s,
+            on_lost=how.on_lost,
+        )
+
+    def prepare(
+        self, arena: Arena, rules: NeatRules, *, inputs: Sequence[str], noise: float, bias_value: float
+    ) -> PlatformTrials:
+        """Set the platform up for many trials of networks of one kind; here one after the other."""
+        from ._stepwise import StepwiseTrials
+
+        self.check(arena, inputs, noise)
+        return StepwiseTrials(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
+
+    def run_whole(
+        self,
+        arena: Arena,
+        neat: NeatRules,
+        rules: RunRules,
+        *,
+        inputs: Sequence[str],
+        noise: float,
+        bias_value: float,
+        key: int,
+        first_replicate: int,
+        rows: RunRows,
+        room: tuple[int, int],
+    ) -> bool:
+        """Compute whole evolutions in one call, if `runs_whole`; return whether all genomes found room."""
+        raise NotImplementedError
+
+    def fleet(self, arena: Arena, inputs: Sequence[str], noise: float, n: int) -> Fleet:
+        """Open n robots that are driven step by step, all at the same step."""
+        from ._stepwise import OwnRobots, StepwiseFleet, open_seen
+
+        self.check_noise(noise)
+        robots = OwnRobots([open_seen(self, arena, noise) for _ in range(n)])
+        return StepwiseFleet(self, arena, inputs, robots, n)

@@ -1,0 +1,107 @@
+"""Trials that were observed before, as a target: it carries out nothing, and shows what is in a file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from realitygap._closing import ClosedOnExit
+from realitygap.errors import RecordError
+from realitygap.evolution import Genome
+from realitygap.records import OBSERVATIONS, Observe, ObservedTrial, read_observations, sees
+from realitygap.robots import Label
+from realitygap.trials import TellTrial, TrialPlan, check_plans, those_that_count
+from realitygap.world import Arena
+
+MOST_NUMBER = 2**63 - 1
+
+
+class RecordedTarget(ClosedOnExit):
+    """The trials of controllers that a file holds.
+
+    The k-th plan with a controller gets its k-th trial with as many steps.
+
+    Trials that were cut off are left out; of several with one number and controller the last counts.
+
+    Args:
+        path: A file of observed trials.
+        name: As the user named it.
+
+    Attributes:
+        controllers: Of each controller in the file, in the order in which they came, how many trials there are.
+        steps: Commands in most of them.
+
+    Raises:
+        RecordError: It cannot be read, or has no whole trial of a controller.
+    """
+
+    is_paced = True
+    inputs = None
+
+    def __init__(self, path: str | Path, name: str = "") -> None:
+        found = read_observations(path)
+        whole = {
+            (trial.genome, trial.number): trial for trial in those_that_count(found.trials) if trial.genome
+        }
+        if not whole:
+            raise RecordError(f"{path} has no whole trial of a controller.")
+        self._path = Path(path)
+        self._trials = list(whole.values())
+        self.name = name or f"recorded:{path}"
+        self.label = cast("Label", found.head.label)
+        self.identity = found.head.identity
+        self.arena = Arena.from_dict(cast("dict[str, Any]", dict(found.head.arena)))
+        self.step_s = float(np.median([trial.step_s for trial in self._trials]))
+        self.n_sensors = self._trials[0].readings.shape[1]
+        counted: Observe = "track" if all(trial.cells for trial in self._trials) else "readings"
+        self.observes = min((counted, *(trial.observe for trial in self._trials)), key=OBSERVATIONS.index)
+        counts = Counter(trial.genome for trial in self._trials)
+        self.steps = Counter(len(trial.commands) for trial in self._trials).most_common(1)[0][0]
+        self.controllers = [(Genome.from_json(text), n) for text, n in counts.items()]
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`; where the robot stood, how long it drove and the number are as they were recorded.
+
+        Raises:
+            RecordError: There are not so many trials of a controller.
+        """
+        check_plans(plans, observe, self, MOST_NUMBER)
+        taken: Counter[str] = Counter()
+        found = []
+        for k, plan in enumerate(plans):
+            genome = "" if plan.genome is None else plan.genome.to_json()
+            there = [
+                trial
+                for trial in self._trials
+                if genome and trial.genome == genome and len(trial.commands) == plan.steps
+            ]
+            if taken[genome] >= len(there):
+                raise RecordError(
+                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, and one more is "
+                    f"asked for; most of its trials have {self.steps} steps. Ask for fewer, or record more."
+                )
+            trial = _seen_as(there[taken[genome]], observe)
+            taken[genome] += 1
+            found.append(trial)
+            if tell is not None:
+                tell(k, trial)
+        return found
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+    """A trial with no more than is to be observed."""
+    if observe != "track":
+        trial = replace(trial, poses=np.empty((0, 3)))
+    if not sees(observe, "encoders"):
+        trial = replace(trial, wheels=np.empty((0, 2)))
+    return trial if sees(observe, "cells") else replace(trial, cells=())

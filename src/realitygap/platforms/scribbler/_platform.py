@@ -1,0 +1,152 @@
+"""The platform `scribbler`: the paper's robot, driven over its own protocol."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
+
+from pydantic import Field
+
+from realitygap.errors import StudyError
+from realitygap.robots import Robot
+from realitygap.robots.scribbler import is_in_this_program
+from realitygap.trials import PortObserver, RobotTarget, Target, WitnessObserver
+from realitygap.world import Arena
+
+from .._platform import Opening, Platform
+
+if TYPE_CHECKING:
+    from realitygap.robots.scribbler import Scribbler
+
+FULL_SCALE = 6400.0
+"""The largest reading of a Fluke's obstacle sensors: readings of robots and simulators are shares of it."""
+WATCHDOG_S = 1.0
+"""After so long a silence of the controlling loop the driver stops the motors [s]."""
+
+
+class ScribblerPlatform(Platform):
+    """The Scribbler as the paper drove it; the port comes from the command line.
+
+    The robot moves on while a command's time runs, and until the next command. A reading is the raw value of an
+    obstacle sensor, divided by `reading_max` and limited to 1; larger is nearer.
+
+    Source: Rosenzweig & Remy, sections 2.2 and 2.3.
+    """
+
+    name: ClassVar[str] = "scribbler"
+    summary: ClassVar[str] = "the paper’s robot: driven over its own protocol"
+    rest: ClassVar[str] = "PORT"
+    rest_setting: ClassVar[str] = "port"
+    needs_rest: ClassVar[bool] = True
+    is_physical: ClassVar[bool] = True
+    channels: ClassVar[tuple[str, ...]] = (
+        *("light.0", "light.1", "light.2", "line.0", "line.1"),
+        *("encoder.0", "encoder.1"),  # of an S2 or S3
+    )
+
+    port: str = Field(
+        "",
+        exclude=True,
+        description="Port of the robot, which the command line names.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
+    steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial (section 2.2: 100).")
+    wait_s: float = Field(0.5, gt=0, le=60, description="Duration of a command [s] (section 2.2: 0.5).")
+    reading_max: float = Field(
+        1700.0, gt=0, le=65_535, description="Divisor of raw readings (section 2.3: 1700)."
+    )
+    ir_power: int = Field(
+        135,
+        ge=0,
+        le=255,
+        description="Power of the Fluke's infrared emitters. Not in the paper; 135 as Myro sets it.",
+    )
+    forwardness: Literal["fluke", "scribbler"] = Field(
+        "fluke",
+        description="Which end goes ahead, where there is a Fluke: the one with it, to which its obstacle sensors "
+        "look, or the other.",
+    )
+
+    @classmethod
+    def from_rest(cls, rest: str) -> Self:
+        """Return the robot at a port; readings are shares of the largest one that a Fluke gives."""
+        return cls(port=rest, reading_max=FULL_SCALE)
+
+    @property
+    def label(self) -> str:
+        """The label of its figures while nothing was driven; then REAL or EMULATED, as the driver finds."""
+        return "not driven"
+
+    @property
+    def title(self) -> str:
+        """Title of its picture."""
+        return self.name
+
+    @property
+    def command_s(self) -> float:
+        """Duration of a command [s]."""
+        return self.wait_s
+
+    @property
+    def outline_words(self) -> str:
+        """The origin of the outline in figures, for their captions."""
+        return "the box that holds the robot’s; the paper does not state the start and where the sensors are mounted"
+
+    def at_port(self, port: str) -> Self:
+        """Return the platform with the port of its robot."""
+        return self.model_copy(update={"port": port})
+
+    @property
+    def needs_person(self) -> bool:
+        """Whether a person has to place the robot: not if it is emulated in this program."""
+        return not is_in_this_program(self.port)
+
+    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
+        """Connect to the robot; an emulated one in this program is placed at the start."""
+        robot = self.connect()
+        witness = getattr(robot.port, "witness", None)
+        if witness is not None:
+            witness.place(arena.start, 0)
+        return robot
+
+    def open(self, arena: Arena, how: Opening) -> Target:
+        """Open the robot for trials one by one, with its observer or its witness."""
+        observer = how.observer or self._witness(how.witness)
+        return RobotTarget(
+            self.connect, arena, observer, name=how.name, step_s=how.step_s, on_lost=how.on_lost
+        )
+
+    def _witness(self, address: str | None) -> PortObserver:
+        if not self.needs_person:
+            return WitnessObserver()
+        if address is not None:
+            from realitygap.emulator import connect_witness
+
+            remote = connect_witness(address)
+            remote.hold()  # before its robot is spoken to: somebody may have left it driving, faster than it answers
+            return WitnessObserver(remote)
+        raise StudyError(
+            f"Who places the robot at {self.port} and says what it drew? Name the witness of an emulator (HOST:PORT, "
+            "from realitygap emulate --witness PORT), or give an observer."
+        )
+
+    def connect(self) -> Scribbler:
+        """Connect to the robot at the port, with these settings.
+
+        Raises:
+            RobotError: It cannot be reached.
+        """
+        from realitygap.robots.scribbler import Scribbler
+
+        if not self.needs_person:
+            import_module("realitygap.emulator")  # which tells pyserial of such ports
+        robot = Scribbler(self.port, step_s=self.wait_s, reading_max=self.reading_max, watchdog_s=WATCHDOG_S)
+        try:
+            if robot.info.fluke != "none":
+                robot.set_forwardness(self.forwardness)
+                robot.set_ir_power(self.ir_power)
+        except BaseException:
+            robot.close()
+            raise
+        return robot

@@ -1,0 +1,128 @@
+"""The platform `twin`: a robot of real physics in MuJoCo, whose file is read in a process of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, Self
+
+from pydantic import Field
+
+from realitygap.robots import Robot
+from realitygap.trials import PlatformTrials, Target
+from realitygap.world import Arena
+
+from .._platform import Opening, Platform
+
+if TYPE_CHECKING:
+    from realitygap.kernels.neat.genome import NeatRules
+
+    from .._fleet import Fleet
+
+_HASH = """
+import hashlib, sys
+try:
+    with open(sys.argv[1], "rb") as file:
+        print(hashlib.file_digest(file, "sha256").hexdigest())
+except OSError as error:
+    sys.exit(error.strerror or str(error))
+"""
+
+
+class TwinPlatform(Platform):
+    """A twin, as pseudo-reality to evolve on.
+
+    It is tried in processes of their own, which alone read its file; here it is known by its hash. Figures draw the
+    Scribbler's outline, whatever the twin's own is.
+    """
+
+    name: ClassVar[str] = "twin"
+    summary: ClassVar[str] = (
+        "pseudo-reality: a robot of real wheels, motors and sensors in MuJoCo, as its file has them"
+    )
+    rest: ClassVar[str] = "FILE"
+    rest_setting: ClassVar[str] = "file"
+    needs_rest: ClassVar[bool] = True
+    file_settings: ClassVar[tuple[str, ...]] = ("file",)
+    channels: ClassVar[tuple[str, ...]] = (
+        *("light.0", "light.1", "light.2", "line.0", "line.1"),  # if the twin's file has them
+        *("encoder.0", "encoder.1"),
+    )
+
+    file: str = Field("", description="The twin's file, as `realitygap twin sample` writes one.")
+    sha256: str = Field(
+        "",
+        pattern="^([0-9a-f]{64})?$",
+        description="Of the file: one that has changed is another twin.",
+        json_schema_extra={"hidden": True},
+    )
+    steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")
+
+    @property
+    def label(self) -> str:
+        """The label of its figures."""
+        return "TWIN"
+
+    @property
+    def outline_words(self) -> str:
+        """The origin of the outline in figures, for their captions."""
+        return "the box that holds a Scribbler’s, and the sensors are that robot’s: the twin’s own are in its file"
+
+    def identified(self) -> Self:
+        """Return the platform with the hash of its file.
+
+        Raises:
+            ValueError: No file is named, or it cannot be read.
+        """
+        if not self.file:
+            raise ValueError("platform is 'twin', expected twin:FILE, with the file of the twin")
+        return self if self.sha256 else self.model_copy(update={"sha256": hash_elsewhere(self.file)})
+
+    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
+        """Open the twin in this process."""
+        from realitygap.robots.twin import load_twin
+
+        from ._open import open_twin
+
+        return open_twin(load_twin(self.file), arena)
+
+    def open(self, arena: Arena, how: Opening) -> Target:
+        """Open the twin for trials one by one, in separate processes."""
+        from ._target import TwinTarget
+
+        return TwinTarget(self.file, arena, how.processes, name=how.name)
+
+    def prepare(
+        self, arena: Arena, rules: NeatRules, *, inputs: Sequence[str], noise: float, bias_value: float
+    ) -> PlatformTrials:
+        """Set the twin up for many trials, shared among processes."""
+        from ._trials import TwinTrials
+
+        self.check_noise(noise)
+        return TwinTrials(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
+
+    def fleet(self, arena: Arena, inputs: Sequence[str], noise: float, n: int) -> Fleet:
+        """Open n robots that are driven step by step, in a separate process."""
+        from .._stepwise import StepwiseFleet
+        from ._robots import TwinRobots
+
+        self.check_noise(noise)
+        self.check_starts(arena)
+        return StepwiseFleet(self, arena, inputs, TwinRobots(self.file, arena, n), n)
+
+
+def hash_elsewhere(file: str) -> str:
+    """The SHA-256 of a file, which another process reads.
+
+    Raises:
+        ValueError: There is no such file, or it cannot be read.
+    """
+    asked = [sys.executable, "-I", "-S", "-c", _HASH, file]
+    done = subprocess.run(asked, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise ValueError(
+            f"the twin's file {file!r} cannot be read ({done.stderr.strip()}). Draw one: realitygap twin sample "
+            "--family close -o FILE"
+        )
+    return done.stdout.strip()

@@ -1,0 +1,87 @@
+"""A twin as a target: it lives in processes of its own, and shows what a robot shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from realitygap._closing import ClosedOnExit
+from realitygap.errors import RobotError
+from realitygap.evolution import inputs_of_robot
+from realitygap.records import Observe, ObservedTrial, trial_from_dict
+from realitygap.robots import Label
+from realitygap.trials import TellTrial, TrialPlan, check_plans
+from realitygap.world import Arena
+
+from ._plan_file import plan_to_dict
+from ._pool import TwinPool
+
+MOST_NUMBER = 2**32 - 1
+
+
+class TwinTarget(ClosedOnExit):
+    """A twin, whose file this process never opens.
+
+    Trial `number` is the same whenever it is carried out, by whichever process.
+
+    Args:
+        file: Of the twin.
+        arena: Where.
+        processes: How many; one a processor that may be used when not given.
+        name: As the user named it; twin:FILE when not given.
+
+    Raises:
+        DescriptionError: There is no such file, or it cannot be used.
+        MissingExtraError: MuJoCo is not installed.
+        RobotError: The twin's process does not come up.
+    """
+
+    label: Label = "TWIN"
+    observes: Observe = "track"
+    is_paced = True
+
+    def __init__(self, file: str, arena: Arena, processes: int | None = None, *, name: str = "") -> None:
+        self.name = name or f"twin:{file}"
+        self.arena = arena
+        self._pool = TwinPool(file, arena, processes)
+        self.step_s = self._pool.step_s
+        self.n_sensors = self._pool.n_sensors
+        self.identity = f"twin {self.sha256}"
+
+    @property
+    def pids(self) -> tuple[int, ...]:
+        """Of its processes."""
+        return self._pool.pids
+
+    @property
+    def sha256(self) -> str:
+        """Of its file, as the process that read it found it."""
+        return self._pool.sha256
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what networks can see."""
+        return inputs_of_robot(self.n_sensors, self._pool.channels)
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`; on Ctrl-C its processes end."""
+        check_plans(plans, observe, self, MOST_NUMBER)
+        requests = [{"do": "carry_out", "plan": plan_to_dict(plan), "observe": observe} for plan in plans]
+        trials: list[ObservedTrial] = []
+        try:
+            for answer in self._pool.ask_all(requests):
+                trial = trial_from_dict(answer["trial"])
+                if answer["problem"]:
+                    raise RobotError(f"Trial {trial.number} on {self.name}: {answer['problem']}")
+                trials.append(trial)
+                if tell is not None:
+                    tell(len(trials) - 1, trial)
+        except (KeyboardInterrupt, SystemExit):
+            self.close()
+            raise
+        return trials
+
+    def close(self) -> None:
+        """End its processes; safe to call twice."""
+        self._pool.close()

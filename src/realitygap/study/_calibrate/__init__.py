@@ -1,0 +1,1 @@
+"""Calibrations: trials on a target, and fits to them."""

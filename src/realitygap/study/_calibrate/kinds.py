@@ -1,0 +1,350 @@
+"""What can be calibrated: the trials that it takes, and the fit to them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.calibration import (
+    LEAST_PLACEMENTS,
+    MOTION,
+    MotionFit,
+    Moved,
+    Placement,
+    SensorFit,
+    Simulate,
+    contact_plans,
+    fit_contact,
+    fit_motion,
+    fit_path,
+    fit_sensor,
+    motion_plans,
+    moved_in,
+    path_plans,
+    placements_of,
+    ranges_of,
+    scribbler_prior,
+    sensor_plans,
+    step_of,
+)
+from realitygap.platforms import SimEnsemble, SimPlatform, SimRobot
+from realitygap.records import CALIBRATES, Observe, ObservedTrial
+from realitygap.robots import Command
+from realitygap.trials import TrialPlan
+from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
+
+from .parts import Parts
+from .whole import ALL_TRIALS, all_plans, fit_everything
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What can be calibrated.
+
+    Attributes:
+        plans: Trials for an arena, a robot and a budget.
+        fit: From trials, the robot to build on, the arena, how much was observed, and the seed of draws.
+        least: Trials that it takes.
+        observes: How much has to be observed for anything to be told.
+    """
+
+    plans: Callable[[Arena, RobotModel, int | None], Sequence[TrialPlan]]
+    fit: Callable[[Sequence[ObservedTrial], RobotModel, Arena, Observe, int], Parts]
+    least: int = 1
+    observes: tuple[Observe, ...] = CALIBRATES
+
+
+def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
+    """Says of what decides how the robot moves where it wants to be more than was thought possible.
+
+    Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
+
+    Args:
+        parts: Of a fit that has no predictive check.
+        is_cut: Whether the fit keeps within what was thought possible, so that at an end it is misspecified.
+    """
+    at_end = [each for each in parts.fitted if each.is_at_end and each.name in MOTION]
+    if not at_end:
+        return parts
+    said = ", ".join(
+        f"{each.name} is {each.estimate:.3g} ({each.prior_low:.3g} to {each.prior_high:.3g})"
+        for each in at_end
+    )
+    note = f"At or beyond the end of what was thought possible: {said}."
+    return replace(parts, misspecified=is_cut, notes=(*parts.notes, note))
+
+
+# path
+
+AT_A_WALL = 0.01
+"""What is less than twice so far ahead of a robot may have stopped it [m]."""
+
+FRONT_M = 0.03
+"""What of a robot's outline lies at most so far behind its foremost point is its front [m]."""
+
+MOST_TURN = 0.9 * math.pi
+"""By a command, of which a camera sees the beginning and the end [rad]."""
+
+FAR_M = 20.0
+"""Nothing stands nearer where a path is simulated [m]."""
+
+NO_LINE = ("path", "sensors")
+"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
+
+_PATH_METHOD = (
+    "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
+    "simulated robot; Student's intervals from repeats and from the step to which was read."
+)
+
+
+def _path_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return path_plans(arena) if budget is None else path_plans(arena, budget)
+
+
+def _fit_path(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    def simulate(trial: ObservedTrial) -> Moved:
+        return _moved_in_sim(trial, robot, arena)
+
+    straight = [trial for trial in trials if _is_straight(trial)]
+    stopped = [id(trial) for trial in straight if _ends_at_a_wall(trial, robot, arena)]
+    n = len(stopped)
+    if n and n == len(straight):
+        raise ValueError(
+            f"All {n} straight paths ended at a wall, expected room for them: is arena {arena.name!r} the right one, "
+            f"and is a command of {straight[0].step_s:g} s right?"
+        )
+    free = [trial for trial in trials if id(trial) not in stopped]
+    fit = fit_path(free, simulate, robot, np.random.default_rng(seed))
+    left_out = (f"{n} of {len(straight)} straight paths ended at a wall, and were left out.",) if n else ()
+    notes = (*fit.notes, *left_out)
+    return _told_of_ends(
+        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, notes, evidence={"path": fit.evidence}),
+        is_cut=False,
+    )
+
+
+def _is_straight(trial: ObservedTrial) -> bool:
+    """Whether it was to go straight ahead."""
+    return bool(np.any(trial.commands[:, 0] > 0)) and not np.any(trial.commands[:, 1])
+
+
+def _ends_at_a_wall(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> bool:
+    """Whether something ahead stopped the robot; where nobody saw its end, by what it said itself.
+
+    One that went back has been told wrongly which of its ends is ahead: that is said elsewhere.
+    """
+    moved = moved_in(trial)
+    if moved is not None and moved.ahead < 0:
+        return False
+    end = trial.poses[-1] if len(trial.poses) else trial.end_pose
+    if end is None:
+        return bool(len(trial.stalled)) and float(np.mean(trial.stalled)) > 0.5
+    outline = np.array([point for part in robot.body for point in part.outline()])
+    front = outline[outline[:, 0] > outline[:, 0].max() - FRONT_M]
+    ahead, sine, cosine = outline[:, 0].max() + AT_A_WALL, math.sin(end[2]), math.cos(end[2])
+    return any(
+        distance_to_segment(end[0] + ahead * cosine - y * sine, end[1] + ahead * sine + y * cosine, wall)
+        < AT_A_WALL
+        for y in np.linspace(front[:, 1].min(), front[:, 1].max(), 9)
+        for wall in arena.segments
+    )
+
+
+def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
+    """How the simulated robot moves in a trial, without noise, where nothing stands in its way.
+
+    Raises:
+        ValueError: A command turns it by so much that turns cannot be counted.
+    """
+    platform = SimPlatform(robot=robot, noise=False, step_s=trial.step_s, precision="double")
+    most = float(np.abs(trial.commands[:, 1]).max(initial=0.0))
+    turned_by = 2 * robot.drive.speed * trial.step_s / robot.drive.track * most
+    if turned_by > MOST_TURN:
+        raise ValueError(
+            f"A command of {trial.step_s:g} s turns the robot by {math.degrees(turned_by):.0f} degrees, expected at "
+            f"most {math.degrees(MOST_TURN):.0f}: turns cannot be counted. Let commands be shorter."
+        )
+    walls = [x for wall in arena.walls for x in wall] or [0.0]
+    low, high = min(walls) - FAR_M, max(walls) + FAR_M
+    around = ((low, low, high, low), (high, low, high, high), (high, high, low, high), (low, high, low, low))
+    with SimRobot(platform, replace(arena, walls=around, obstacles=(), vary={})) as simulated:
+        simulated.reset(Pose(*trial.start))
+        headings = [trial.start[2]]
+        for move, turn in trial.commands:
+            simulated.drive(Command(float(move), float(turn)))
+            headings.append(simulated.pose.heading)
+        x, y, _ = simulated.pose
+    turned = float(np.ptp(np.unwrap(headings)[[0, -1]]) * np.sign(np.diff(np.unwrap(headings)[[0, -1]]))[0])
+    east, north = x - trial.start[0], y - trial.start[1]
+    sine, cosine = math.sin(trial.start[2]), math.cos(trial.start[2])
+    return Moved(east * cosine + north * sine, north * cosine - east * sine, turned)
+
+
+# sensors
+
+_SENSORS_METHOD = (
+    "Readings of a robot that stands before a wall (Rosenzweig & Remy, section 2.3): likelihood of the mixture of "
+    "`sim`, censored at 0 and 1, for each sensor; posterior under even priors by tempered particles (Del Moral, "
+    "Doucet & Jasra 2006); posterior predictive check (Gelman, Meng & Stern 1996); readings count less where "
+    "consecutive ones, or those of a placement, are alike."
+)
+
+MISFIT = 0.05
+"""A check's p below which the sensor's model does not make what was read, over all sensors."""
+
+MISPLACED = 0.1
+"""Share of a sensor's readings that have to be elsewhere for the fit before it is said not to make them: with enough
+readings any model is found wrong somewhere."""
+
+
+def _sensor_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return sensor_plans(arena, robot, budget)
+
+
+def _fit_sensors(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    standing = [trial for trial in trials if len(trial.commands) and not np.any(trial.commands)]
+    if not standing:
+        raise ValueError(
+            "In no trial the robot stands still: expected readings before a wall, as `realitygap calibrate sensors` "
+            "records them."
+        )
+    found = {trial.readings.shape[1] for trial in standing}
+    if found != {len(robot.range)}:
+        raise ValueError(
+            f"The trials have {min(found)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on the "
+            "robot that it was (--base ROBOT)."
+        )
+    rng = np.random.default_rng(seed)
+    placements = placements_of(standing, _rays_in(robot, arena))
+    fits = [fit_sensor(robot, k, each, rng) for k, each in enumerate(placements)]
+    p = min(1.0, len(fits) * min(fit.p for fit in fits))
+    farthest = max(fit.misfit for fit in fits)
+    return Parts(
+        fitted=tuple(fitted for fit in fits for fitted in fit.fitted),
+        numbers={name: value for fit in fits for name, value in fit.numbers.items()},
+        draws={name: values for fit in fits for name, values in fit.draws.items()},
+        method=_SENSORS_METHOD,
+        notes=tuple(_said_of(fit) for fit in fits) + _said_of_placements(placements[0]),
+        misspecified=p < MISFIT and farthest > MISPLACED,
+        misspecification_p=p,
+        evidence={"sensors": [_drawn_of(fit, each) for fit, each in zip(fits, placements, strict=True)]},
+    )
+
+
+def _rays_in(robot: RobotModel, arena: Arena) -> Callable[[Pose], list[NDArray[np.float64]]]:
+    """Distances along each sensor's rays at a pose, as the simulated robot sees them."""
+    simulated = SimRobot(SimPlatform(robot=robot, precision="double"), arena)
+    ends = np.cumsum([sensor.rays for sensor in robot.range])
+
+    def rays(pose: Pose) -> list[NDArray[np.float64]]:
+        simulated.reset(pose)
+        return [np.array(each) for each in np.split(simulated.distances[: ends[-1]], ends[:-1])]
+
+    return rays
+
+
+def _said_of(fit: SensorFit) -> str:
+    apart = fit.independence
+    return (
+        f"{fit.name}: {apart.readings} readings in {apart.placements} placements count as {apart.effective:.0f}; "
+        f"correlation of consecutive ones {apart.correlation:.2f} (p {apart.correlation_p:.3f}), share of the variance "
+        f"between placements {apart.between:.2f} (p {apart.between_p:.3f}); posterior predictive p {fit.p:.3f}, "
+        f"{fit.misfit:.0%} of the readings are not where the fit has them."
+    )
+
+
+def _said_of_placements(placements: Sequence[Placement]) -> tuple[str, ...]:
+    if min(Counter(placement.group for placement in placements).values()) >= LEAST_PLACEMENTS:
+        return ()
+    return (
+        f"Some distances have fewer than {LEAST_PLACEMENTS} placements: what lies between placements cannot be told "
+        "there, and intervals may be too narrow.",
+    )
+
+
+def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]:
+    """What Figure 3 draws of a sensor."""
+    return {
+        "name": fit.name,
+        "distances_m": [float(placement.distances.min()) for placement in placements],
+        "readings": [np.round(placement.readings, 5).tolist() for placement in placements],
+        "curve": {key: np.round(values, 5).tolist() for key, values in fit.curve.items()},
+        "p": fit.p,
+    }
+
+
+# motion and contact
+
+
+def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return motion_plans(arena, robot) if budget is None else motion_plans(arena, robot, budget)
+
+
+def _fit_motion(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    moving = _of_purpose(trials, "motion")
+    fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
+    return _told_of_ends(_parts_of(fit), is_cut=True)
+
+
+def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return contact_plans(arena, robot) if budget is None else contact_plans(arena, robot, budget)
+
+
+def _fit_contact(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    met = _of_purpose(trials, "contact")
+    simulate = _replay(met, robot, arena)
+    return _parts_of(fit_contact(met, simulate, robot, arena, observe=observe, seed=seed))
+
+
+def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedTrial]:
+    """The trials that were carried out for it; all with commands where none was."""
+    return [trial for trial in trials if trial.purpose == purpose] or [
+        trial for trial in trials if len(trial.commands)
+    ]
+
+
+def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
+    """Trials in `sim` with other numbers."""
+    step_s = step_of(trials) if trials else robot.step_s
+    ranges = ranges_of(scribbler_prior(robot), robot)
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges).replay
+
+
+def _parts_of(fit: MotionFit) -> Parts:
+    return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
+
+
+# all
+
+
+def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
+
+
+def _fit_all(
+    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+) -> Parts:
+    return fit_everything(trials, robot, arena, seed)
+
+
+KINDS: dict[str, Kind] = {
+    "path": Kind(_path_plans, _fit_path, least=2),
+    "sensors": Kind(_sensor_plans, _fit_sensors),
+    "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
+    "contact": Kind(_contact_plans, _fit_contact, observes=("track",)),
+    "all": Kind(_all_plans, _fit_all),
+}

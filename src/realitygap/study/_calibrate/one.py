@@ -1,0 +1,391 @@
+"""A calibration: trials on a target, kept as they end, and the fit to them."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from realitygap.calibration import of_one_length, ruled, step_of
+from realitygap.errors import RecordError, StudyError, did_you_mean
+from realitygap.platforms import DEFAULT_ROBOT, SimPlatform, split_spec
+from realitygap.records import (
+    Observations,
+    ObservationsFile,
+    Observe,
+    ObservedTrial,
+    read_observations,
+    sees,
+    write_whole,
+)
+from realitygap.trials import Operator, Target, TrialPlan, those_that_count
+from realitygap.world import Arena, Calibration, Fitted, RobotModel, load_robot, read_calibration
+
+from .._targets import observations_head, refuse_more_than_is_seen
+from .._wrapped_targets import (
+    PATH,
+    CountingTarget,
+    OperatedTarget,
+    ResumableTarget,
+    RuledTarget,
+)
+from .kinds import KINDS, Kind
+from .parts import SOFTWARE, Parts
+from .whole import ALL_TRIALS, LEAST_TO_CHOOSE, calibrate_all
+
+SEED_STRIDE = 10_000
+"""Between the numbers of trials of calibrations with different seeds."""
+
+Tell = Callable[[int, int], None]
+"""Told of how many of how many trials are there."""
+
+
+def calibrate(
+    kind: str,
+    target: Target,
+    *,
+    robot: str | Path = DEFAULT_ROBOT,
+    observe: Observe = "cells",
+    budget: int | None = None,
+    seed: int = 0,
+    trials_file: Path | None = None,
+    choose: bool = False,
+    operator: Operator | None = None,
+    tell: Tell | None = None,
+) -> Calibration:
+    """Carry out the trials of a calibration on a target, and fit a simulated robot to what is observed.
+
+    Args:
+        kind: path, sensors, motion, contact or all.
+        target: What is calibrated.
+        robot: On whose numbers the fit builds: a name, a file, or an earlier calibration, whose numbers stay where this
+            one has none.
+        observe: How much to look at.
+        budget: Trials in all; what the kind needs when not given.
+        seed: Of trials and draws.
+        trials_file: Where trials are kept as they end, and taken up from; nowhere when not given.
+        choose: Of all: whether the last trials are chosen after a first fit, as those that tell most.
+        operator: Puts the robot where it has to stand; None if the target places itself.
+        tell: Called after each trial.
+
+    Raises:
+        StudyError: There is no such kind, or the target, the robot and the kind do not go together.
+        RobotError: The robot failed; what was recorded is kept.
+        StoppedByPerson: The operator was told to stop; what was recorded is kept.
+    """
+    _refuse(kind, target, robot, observe, budget)
+    if choose and kind != "all":
+        raise StudyError(f"--choose goes with all: the trials of {kind} are known before the first of them.")
+    if choose and budget is not None and budget < LEAST_TO_CHOOSE:
+        raise StudyError(
+            f"--budget is {budget}, and the last trials can be chosen where there are at least {LEAST_TO_CHOOSE}: the "
+            "first ones have to tell which. Give more, or leave out --choose."
+        )
+    around: Target = OperatedTarget(target, operator) if operator is not None else RuledTarget(target)
+    if trials_file is None:
+        return _calibrated(kind, around, robot, observe, budget, seed, tell, choose=choose)
+    with ObservationsFile(trials_file, observations_head(target, observe, str(robot))) as file:
+        kept = ResumableTarget(around, file)
+        return _calibrated(kind, kept, robot, observe, budget, seed, tell, choose=choose)
+
+
+def _calibrated(
+    kind: str,
+    target: Target,
+    robot: str | Path,
+    observe: Observe,
+    budget: int | None,
+    seed: int,
+    tell: Tell | None,
+    *,
+    choose: bool,
+) -> Calibration:
+    if choose:
+        return _chosen(target, robot, observe, ALL_TRIALS if budget is None else budget, seed, tell)
+    paced = load_robot(robot).model_copy(update={"step_s": target.step_s})
+    plans = _plans(KINDS[kind], target.arena, paced, budget)
+    numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
+    trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
+    parts = _fit(kind, trials, robot, target.arena, observe, seed)
+    return _calibration(kind, parts, robot, target.name, target.label, observe, trials, target.arena, seed)
+
+
+def _chosen(
+    target: Target, robot: str | Path, observe: Observe, n: int, seed: int, tell: Tell | None
+) -> Calibration:
+    """A calibration of everything whose last trials are chosen after a first fit."""
+    counting = CountingTarget(target, n, tell)
+    try:
+        made = calibrate_all(
+            counting, robot=load_robot(robot), observe=observe, budget=n, seed=seed, choose=True
+        )
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+    parts = Parts(
+        made.fitted,
+        made.numbers,
+        made.draws,
+        made.method,
+        made.notes,
+        made.misspecified,
+        made.misspecification_p,
+        made.evidence,
+    )
+    made_of = _calibration("all", parts, robot, target.name, target.label, observe, (), target.arena, seed)
+    return made_of.model_copy(update={"trials": made.trials, "step_s": made.step_s})
+
+
+def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
+    """Return where a calibration can be carried out.
+
+    Raises:
+        StudyError: It cannot be.
+    """
+    _check_kind(kind)
+    base, made = load_robot(robot), KINDS[kind]
+    if budget is not None and budget < made.least:
+        raise StudyError(
+            f"--budget is {budget}, and a calibration of {kind} takes at least {made.least} trials."
+        )
+    if observe not in made.observes:
+        raise _too_little_seen(kind, observe)
+    refuse_more_than_is_seen(target, observe)
+    refuse_other_sensors(base, target, str(robot))
+
+
+def _too_little_seen(kind: str, observe: Observe) -> StudyError:
+    return StudyError(
+        f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
+        f"{' or '.join(KINDS[kind].observes)}); `calibrate all` makes do with cells."
+    )
+
+
+def refuse_other_sensors(robot: RobotModel, target: Target, named: str = "") -> None:
+    """Raise an error if a target has another number of range sensors than the robot on whose numbers a fit builds.
+
+    Args:
+        robot: The robot.
+        target: The target.
+        named: What the user called the robot; its name if not given.
+
+    Raises:
+        StudyError: The numbers differ.
+    """
+    if len(robot.range) == target.n_sensors:
+        return
+    advice = "Name the robot that the target is: --base ROBOT, or a study with that robot."
+    if split_spec(target.name)[0] == SimPlatform.name:
+        advice = f"To simulate that robot, name the target sim:{named or robot.name}. Otherwise n{advice[1:]}"
+    raise StudyError(
+        f"{target.name} has {target.n_sensors} range sensors and robot {robot.name!r} {len(robot.range)}. {advice}"
+    )
+
+
+def calibrate_from(
+    kind: str, data: Path, *, robot: str | Path | None = None, observe: Observe | None = None, seed: int = 0
+) -> Calibration:
+    """Fit a simulated robot to trials that were recorded before.
+
+    Args:
+        kind: As in `calibrate`.
+        data: A file of observed trials.
+        robot: On whose numbers the fit builds; the one that the file names when not given.
+        observe: To use less than was recorded.
+        seed: Of draws.
+
+    Raises:
+        StudyError: There is no such kind, or the file has nothing to fit it to.
+        RecordError: The file cannot be read.
+    """
+    _check_kind(kind)
+    found = read_observations(data)
+    robot = found.head.robot if robot is None else robot
+    arena = _arena_of(data, found)
+    seen = observe or found.head.observe
+    if seen not in KINDS[kind].observes:
+        raise _too_little_seen(kind, seen)
+    if not sees(found.head.observe, seen):
+        raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
+    trials = [_seen_as(trial, seen) for trial in those_that_count(found.trials)]
+    _refuse_other_readings(trials, load_robot(robot))
+    parts = _fit(kind, trials, robot, arena, seen, seed)
+    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials, arena, seed)
+    last = datetime.datetime.fromtimestamp(data.stat().st_mtime, datetime.UTC)
+    more = {"measured": last.isoformat(timespec="seconds")}
+    return made.model_copy(update=more | ({"notes": (*made.notes, found.problem)} if found.problem else {}))
+
+
+def _arena_of(path: Path, found: Observations) -> Arena:
+    try:
+        return Arena.from_dict(dict(found.head.arena))
+    except (KeyError, TypeError, ValueError) as error:
+        raise RecordError(
+            f"{path} is damaged: its first line has no arena that can be read ({error})."
+        ) from None
+
+
+def _refuse_other_readings(trials: Sequence[ObservedTrial], robot: RobotModel) -> None:
+    others = {trial.readings.shape[1] for trial in trials if len(trial.readings)} - {len(robot.range)}
+    if others:
+        raise StudyError(
+            f"The trials have {min(others)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on the "
+            "robot that it was (--base ROBOT)."
+        )
+
+
+def save_calibration(path: Path, calibration: Calibration) -> None:
+    """Write a calibration, whole: the file that was there or the new one, and nothing between.
+
+    A robot's file that it builds on is named as it is found from the folder of `path`.
+
+    Raises:
+        RecordError: It cannot be written.
+    """
+    robot = calibration.robot
+    if Path(robot).is_file():
+        robot = os.path.relpath(Path(robot).resolve(), path.resolve().parent)
+    write_whole(path, calibration.model_copy(update={"robot": robot}).to_toml().encode())
+
+
+def _check_kind(kind: str) -> None:
+    if kind not in KINDS:
+        raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, KINDS)}")
+
+
+def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+    try:
+        return kind.plans(arena, robot, budget)
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+
+
+def _fit(
+    kind: str,
+    trials: Sequence[ObservedTrial],
+    robot: str | Path,
+    arena: Arena,
+    observe: Observe,
+    seed: int,
+) -> Parts:
+    base = load_robot(robot)
+    alike, left_out = (trials, "") if kind == "sensors" else of_one_length(trials)
+    try:
+        parts = KINDS[kind].fit(alike, base, arena, observe, seed)
+    except ValueError as error:
+        raise StudyError(str(error)) from error
+    return replace(parts, notes=(*parts.notes, left_out)) if left_out else parts
+
+
+def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+    """A trial with no more than was to be observed."""
+    if observe != "track" and len(trial.poses):
+        trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
+    return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
+
+
+def _calibration(
+    kind: str,
+    parts: Parts,
+    robot: str | Path,
+    target: str,
+    label: str,
+    observe: Observe,
+    trials: Sequence[ObservedTrial],
+    arena: Arena,
+    seed: int,
+) -> Calibration:
+    """The parts of a fit laid over an earlier calibration, where it builds on one."""
+    below = read_calibration(robot)
+    numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
+    fitted, notes = parts.fitted, parts.notes
+    flagged, p = parts.misspecified, parts.misspecification_p
+    name = str(robot)
+    _refuse_no_robot(parts, robot, target)
+    step_s = round(step_of(of_one_length(trials)[0]), 4) if trials and kind != "sensors" else 0.0
+    if below is not None:
+        step_s = step_s or below.step_s
+        name = below.robot
+        numbers = {**below.numbers, **numbers}
+        draws = _paired(below.draws, draws)
+        fitted = (*_still_said(below.fitted, parts), *fitted)
+        notes = (*notes, f"Builds on {Path(robot).name}: {below.kind} of {below.target}, {below.date}.")
+        if below.misspecified and kind != "all":  # which fits all numbers anew
+            flagged, p = True, min(p, below.misspecification_p)
+            notes = (*notes, *below.notes)
+    return Calibration(
+        kind=kind,
+        robot=name,
+        target=target,
+        label=label,
+        observe=observe,
+        trials=len(trials),
+        step_s=step_s,
+        date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        arena=arena.name,
+        seed=seed,
+        software=SOFTWARE,
+        method=parts.method,
+        fitted=tuple(fitted),
+        numbers=numbers,
+        draws={key: tuple(values) for key, values in draws.items()},
+        misspecified=flagged,
+        misspecification_p=p,
+        notes=tuple(notes),
+        evidence=parts.evidence,
+    )
+
+
+def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
+    """What an earlier calibration says of numbers that a later one has not fitted anew.
+
+    `range.amplitude` is that of all sensors together, and `range.0.amplitude` of one; steps of a path follow from
+    gains.
+    """
+
+    def of_all(name: str) -> str:
+        return re.sub(r"\.\d+\.", ".", name)
+
+    anew = {of_all(name) for name in (*(each.name for each in parts.fitted), *parts.numbers)}
+    has_other_gains = "drive.gain_left" in anew
+    return [
+        each
+        for each in below
+        if of_all(each.name) not in anew and not (has_other_gains and each.name.startswith("path."))
+    ]
+
+
+def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
+    """Return where a robot can have the numbers that were fitted.
+
+    Raises:
+        StudyError: It cannot: a wheel's gain below 0, say.
+    """
+    try:
+        load_robot(robot).with_numbers(parts.numbers)
+    except ValueError as error:
+        said = "; ".join(line.removeprefix("RobotModel.") for line in str(error).split("\n"))
+        raise StudyError(
+            f"What was fitted to {target} makes no robot: {said} Did it go back when it was told to go ahead, or turn "
+            "the other way? See which end of it is ahead, and that left and right are not swapped. Trials that were "
+            "kept are safe."
+        ) from None
+
+
+def _paired(
+    below: Mapping[str, Sequence[float]], above: Mapping[str, Sequence[float]]
+) -> dict[str, list[float]]:
+    """Draws of two calibrations as draws of both, row by row at random: they were fitted apart."""
+    n = max((len(values) for values in (*below.values(), *above.values())), default=0)
+    rng = np.random.default_rng(0)
+
+    def spread(draws: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+        size = max((len(values) for values in draws.values()), default=1)
+        rows = np.concatenate([rng.permutation(size) for _ in range(-(-n // size))])[:n]
+        return {name: np.asarray(values)[rows].tolist() for name, values in draws.items()}
+
+    return {name: values for name, values in spread(below).items() if name not in above} | spread(above)

@@ -1,0 +1,301 @@
+"""All parameters of a robot together, from whole trials on a target: `calibrate all`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from realitygap.calibration import (
+    LEAST_STEPS,
+    Effort,
+    Evidence,
+    Floats,
+    Misfit,
+    Parameter,
+    Posterior,
+    Vectors,
+    evidence_of,
+    excitation,
+    fit_all,
+    fit_from_poses,
+    information_of,
+    misfits,
+    mixed,
+    next_trials,
+    numbers_of,
+    of_one_length,
+    random_controllers,
+    ranges_of,
+    scribbler_prior,
+    step_of,
+    values_of,
+)
+from realitygap.errors import whole_number
+from realitygap.evolution import Genome
+from realitygap.platforms import SimEnsemble, SimPlatform
+from realitygap.records import Observe, ObservedTrial
+from realitygap.trials import Target, TrialPlan
+from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
+
+from .parts import SOFTWARE, Parts
+
+METHOD = (
+    "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
+    "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002). "
+    "With poses, three of four draws are from likelihoods of single commands (multiple shooting, Bock 1983)."
+)
+ALL_TRIALS = 20  # if no budget is given
+LEAST_TO_CHOOSE = 10  # of the budget, for which the last trials are chosen
+STEPS = 100  # of a trial
+IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
+N_CANDIDATES = 12  # of which the next trials are chosen
+N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
+OF_COMMANDS = (
+    3  # draws of single commands for each of whole trials, with poses: predicted more than 1 did, on twins
+)
+BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
+
+
+def calibrate_all(
+    target: Target,
+    *,
+    robot: RobotModel | str | None = None,
+    observe: Observe = "cells",
+    budget: int,
+    seed: int = 0,
+    effort: Effort = "full",
+    choose: bool = False,
+    tell: Callable[[str], None] | None = None,
+    keep: Callable[[ObservedTrial], None] | None = None,
+    threads: int | None = None,
+) -> Calibration:
+    """Carry out trials on a target and fit all parameters of `sim` to what was observed.
+
+    Half of the trials are commands that change often, from many places; the other half are random controllers from
+    the arena's start.
+
+    Args:
+        target: What is calibrated.
+        robot: On whose numbers the fit builds, by name, file or as it is; the default one of `sim` when not given.
+        observe: How much of the target is seen.
+        budget: Trials to carry out; with 0 the robot stays as its file has it.
+        seed: Of all random numbers.
+        effort: How many simulations.
+        choose: Whether the last trials of 10 and more are chosen after a first fit, as those that tell most of how
+            controllers that were not tried will do.
+        tell: Told what is going on.
+        keep: Given each trial as it comes, to be kept.
+        threads: Of the simulations.
+
+    Raises:
+        RobotError: The target failed; what `keep` was given is not lost.
+        ValueError: So much cannot be seen of the target.
+    """
+    whole_number("budget", budget, 0)
+    platform = SimPlatform(step_s=target.step_s, **({} if robot is None else {"robot": robot}))
+    say = tell or (lambda _: None)
+    told = None if keep is None else lambda _, trial: keep(trial)
+    plans = all_plans(target.arena, platform.robot, budget, seed)
+    is_chosen = choose and budget >= LEAST_TO_CHOOSE
+    first = round(BEFORE_CHOICE * budget) if is_chosen else budget
+    say(f"{first} trials on {target.name}, {observe} observed")
+    carried_out = list(target.carry_out(plans[:first], observe, told))
+    trials, left_out = of_one_length(carried_out)
+    if trials:
+        platform = platform.model_copy(update={"step_s": step_of(trials)})
+    fit = _Fit(platform, target.arena, seed, say, threads)
+    if is_chosen:
+        chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
+        say(f"{len(chosen)} more trials, chosen")
+        carried_out += target.carry_out(chosen, observe, told)
+        trials, left_out = of_one_length(carried_out)
+    parts = fit.parts(trials, effort)
+    return Calibration(
+        kind="all",
+        robot=robot if isinstance(robot, str) else platform.robot.name,
+        target=target.name,
+        label=target.label,
+        observe=observe,
+        trials=len(carried_out),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        arena=target.arena.name,
+        seed=seed,
+        software=SOFTWARE,
+        method=parts.method,
+        fitted=parts.fitted,
+        numbers=dict(parts.numbers),
+        draws={name: tuple(np.asarray(value).tolist()) for name, value in parts.draws.items()},
+        step_s=step_of(trials) if trials else 0.0,
+        misspecified=parts.misspecified,
+        misspecification_p=parts.misspecification_p,
+        notes=(*parts.notes, left_out) if left_out else parts.notes,
+        evidence=parts.evidence,
+    )
+
+
+def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> list[TrialPlan]:
+    """The trials of a calibration of everything: excitation and random controllers in turn."""
+    rng = np.random.default_rng([seed, 1])
+    given = excitation(arena, robot.radius, (budget + 1) // 2, STEPS, rng)
+    driven = [
+        TrialPlan(genome=genome, steps=STEPS)
+        for genome in random_controllers(budget // 2, int(rng.integers(2**31)))
+    ]
+    plans = [plan for k in range(len(given)) for plan in (given[k], *driven[k : k + 1])]
+    return [TrialPlan(**{**vars(plan), "number": k}) for k, plan in enumerate(plans)]
+
+
+def fit_everything(
+    trials: Sequence[ObservedTrial],
+    robot: RobotModel,
+    arena: Arena,
+    seed: int = 0,
+    *,
+    effort: Effort = "full",
+    tell: Callable[[str], None] | None = None,
+    threads: int | None = None,
+) -> Parts:
+    """The fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
+
+    Raises:
+        ValueError: Trials with commands of several lengths of time.
+    """
+    platform = SimPlatform(robot=robot, **({"step_s": step_of(trials)} if trials else {}))
+    return _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
+
+
+class _Fit:
+    """A robot in an arena, ready to be fitted."""
+
+    def __init__(
+        self, platform: SimPlatform, arena: Arena, seed: int, tell: Callable[[str], None], threads: int | None
+    ) -> None:
+        self.robot = platform.robot
+        self.arena = arena
+        self.seed = seed
+        self.tell = tell
+        self.prior = scribbler_prior(self.robot)
+        self.ensemble = SimEnsemble(
+            platform, arena, ranges=ranges_of(self.prior, self.robot), threads=threads
+        )
+
+    def simulate(self, one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
+        """(m, d) what is seen of m robots."""
+        return self.ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
+
+    def evidence(self, trials: Sequence[ObservedTrial]) -> list[Evidence]:
+        genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
+        return evidence_of(trials, genomes, self.arena.grid.n_cells)
+
+    def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+        """What is left of the prior.
+
+        With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
+        where `sim` cannot make both, the first knows how the robot moves and the second what comes of it.
+        """
+        told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
+        if not told or any(trial.observe != "track" for trial in told):
+            return self._posterior_of_trials(trials, effort)
+        of_commands = fit_from_poses(
+            told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
+        )
+        blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
+        return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior, share=OF_COMMANDS)
+
+    def _posterior_of_trials(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+        return fit_all(
+            self.evidence(trials), self.simulate, self.prior, self.robot,
+            seed=self.seed, effort=effort, tell=self.tell,
+        )  # fmt: skip
+
+    def numbers(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
+        return numbers_of(self.prior, values, self.robot)
+
+    def parts(self, trials: Sequence[ObservedTrial], effort: Effort) -> Parts:
+        """All that the trials tell."""
+        if not self.evidence(trials):
+            return self._as_it_is()
+        posterior = self.posterior(trials, effort)
+        middle = {name: np.median(value, keepdims=True) for name, value in posterior.values.items()}
+        draws = self.numbers(posterior.values)
+        found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
+        return Parts(
+            fitted=tuple(_fitted(parameter, posterior) for parameter in self.prior),
+            numbers={name: float(value[0]) for name, value in self.numbers(middle).items()},
+            draws=draws,
+            method=METHOD,
+            notes=tuple(_said_of(misfit) for misfit in found),
+            misspecified=any(misfit.is_too_large for misfit in found),
+            misspecification_p=min(1.0, len(found) * min(misfit.p for misfit in found)),
+            evidence={"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}},
+        )
+
+    def chosen(self, posterior: Posterior, n: int, number: int) -> list[TrialPlan]:
+        """The n trials that tell most of how controllers do that were not tried."""
+        rng = np.random.default_rng([self.seed, 2])
+        given = excitation(self.arena, self.robot.radius, N_CANDIDATES // 2, STEPS, rng)
+        controllers = random_controllers(N_CANDIDATES, int(rng.integers(2**31)))
+        driven = [TrialPlan(genome=genome, steps=STEPS) for genome in controllers[: N_CANDIDATES // 2]]
+        places = posterior.places[:N_ASKED]
+        numbers = self.numbers(values_of(self.prior, places))
+        informations = []
+        for k, plan in enumerate([*given, *driven]):
+            (one,) = self._unseen(plan)
+            vectors = self.simulate(one, numbers, self.seed + k)
+            informations.append(information_of(places, vectors, one.finest))
+        starts = np.tile(self.arena.start, (N_CANDIDATES // 2, 1))
+        held_out = controllers[N_CANDIDATES // 2 :]
+        goal = self.ensemble.drive(held_out, starts, STEPS, numbers, self.seed, keep=()).coverage
+        which = next_trials(places, informations, n, goal)
+        plans = [[*given, *driven][k] for k in which]
+        return [TrialPlan(**{**vars(plan), "number": number + k}) for k, plan in enumerate(plans)]
+
+    def _unseen(self, plan: TrialPlan) -> list[Evidence]:
+        """What a trial that was not carried out would tell, seen from afar."""
+        n, s = plan.steps, len(self.robot.range)
+        commands = plan.commands if plan.genome is None else np.zeros((n, 2))
+        start = plan.start or self.arena.start
+        x, y, heading = start
+        trial = ObservedTrial((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
+        return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
+
+    def _as_it_is(self) -> Parts:
+        """Of no trials: the robot's own numbers."""
+        plain = {
+            name: value.center if isinstance(value, Distribution) else value
+            for name, value in self.robot.numbers().items()
+        }
+        numbers = {e.number: plain[e.number] for parameter in self.prior for e in parameter.expand}
+        return Parts(
+            fitted=(),
+            numbers=numbers,
+            draws={name: (value,) for name, value in numbers.items()},
+            method="None: no trials.",
+            notes=("No trial was observed: these are the robot file's numbers.",),
+        )
+
+
+def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
+    draws = posterior.values[parameter.name]
+    low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
+    spread = float(parameter.scale(draws).std()) / parameter.width
+    identified = spread < IDENTIFIED / np.sqrt(12.0)
+    return Fitted(
+        name=parameter.name,
+        estimate=float(middle),
+        low=float(low),
+        high=float(high),
+        prior_low=parameter.prior.lowest,
+        prior_high=parameter.prior.highest,
+        identified=bool(identified),
+        unit=parameter.unit,
+        advice="" if identified else f"To identify it, record {parameter.advice}.",
+    )
+
+
+def _said_of(misfit: Misfit) -> str:
+    most = f"expected at most {misfit.tolerated:.0%}"
+    return f"{misfit.kind}: {misfit.share:.0%} of its variance is neither predicted nor chance, {most}."

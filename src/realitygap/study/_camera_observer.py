@@ -1,0 +1,166 @@
+"""The observer of a robot on the floor: a camera above it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import RobotError, VisionError
+from realitygap.records import Observe, Score
+from realitygap.robots import Clock, Robot
+from realitygap.trials import PortObserver, SheetObserver, TrialPlan
+from realitygap.vision import Track, Tracked
+from realitygap.world import Arena
+
+from ._tracked import score_along
+
+AT_REST_S = 0.4
+"""By so much the robot may be seen later than it began, or less long than it drove: it stands at both ends."""
+
+
+class Looking(Protocol):
+    """Follows a robot, such as `LiveTrack`."""
+
+    def now(self) -> float:
+        """The time of its pictures [s]."""
+        ...
+
+    def begin(self) -> None:
+        """A trial begins."""
+        ...
+
+    def tracked(self, until_s: float | None = None) -> Tracked:
+        """The track since then, up to a time [s] at least."""
+        ...
+
+
+class CameraObserver:
+    """A camera above a robot: sees where it was at each look, and the cells that it crossed.
+
+    Args:
+        camera: Follows the robot.
+        arena: In which the camera finds its way.
+        beside: Another observer, which puts the robot at its start and reads its encoders; None if nobody has to.
+        say: Told why a trial has to be counted by hand.
+    """
+
+    who = "camera"
+    observes: Observe = "track"
+
+    def __init__(
+        self,
+        camera: Looking,
+        arena: Arena,
+        beside: PortObserver | None = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._camera, self._arena, self._say = camera, arena, say
+        self.beside: PortObserver = beside or SheetObserver(lambda _: ())
+        self._times: list[float] = []
+        self._track: Track | None = None
+
+    @property
+    def identity(self) -> str:
+        """Identity of the robot that was met."""
+        return self.beside.identity
+
+    def meet(self, robot: Robot, arena: Arena | None = None) -> None:
+        """Take note of a robot that was opened.
+
+        Raises:
+            RobotError: The camera was set up for another arena.
+        """
+        if arena not in (None, self._arena):
+            raise RobotError(
+                f"The camera was set up for arena {self._arena.name!r}, and the trials are in {arena.name!r}. Name the "
+                f"arena (--arena)."
+            )
+        self.beside.meet(robot, arena)
+
+    def ready(self) -> None:
+        """Have it stand where it can turn on the spot."""
+        self.beside.ready()
+
+    def clock(self, robot: Robot) -> Clock:
+        """The clock by which its commands are timed."""
+        return self.beside.clock(robot)
+
+    def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
+        """Have it put at a start, and look from then on."""
+        self.beside.place(plan, arena, "readings")
+        self._times, self._track = [], None
+        self._camera.begin()
+
+    def battery_v(self) -> float:
+        """Voltage of the robot at the start of a trial [V]; nan if it is not known."""
+        return self.beside.battery_v()
+
+    def wheels(self) -> tuple[float, float] | None:
+        """Way of the wheels by its encoders [m]."""
+        return self.beside.wheels()
+
+    def look(self) -> None:
+        """Note the time: where it was then is in the pictures."""
+        self._times.append(self._camera.now())
+        self.beside.look()
+
+    def poses(self) -> NDArray[np.float64]:
+        """(n, 3) at each look.
+
+        Raises:
+            RobotError: The camera did not see it.
+        """
+        return self._seen().at(np.array(self._times)) if self._times else np.empty((0, 3))
+
+    def cells(self) -> tuple[int, ...]:
+        """Those along its line.
+
+        Raises:
+            RobotError: The camera did not see it.
+        """
+        if len(self._times) < 2:
+            return ()
+        return self._seen().between(self._times[0], self._times[-1]).cells(self._arena.grid)
+
+    def score(self, arena: Arena) -> Score | None:
+        """The cells along the robot's line, and the path; None if the camera did not see it."""
+        if arena.grid != self._arena.grid:
+            self._say(
+                f"The camera looks at the arena {self._arena.name!r}, and the trial was in {arena.name!r}."
+            )
+            return None
+        try:
+            score = score_along(self._seen(), np.array(self._times), arena.grid, self.who)
+        except RobotError as error:
+            self._say(f"{error} Count its cells by hand.")
+            return None
+        self._say(f"The camera counts {len(score.cells)} cells.")
+        return score
+
+    def _seen(self) -> Track:
+        """From the first look to the last."""
+        if self._track is None:
+            self._track = seen_between(self._camera, self._times[0], self._times[-1])
+        return self._track
+
+
+def seen_between(camera: Looking, first: float, last: float) -> Track:
+    """The track of a trial from one time to another [s].
+
+    Raises:
+        RobotError: The camera did not see all of it.
+    """
+    try:
+        track = camera.tracked(last).track
+    except (VisionError, ValueError) as error:
+        raise RobotError(f"The camera did not see the trial: {error}") from error
+    if track.times[0] > first + AT_REST_S or track.times[-1] < last - AT_REST_S:
+        from_s, to_s = track.times[0] - first, track.times[-1] - first
+        raise RobotError(
+            f"The camera saw the robot from {from_s:.1f} to {to_s:.1f} s of a trial of {last - first:.1f} s, expected "
+            "all of it. Does it see the whole arena?"
+        )
+    return track.held(min(first, track.times[0]), max(last, track.times[-1]))

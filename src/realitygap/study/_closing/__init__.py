@@ -1,0 +1,1 @@
+"""The study on how far calibration closes the gap to twins."""

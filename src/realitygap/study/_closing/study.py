@@ -1,0 +1,184 @@
+"""`closing-the-gap`: many twins, each calibrated by a few trials; does the simulator then say what they do?"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from realitygap.errors import RobotError, from_extra, whole_number
+from realitygap.platforms import TwinTarget
+from realitygap.records import write_whole
+from realitygap.trials import Target
+
+from .._calibrate.whole import calibrate_all
+from .._executors import usable_processors
+from .._transfer.strategies import choose_condition
+from .plan import STUDY, ClosingPlan, TwinName, adopt_plan
+from .summary import summarize_closing
+from .twin import ClosingTwin
+
+
+@dataclass(frozen=True)
+class ClosingProgress:
+    """How far the study is.
+
+    Attributes:
+        n_done: Units that are there.
+        n_units: Of so many.
+        seconds: Since this call began.
+    """
+
+    n_done: int
+    n_units: int
+    seconds: float
+
+
+def closing_the_gap(
+    out: str | Path,
+    plan: ClosingPlan | None = None,
+    *,
+    processes: int | None = None,
+    tell: Callable[[ClosingProgress], None] | None = None,
+) -> dict[str, Any]:
+    """Carry out the study, or what is missing of it, and sum up.
+
+    Each twin is drawn from its family into a file, which only the process that simulates it reads. The held-out
+    controllers are tried on it; the simulator is calibrated by each budget of trials and way to observe, and judged by
+    these controllers; and what evolves in it is transferred to the twin. Each of these is a file of its own, written
+    whole: interrupt it at any moment, and the same call goes on.
+
+    Args:
+        out: Folder for the results.
+        plan: What is done; the study at its full size when not given. `realitygap.study.SMALL` is one of minutes.
+        processes: Twins at once; as many as there are processors when not given.
+        tell: Told how far it is, now and then.
+
+    Returns:
+        The summary, which is in `summary.json` of the folder as well: see `summarize_closing`.
+
+    Raises:
+        RecordError: The folder holds another plan.
+        MissingExtraError: MuJoCo is not installed.
+        ValueError: There is no such family, or a number out of its range.
+    """
+    plan = plan or ClosingPlan()
+    processes = usable_processors() if processes is None else whole_number("processes", processes, 1)
+    folder = Path(out)
+    adopt_plan(folder, plan)
+    _write_twins(folder, plan.names)
+    since = time.perf_counter()
+
+    def show() -> None:
+        if tell is not None:
+            tell(ClosingProgress(n_done(folder, plan), plan.n_units, time.perf_counter() - since))
+
+    show()
+    missing = [name for name in plan.names if any(not path.exists() for path in _paths(folder, plan, name))]
+    if processes == 1:
+        for name in missing:
+            _carry_out(plan, name, folder, show)
+    else:
+        _carry_out_apart(plan, missing, folder, processes, show)
+    show()
+    summary = summarize_closing(folder)
+    write_whole(folder / "summary.json", json.dumps(summary, indent=2).encode(), within=folder)
+    return summary
+
+
+def n_done(folder: Path, plan: ClosingPlan) -> int:
+    """Units that are there."""
+    return sum(path.exists() for name in plan.names for path in _paths(folder, plan, name))
+
+
+def _paths(folder: Path, plan: ClosingPlan, name: TwinName) -> Iterable[Path]:
+    return [folder / "units" / f"{name}-{unit}.json" for unit in plan.units()]
+
+
+def _write_twins(folder: Path, names: Iterable[TwinName]) -> None:
+    """The file of each twin; one that is there stays."""
+    from realitygap.robots.twin import sample_twin
+
+    for name in names:
+        model = sample_twin(name.family, name.seed)
+        if model.engine == "mujoco":
+            from_extra("mujoco", "twin")
+        path = folder / "twins" / f"{name}.toml"
+        if not path.exists():
+            write_whole(path, model.to_toml().encode(), within=folder)
+
+
+def _carry_out(
+    plan: ClosingPlan, name: TwinName, folder: Path, show: Callable[[], None] | None = None
+) -> None:
+    """One twin, in this process; the twin itself is in another."""
+    arena = choose_condition(STUDY, None, plan.seed).arena.arena()
+
+    def open_twin(file: Path) -> Target:
+        return TwinTarget(str(file), arena, 1, name=f"twin:{name}")
+
+    ClosingTwin(plan, name, folder, open_twin, calibrate_all, lambda _: show and show()).carry_out()
+
+
+def _carry_out_apart(
+    plan: ClosingPlan, names: list[TwinName], folder: Path, processes: int, show: Callable[[], None]
+) -> None:
+    """Twins in processes of their own, as many at once; whatever ends this ends them."""
+    context = multiprocessing.get_context("spawn")
+    left = list(names)
+    under_way: list[tuple[Any, Connection]] = []
+    try:
+        while left or under_way:
+            while left and len(under_way) < processes:
+                ours, theirs = context.Pipe(duplex=False)
+                process = context.Process(target=_report, args=(theirs, plan, left.pop(0), folder))
+                process.start()
+                theirs.close()
+                under_way.append((process, ours))
+            # the time-out lets Ctrl-C through on every system, and shows what is done
+            wait([ours for _, ours in under_way], timeout=1.0)
+            show()
+            for process, ours in under_way[:]:
+                if ours.poll():
+                    under_way.remove((process, ours))
+                    _end(process, ours)
+    finally:
+        for process, _ in under_way:
+            process.terminate()
+
+
+def _report(pipe: Connection, plan: ClosingPlan, name: TwinName, folder: Path) -> None:
+    """One twin in a process of its own, which sends what went wrong, or None."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    problem: BaseException | None = None
+    try:
+        _carry_out(plan, name, folder)
+    except BaseException as error:
+        problem = error
+    pipe.send(problem)
+
+
+def _end_with_parent() -> None:
+    """A study that was killed leaves nobody behind who writes to its folder beside the next one."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _end(process: Any, pipe: Connection) -> None:
+    """Take what a process sent; raise it where that is an error."""
+    try:
+        problem = pipe.recv()
+    except EOFError:
+        problem = RobotError(f"The process of a twin ended (status {process.exitcode}) before it was done.")
+    process.join()
+    if problem is not None:
+        raise problem

@@ -1,0 +1,401 @@
+"""What came of `closing-the-gap`: each goal with its figure, its interval, and whether it is met."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realitygap import _special as special
+from realitygap._version import __version__
+from realitygap.records import read_object
+from realitygap.world import Fitted
+
+from .plan import ClosingPlan, TwinName, read_plan
+
+STANDARD_ERRORS = 3.0
+"""A twin counts where the simulator as it is differs from it by more than so many standard errors."""
+
+NORMAL_95 = 1.959963984540054
+FALLS = {"track": 0.6, "cells": 0.4}
+"""Least median fall of the RMS gap, by what calibrating sees."""
+
+STRETCH = 0.8
+"""The same with `track`, where all goes well."""
+
+LEAST_SRCC = 0.95
+MOST_MMRV = 2.0
+LEAST_OVER_DIRECT = 0.8
+Row = dict[str, Any]
+
+
+def summarize_closing(folder: str | Path) -> dict[str, Any]:
+    """Sum up what there is of the study in a folder; what is missing is said.
+
+    Returns:
+        `plan`; `twins`: of each one the RMS gap before and after by observation and budget, whether it counts, and
+        what its calibrations found; `families`; `strategies`; `goals`: each with `name`, `figure`, `low`, `high` (95 %
+        interval, over twins), `n`, `goal`, `met` (as `is_met` returns it), `why` for those twins that miss it, and
+        `unknown`: twins of which the figure is not known, and why; `n_done` and `n_units`.
+
+    Raises:
+        RecordError: There is no such study.
+    """
+    folder = Path(folder)
+    plan = read_plan(folder)
+    units = _read_units(folder, plan)
+    twins = [row for name in plan.names if (row := _twin(name, plan, units.get(str(name), {}))) is not None]
+    budget = _goal_budget(plan)
+    return {
+        "study": "closing-the-gap",
+        "software": __version__,
+        "plan": plan.to_dict(),
+        "budget": budget,
+        "n_done": sum(len(found) for found in units.values()),
+        "n_units": plan.n_units,
+        "n_counted": sum(twin["counts"] for twin in twins),
+        "twins": twins,
+        "families": _families(plan, twins),
+        "strategies": _strategies(twins),
+        "goals": list(_goals(plan, twins, budget)),
+    }
+
+
+def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
+    """What is there, by twin and unit."""
+    found: dict[str, dict[str, Row]] = {}
+    for name in plan.names:
+        for unit in plan.units():
+            path = folder / "units" / f"{name}-{unit}.json"
+            if path.exists():
+                found.setdefault(str(name), {})[unit] = read_object(path)
+    return found
+
+
+def _goal_budget(plan: ClosingPlan) -> int:
+    """The budget by which goals are judged."""
+    return plan.transfer_budget if plan.transfer_budget in plan.budgets else max(plan.budgets)
+
+
+# a twin
+
+
+def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | None:
+    """What came of a twin; None while not even the gap of the simulator as it is is known."""
+    before = units.get("gap-none-0")
+    if before is None:
+        return None
+    rms = before["gap"]["rms"]
+    error = standard_error(rms)
+    after = [_calibrated(units[unit], rms) for unit in plan.units() if unit in units and _is_after(unit)]
+    row: Row = {
+        "twin": str(name),
+        "family": name.family,
+        "rms": rms,
+        "standard_error": error,
+        "counts": bool(rms["estimate"] is not None and error and rms["estimate"] > STANDARD_ERRORS * error),
+        "gap": _measures(before),
+        "means": before["means"],
+        "calibrated": after,
+    }
+    if "transfer" in units:
+        row["transfer"] = units["transfer"]["strategies"]
+    row["seconds"] = sum(unit["seconds"] for unit in units.values())
+    return row
+
+
+def _is_after(unit: str) -> bool:
+    return unit.startswith("gap-") and unit != "gap-none-0"
+
+
+def standard_error(estimate: Row) -> float | None:
+    """That of a figure with a 95 % interval, as wide as a normal one; None where there is no interval."""
+    if estimate["low"] is None or estimate["high"] is None:
+        return None
+    return float(estimate["high"] - estimate["low"]) / (2 * NORMAL_95)
+
+
+def _calibrated(unit: Row, before: Row) -> Row:
+    """One calibration: how far the gap fell, and what the fit says of itself."""
+    after, fit = unit["gap"]["rms"], unit["calibration"]
+    known = after["estimate"] is not None and before["estimate"]
+    return {
+        "observe": unit["observe"],
+        "budget": unit["budget"],
+        "rms": after,
+        "rms_point": unit["point"],
+        "fall": 1 - after["estimate"] / before["estimate"] if known else None,
+        "gap": _measures(unit),
+        "means": unit["means"],
+        "misspecified": fit["misspecified"],
+        "misspecification_p": fit["misspecification_p"],
+        "at_prior_end": sorted(each["name"] for each in fit["fitted"] if Fitted(**each).is_at_end),
+    }
+
+
+def _measures(unit: Row) -> Row:
+    """Of a gap, what figures need."""
+    gap = unit["gap"]
+    names = ("srcc", "srcc_disattenuated", "mmrv", "mmrv_floor", "level")
+    found: Row = {name: gap[name]["estimate"] for name in names}
+    floor, mmrv = found["mmrv_floor"], found["mmrv"]
+    found["mmrv_ratio"] = mmrv / floor if mmrv is not None and floor else None
+    return found
+
+
+# families and strategies
+
+
+def _families(plan: ClosingPlan, twins: Sequence[Row]) -> list[Row]:
+    """RMS gap by family, observation and budget: medians over all twins, and over those that count."""
+    rows: list[Row] = []
+    for family in plan.families:
+        of_family = [twin for twin in twins if twin["family"] == family]
+        rows.append(_family(family, "none", 0, of_family, lambda twin: (twin["rms"], 0.0)))
+        for observe in plan.observations:
+            for budget in sorted(each for each in plan.budgets if each):
+
+                def after(
+                    twin: Row, observe: str = observe, budget: int = budget
+                ) -> tuple[Row, float] | None:
+                    found = _after(twin, observe, budget)
+                    return None if found is None else (found["rms"], found["fall"])
+
+                rows.append(_family(family, observe, budget, of_family, after))
+    return rows
+
+
+def _family(
+    family: str,
+    observe: str,
+    budget: int,
+    twins: Sequence[Row],
+    read: Callable[[Row], tuple[Row, float | None] | None],
+) -> Row:
+    found = [(twin, each) for twin in twins if (each := read(twin)) is not None]
+    values = [each[0]["estimate"] for _, each in found if each[0]["estimate"] is not None]
+    falls = [each[1] for twin, each in found if twin["counts"] and each[1] is not None]
+    return {
+        "family": family,
+        "observe": observe,
+        "budget": budget,
+        "n": len(values),
+        "rms": median_interval(values),
+        "n_counted": len(falls),
+        "fall": median_interval(falls),
+    }
+
+
+def _after(twin: Row, observe: str, budget: int) -> Row | None:
+    return next(
+        (each for each in twin["calibrated"] if (each["observe"], each["budget"]) == (observe, budget)), None
+    )
+
+
+def _strategies(twins: Sequence[Row]) -> list[Row]:
+    """Quality on the twins by strategy: mean over twins, with an interval over twins."""
+    found: dict[str, list[float]] = {}
+    for twin in twins:
+        for row in twin.get("transfer", []):
+            found.setdefault(row["strategy"], []).append(row["quality"]["estimate"])
+    return [{"strategy": name, "n": len(values), **_mean_interval(values)} for name, values in found.items()]
+
+
+# goals
+
+
+def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row]:
+    counted = [twin for twin in twins if twin["counts"]]
+    for observe in plan.observations:
+        pairs = [(twin, after) for twin in counted if (after := _after(twin, observe, budget)) is not None]
+        falls = [(twin, after, after["fall"]) for twin, after in pairs if after["fall"] is not None]
+        least = FALLS.get(observe, FALLS["cells"])
+        yield _median_goal(f"fall of the RMS gap, {observe}", falls, least, above=True)
+        if observe == "track":
+            yield _median_goal(f"fall of the RMS gap, {observe} (stretch)", falls, STRETCH, above=True)
+        yield _no_family_worse(plan, observe, falls)
+        order = [(twin, after, after["gap"]["srcc_disattenuated"]) for twin, after in pairs]
+        yield _median_goal(f"disattenuated SRCC, {observe}", order, LEAST_SRCC, above=True)
+        ratio = [(twin, after, after["gap"]["mmrv_ratio"]) for twin, after in pairs]
+        yield _median_goal(f"MMRV over its split-half floor, {observe}", ratio, MOST_MMRV, above=False)
+        for other, least in (("plain", 0.5), ("select", 0.5), ("direct", LEAST_OVER_DIRECT)):
+            yield _wins(counted, observe, other, least)
+
+
+def is_met(low: float | None, high: float | None, goal: float, sense: str) -> bool | None:
+    """Return whether a figure's whole interval meets a goal.
+
+    Args:
+        low: Lower end of the interval; None if there is no interval.
+        high: Upper end.
+        goal: The value wanted.
+        sense: `at least`, `more than` or `at most`.
+
+    Returns:
+        True if the whole interval meets the goal, False if none of it does, and None if the interval contains values of
+        both kinds or if there is none: such data do not decide.
+    """
+    if low is None or high is None:
+        return None
+    meets = {"at least": operator.ge, "more than": operator.gt, "at most": operator.le}[sense]
+    ends = {bool(meets(low, goal)), bool(meets(high, goal))}
+    return ends.pop() if len(ends) == 1 else None
+
+
+def _median_goal(
+    name: str, found: Sequence[tuple[Row, Row, float | None]], goal: float, *, above: bool
+) -> Row:
+    """A goal of a median over twins; a twin of which the figure is not known is said, and not counted."""
+    known = [(twin, after, value) for twin, after, value in found if value is not None]
+    figure = median_interval([value for _, _, value in known])
+    sense = "at least" if above else "at most"
+    missing = [
+        (twin, after, value) for twin, after, value in known if (value < goal) == above and value != goal
+    ]
+    return _goal(
+        name,
+        figure,
+        len(known),
+        goal,
+        sense,
+        [_why(twin, after, value) for twin, after, value in missing],
+        [
+            {"twin": twin["twin"], "why": _why_unknown(name, after)}
+            for twin, after, value in found
+            if value is None
+        ],
+    )
+
+
+def _goal(
+    name: str, figure: Row, n: int, goal: float, sense: str, why: list[Row], unknown: Sequence[Row] = ()
+) -> Row:
+    ends = {"low": figure["low"], "high": figure["high"]}
+    return {
+        "name": name,
+        "figure": figure["estimate"],
+        **ends,
+        "n": n,
+        "unknown": list(unknown),
+        "goal": goal,
+        "sense": sense,
+        "met": is_met(**ends, goal=goal, sense=sense),
+        "why": why,
+    }
+
+
+def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row, Row, float]]) -> Row:
+    """The smallest median fall of a family."""
+    by_family = {
+        family: [value for twin, _, value in falls if twin["family"] == family] for family in plan.families
+    }
+    medians = {family: median_interval(values) for family, values in by_family.items() if values}
+    worst = min(medians, key=lambda family: medians[family]["estimate"], default=None)
+    figure = medians[worst] if worst is not None else median_interval([])
+    worse = [each for each in falls if medians[each[0]["family"]]["estimate"] < 0 and each[2] < 0]
+    return _goal(
+        f"smallest fall of a family, {observe}" + (f" ({worst})" if worst else ""),
+        figure,
+        len(by_family[worst]) if worst is not None else 0,
+        0.0,
+        "at least",
+        [_why(twin, after, value) for twin, after, value in worse],
+    )
+
+
+def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row:
+    """On which share of twins `posterior` does better than another strategy; a draw is half a win."""
+    pairs = []
+    for twin in counted:
+        quality = {row["strategy"]: row["quality"]["estimate"] for row in twin.get("transfer", [])}
+        if f"posterior, {observe}" in quality and other in quality:
+            pairs.append((twin, quality[f"posterior, {observe}"] - quality[other]))
+    wins = [1.0 if difference > 0 else 0.5 if difference == 0 else 0.0 for _, difference in pairs]
+    share = float(np.mean(wins)) if wins else None
+    low, high = share_interval(sum(wins), len(wins))
+    sense = "at least" if other == "direct" else "more than"
+    return _goal(
+        f"posterior, {observe}, better than {other}",
+        {"estimate": share, "low": low, "high": high},
+        len(pairs),
+        least,
+        sense,
+        [
+            {"twin": twin["twin"], "family": twin["family"], "figure": difference}
+            for twin, difference in pairs
+            if difference < 0
+        ],
+        [
+            {"twin": twin["twin"], "why": "its transfer is not done"}
+            for twin in counted
+            if twin["twin"] not in [each["twin"] for each, _ in pairs]
+        ],
+    )
+
+
+def _why_unknown(name: str, after: Row) -> str:
+    """Why a twin has no such figure."""
+    gap = after["gap"]
+    if name.startswith("MMRV") and gap["mmrv_floor"] == 0 and gap["mmrv"] is not None:
+        return f"its floor is 0, the same order in both halves of its trials; MMRV is {gap['mmrv']:.3f}"
+    return "its trials are too few to tell"
+
+
+def _why(twin: Row, after: Row, value: float) -> Row:
+    """What is known of a twin that misses a goal."""
+    names = ("misspecified", "misspecification_p", "at_prior_end")
+    return {
+        "twin": twin["twin"],
+        "family": twin["family"],
+        "figure": value,
+        "rms_before": twin["rms"]["estimate"],
+        "rms_after": after["rms"]["estimate"],
+        **{name: after[name] for name in names},
+    }
+
+
+# intervals
+
+
+def median_interval(values: Sequence[float]) -> Row:
+    """The median, with the 95 % interval between two of the values in order; without one below six of them.
+
+    Source: Conover (1999), Practical Nonparametric Statistics, section 3.2.
+    """
+    from scipy import stats  # takes a third of a second, which most commands can do without
+
+    n = len(values)
+    if not n:
+        return {"estimate": None, "low": None, "high": None}
+    ordered = np.sort(np.asarray(values, float))
+    rank = int(stats.binom.ppf(0.025, n, 0.5))
+    if 2 * stats.binom.cdf(rank, n, 0.5) > 0.05:
+        rank -= 1
+    found: Row = {"estimate": float(np.median(ordered)), "low": None, "high": None}
+    if rank >= 0:
+        found |= {"low": float(ordered[rank]), "high": float(ordered[n - 1 - rank])}
+    return found
+
+
+def _mean_interval(values: Sequence[float]) -> Row:
+    """The mean, with Student's 95 % interval."""
+    n = len(values)
+    mean = float(np.mean(values))
+    if n < 2:
+        return {"estimate": mean, "low": None, "high": None}
+    reach = float(special.stdtrit(n - 1, 0.975)) * float(np.std(values, ddof=1)) / math.sqrt(n)
+    return {"estimate": mean, "low": mean - reach, "high": mean + reach}
+
+
+def share_interval(successes: float, n: int) -> tuple[float | None, float | None]:
+    """Wilson's 95 % interval of a share."""
+    if not n:
+        return None, None
+    p, z2 = successes / n, NORMAL_95**2
+    center = (p + z2 / (2 * n)) / (1 + z2 / n)
+    reach = NORMAL_95 * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
+    return max(0.0, center - reach), min(1.0, center + reach)

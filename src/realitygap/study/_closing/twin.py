@@ -1,0 +1,223 @@
+"""One twin of the study `closing-the-gap`: judged, calibrated by each budget, transferred to."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from realitygap.evolution import Genome, Population
+from realitygap.gap import GapSide, measure_gap
+from realitygap.records import Observe, read_object, write_whole
+from realitygap.runs import Condition
+from realitygap.trials import NoiseKey, Target
+from realitygap.world import Calibration, load_calibration
+
+from .._transfer.attempt import plans_of
+from .._transfer.calibrated import SELECTING, fitted_condition
+from .._transfer.noise import needs_sim
+from .._transfer.simulated import crossed_cells, evolve_champions, try_repeatedly
+from .._transfer.strategies import choose_condition, transfer
+from .._transfer.target import KeptTarget
+from .plan import CONTROLLERS_SEED, STUDY, ClosingPlan, TwinName
+
+JUDGING, CALIBRATING = 10_000_000, 5_000_000
+"""Numbers of the first trials for it, so that no two parts of the study draw the same noise."""
+
+STRATEGIES = ("plain", "select", "direct")
+"""Compared with `posterior`; what they do does not depend on what calibrating sees."""
+
+
+@dataclass(frozen=True)
+class ClosingTwin:
+    """A twin, and what is done with it.
+
+    Attributes:
+        plan: Of the study.
+        name: Which twin.
+        folder: Of the study.
+        open_twin: Opens it as a target, from its file.
+        calibrate: As `calibrate_all`.
+        tell: Told of each unit that is done.
+    """
+
+    plan: ClosingPlan
+    name: TwinName
+    folder: Path
+    open_twin: Callable[[Path], Target]
+    calibrate: Callable[..., Calibration]
+    tell: Callable[[str], None]
+
+    def carry_out(self) -> None:
+        """All units that are missing."""
+        missing = [unit for unit in self.plan.units() if not self._path(unit).exists()]
+        if not missing:
+            return
+        with self.open_twin(self.folder / "twins" / f"{self.name}.toml") as target:
+            for unit in missing:
+                since = time.perf_counter()
+                found = self._unit(unit, target)
+                found |= {"family": self.name.family, "seed": self.name.seed, "unit": unit}
+                found["seconds"] = round(time.perf_counter() - since, 1)
+                write_whole(self._path(unit), json.dumps(found).encode(), within=self.folder)
+                self.tell(f"{self.name} {unit}")
+
+    def _path(self, unit: str) -> Path:
+        return self.folder / "units" / f"{self.name}-{unit}.json"
+
+    def _unit(self, unit: str, target: Target) -> dict[str, Any]:
+        if unit == "judged":
+            return self._judge(target)
+        if unit == "transfer":
+            return self._transfer(target)
+        _, observe, budget = unit.split("-")
+        return self._gap(target, observe, int(budget))
+
+    @cached_property
+    def condition(self) -> Condition:
+        """What is evolved in simulation; its platform is the simulator as it is."""
+        return choose_condition(STUDY, None, self.plan.seed)
+
+    @cached_property
+    def genomes(self) -> list[Genome]:
+        """The held-out controllers."""
+        return held_out(self.plan.controllers)
+
+    # the same controllers on both sides
+
+    def _judge(self, target: Target) -> dict[str, Any]:
+        """The held-out controllers on the twin: crossed cells of each trial."""
+        n = self.plan.trials
+        repeated = [genome for genome in self.genomes for _ in range(n)]
+        trials = target.carry_out(plans_of(self.condition, repeated, JUDGING, "held out"), "cells")
+        cells = [trial.cells for trial in trials]
+        return {
+            "trials": n,
+            "n_cells": target.arena.grid.n_cells,
+            "label": target.label,
+            "cells": [cells[k : k + n] for k in range(0, len(cells), n)],
+        }
+
+    def _on_twin(self) -> GapSide:
+        judged = read_object(self._path("judged"))
+        crossed = np.zeros((self.plan.controllers, self.plan.trials, judged["n_cells"]), bool)
+        for k, trials in enumerate(judged["cells"]):
+            for j, cells in enumerate(trials):
+                crossed[k, j, cells] = True
+        return GapSide(f"twin {self.name}", judged["label"], crossed.mean(axis=2), crossed)
+
+    def _in_simulation(self, condition: Condition) -> GapSide:
+        n = self.plan.trials
+        keys = [NoiseKey(condition.key, self.name.seed, 0, k) for k in range(len(self.genomes))]
+        crossed = crossed_cells(try_repeatedly(condition, self.genomes, keys, range(n))[0], n)
+        return GapSide(condition.name, condition.label, crossed.mean(axis=2), crossed)
+
+    def _gap(self, target: Target, observe: str, budget: int) -> dict[str, Any]:
+        """The gap to the simulator as it is, or as a calibration by so many trials makes it."""
+        if not budget:
+            return self._measured(self.condition, None)
+        calibration = self._calibration(target, cast("Observe", observe), budget)
+        found = self._measured(fitted_condition(self.condition, calibration, "posterior"), calibration)
+        point = self._measured(fitted_condition(self.condition, calibration, "no"), calibration)
+        return {**found, "observe": observe, "budget": budget, "point": point["gap"]["rms"]}
+
+    def _measured(self, condition: Condition, calibration: Calibration | None) -> dict[str, Any]:
+        source, target = self._in_simulation(condition), self._on_twin()
+        misspecified = None if calibration is None else calibration.misspecified
+        gap = measure_gap(source, target, misspecified=misspecified, seed=self.plan.seed)
+        found: dict[str, Any] = {"observe": "none", "budget": 0, "gap": gap.to_dict()}
+        found["means"] = {"source": source.means.tolist(), "target": target.means.tolist()}
+        if calibration is not None:
+            found["calibration"] = {
+                "trials": calibration.trials,
+                "misspecified": calibration.misspecified,
+                "misspecification_p": calibration.misspecification_p,
+                "fitted": [fitted.model_dump(exclude={"advice"}) for fitted in calibration.fitted],
+            }
+        return found
+
+    def _calibration(self, target: Target, observe: Observe, budget: int) -> Calibration:
+        """That by so many trials, which is made where it is not there; its trials are kept as they come."""
+        place = self.folder / "calibrations" / f"{self.name}-{observe}-{budget}"
+        path = place.with_suffix(".toml")
+        if not path.exists():
+            with KeptTarget(
+                target, place.with_suffix(".jsonl"), budget, CALIBRATING, observe=observe
+            ) as kept:
+                found = self.calibrate(
+                    kept,
+                    robot=needs_sim(self.condition, "calibrated").robot,
+                    observe=observe,
+                    budget=budget,
+                    seed=self.name.seed,
+                    effort=self.plan.effort,
+                )
+            write_whole(path, found.to_toml().encode(), within=self.folder)
+        return load_calibration(path)
+
+    # transfer
+
+    def _transfer(self, target: Target) -> dict[str, Any]:
+        """Each strategy at equal budget; `posterior` for each way to observe, calibrated by its share of the budget."""
+        budget = self.plan.transfer_budget
+        rows = self._strategies(target, "any", STRATEGIES, None)
+        for observe in self.plan.observations:
+            calibrating = budget - budget // SELECTING
+            self._calibration(target, observe, calibrating)
+            file = self.folder / "calibrations" / f"{self.name}-{observe}-{calibrating}.toml"
+            (row,) = self._strategies(target, observe, ("posterior",), file)
+            rows.append({**row, "strategy": f"posterior, {observe}"})
+        return {"budget": budget, "label": target.label, "strategies": rows}
+
+    def _strategies(
+        self, target: Target, part: str, names: Sequence[str], calibration: Path | None
+    ) -> list[dict[str, Any]]:
+        plan = self.plan
+        result = transfer(
+            STUDY,
+            target,
+            names,
+            plan.transfer_budget,
+            out=self.folder / "transfers" / f"{self.name}-{part}",
+            replicates=plan.replicates,
+            fresh_trials=plan.fresh_trials,
+            runs=plan.runs,
+            repeats=plan.repeats,
+            calibration=calibration,
+            seed=self.name.seed,
+        )
+        return [
+            {
+                "strategy": row.strategy,
+                "quality": row.quality.to_dict(),
+                "simulated": row.simulated,
+                "coverage": [
+                    float(np.mean(each.scores)) for each in result.champions if each.strategy == row.strategy
+                ],
+            }
+            for row in result.strategies
+        ]
+
+
+def held_out(n: int) -> list[Genome]:
+    """The controllers by which simulators are judged: the first half random, the others champions of their own runs.
+
+    Champions are of runs of the study's condition on the simulator as it is, a run each, of seeds that nothing else
+    uses.
+    """
+    condition = choose_condition(STUDY, None, CONTROLLERS_SEED)
+    n_random = n // 2
+    random: list[Genome] = []
+    for replicate in range(-(-n_random // condition.neat.population)):
+        bias = condition.has_bias_input
+        random += Population(
+            3, 2, condition.neat, seed=CONTROLLERS_SEED, replicate=replicate, bias=bias
+        ).ask()
+    champions = evolve_champions(condition, range(n - n_random), repeats=1)
+    return random[:n_random] + [champion.genome for champion in champions]

@@ -1,0 +1,233 @@
+"""The gap between two platforms by name: opened, tried, measured and explained."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from realitygap.errors import StudyError
+from realitygap.gap import Why
+from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
+from realitygap.records import Observe
+from realitygap.tasks import Task
+from realitygap.trials import PortObserver, Target
+from realitygap.world import Arena, Calibration, load_arena
+
+from .._code import task_named
+from .._controllers import Controller, recorded_controllers, sample_controllers, task_of
+from .study import STEPS, GapStudy, Tell, study_gap
+from .why import calibration_of, why_gap
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class GapBetween:
+    """A gap between two platforms, and why it is there.
+
+    Attributes:
+        study: Measures, and what figures are drawn from.
+        why: What each part of the model carries; None where nobody asked.
+    """
+
+    study: GapStudy
+    why: Why | None
+
+
+def gap_between(
+    sim: str,
+    target: str,
+    *,
+    controllers: str | Path = "random",
+    n_controllers: int = 30,
+    task: str | Task | None = None,
+    trials: int = 10,
+    margin: float | None = None,
+    observe: Observe | None = None,
+    arena: str | Path | Arena | None = None,
+    noise: float | None = None,
+    randomize: Literal["no", "posterior"] = "no",
+    reevolved: str | Path | None = None,
+    why: bool = False,
+    processes: int | None = None,
+    witness: str | None = None,
+    observer: PortObserver | None = None,
+    seed: int = 1,
+    results: str | Path | None = None,
+    allow_code: bool = False,
+    tell: Tell | None = None,
+    say: Say | None = None,
+) -> GapBetween:
+    """Measure the gap between a simulator and a target, both by name; as `realitygap gap`.
+
+    Args:
+        sim: The simulator: `sim`, `sim:FILE` or `jyro`.
+        target: Any platform, such as `twin:FILE` or `scribbler:PORT`.
+        controllers: As in `sample_controllers`; of recorded trials those that drove, unless others are named.
+        n_controllers: How many.
+        task: What scores the trials: a kind with its defaults, such as `avoid`, python:FILE.py:function, or a `Task`.
+            If not given, the task for which the controllers were selected; coverage for random ones.
+        trials: Of each on each platform.
+        margin: Of equivalence in level, in units of the score.
+        observe: How much is seen of the target; as much as the task needs if not given.
+        arena: By name, from a file, or an `Arena`; if not given, that in which the controllers were selected, and the
+            paper's for random ones.
+        noise: The paper's a on simulators; 0.1 on `jyro` and none on others when not given.
+        randomize: Of a simulator that is a calibration: posterior draws the robot of each trial from it.
+        reevolved: Results or a study that was evolved on the target.
+        why: Whether to find what each part of the model carries; the simulator has to be a calibration then.
+        processes: Of a twin.
+        witness: Of an emulated robot in another program: HOST:PORT.
+        observer: Of a robot: who places it and says what it drew, where no witness does.
+        seed: Of everything.
+        results: A file where the target's trials are kept.
+        allow_code: Whether the Python file of a task may run that the user has not allowed before.
+        tell: Called as trials are done.
+        say: Called with what is done otherwise.
+
+    Raises:
+        StudyError: A platform, study or number that cannot be.
+        RealityGapError: The robot failed, or files cannot be read or written.
+    """
+    recorded = recorded_controllers(target) if controllers == "random" else []
+    steps = STEPS
+    if len(recorded) == 1:
+        raise StudyError(
+            f"The trials in {target.partition(':')[2]} are of one controller, expected at least 2: a gap is told from "
+            "how several differ. Record more, such as with: realitygap gap SIM TARGET -o FILE"
+        )
+    if recorded:
+        n_controllers, trials = min(n_controllers, len(recorded)), min(trials, recorded[0][1])
+        there_before = RecordedTarget(split_spec(target)[1])
+        arena, steps = there_before.arena, there_before.steps
+    calibration = calibration_of(sim)
+    if why and calibration is None:
+        raise StudyError(
+            f"Parts of the model are switched in from a calibration, and {sim} is none. Make one with: realitygap "
+            f"calibrate all --robot {target} --observe {observe or 'cells'} -o fit.toml; then measure the gap of "
+            "sim:fit.toml."
+        )
+    if why and noise:
+        raise StudyError(
+            f"--why switches parts of the model in without the paper's noise, and --noise is {noise:g}. Leave one out."
+        )
+    if why and trials < 2:
+        raise StudyError(
+            "Why there is a gap needs at least 2 trials of each controller, to tell it from noise."
+        )
+    tell_of = say or (lambda _: None)
+    if recorded:
+        tell_of(f"The {n_controllers} controllers of {target}, {trials} trials each.")
+        chosen = [each for each, _ in recorded[:n_controllers]]
+    else:
+        tell_of(f"Drawing {n_controllers} controllers: {controllers}.")
+        chosen = sample_controllers(controllers, n_controllers, seed, allow_code=allow_code)
+    there = (
+        [] if reevolved is None else sample_controllers(reevolved, n_controllers, seed, allow_code=allow_code)
+    )
+    scored_by = task_of(chosen) if task is None else task_named(task, allow_code=allow_code)
+    if why and scored_by.name != "coverage":
+        raise StudyError(
+            f"--why shares out the gap in coverage, and the score here is {scored_by.score_name}. Leave --why out, or "
+            "name the task (--task coverage)."
+        )
+    place = _arena(arena, chosen, controllers)
+    if chosen[0].condition is not None:
+        steps = chosen[0].condition.on.steps
+    if there and not recorded:
+        _refuse_elsewhere(there, f"--reevolved {reevolved}", target)
+    if there:
+        _refuse_elsewhere(chosen, f"--controllers {controllers}", sim)
+    with (
+        _open(sim, place, noise, 2 * seed, randomize=randomize) as source,
+        _open(target, place, noise, 2 * seed + 1, processes, witness, observer) as costly,
+    ):
+        if costly.label == "REAL" and results is None and not isinstance(costly, RecordedTarget):
+            raise StudyError(
+                f"{n_controllers * trials} trials on {target} would be kept nowhere, and lost where anything goes "
+                "wrong. Name a file for them (-o FILE.jsonl): the same command goes on there."
+            )
+        found = study_gap(
+            source,
+            costly,
+            chosen,
+            task=scored_by,
+            trials=trials,
+            margin=margin,
+            observe=observe,
+            misspecified=_misspecified(calibration),
+            reevolved=there,
+            seed=seed,
+            tell=tell,
+            results=results,
+            at_its_pace=calibration is None or not calibration.step_s,
+            steps=steps,
+        )
+    parts = None
+    if why and calibration is not None:
+        tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")
+        genomes = [each.genome for each in chosen]
+        parts = why_gap(
+            calibration, place, genomes, found.target, steps=steps, step_s=found.step_s, seed=seed
+        )
+    return GapBetween(found, parts)
+
+
+def _arena(arena: str | Path | Arena | None, chosen: Sequence[Controller], named: str | Path) -> Arena:
+    """Return where the gap is measured.
+
+    Raises:
+        StudyError: None is named, and the controllers were selected in several.
+    """
+    if isinstance(arena, Arena):
+        return arena
+    if arena is not None:
+        return load_arena(arena)
+    selected_in = [each.condition.arena.arena().alone for each in chosen if each.condition is not None]
+    if any(other != selected_in[0] for other in selected_in):
+        names = ", ".join(sorted({each.name for each in selected_in}))
+        raise StudyError(
+            f"The controllers of {named} were selected in several arenas ({names}). Name one (--arena)."
+        )
+    return selected_in[0] if selected_in else load_arena("paper")
+
+
+def _refuse_elsewhere(evolved: Sequence[Controller], named: str, platform: str) -> None:
+    """Return where all were evolved on the platform, before trials are spent on them.
+
+    Raises:
+        StudyError: One was not.
+    """
+    for each in evolved:
+        where = each.selected_on or "nowhere"
+        if each.kind != "champion" or where.partition(":")[0] != platform.partition(":")[0]:
+            raise StudyError(
+                f"{each.name} of {named} was evolved {'on ' if each.selected_on else ''}{where}, expected champions "
+                f"evolved on {platform}: the re-evolved gap is between such of both platforms."
+            )
+
+
+def _misspecified(calibration: Calibration | None) -> bool | None:
+    """What the predictive check of a calibration said; that of a part can find fault, and acquits of nothing."""
+    if calibration is None:
+        return None
+    return calibration.misspecified if calibration.kind == "all" else calibration.misspecified or None
+
+
+def _open(
+    spec: str,
+    arena: Arena,
+    noise: float | None,
+    key: int,
+    processes: int | None = None,
+    witness: str | None = None,
+    observer: PortObserver | None = None,
+    randomize: Literal["no", "posterior"] = "no",
+) -> Target:
+    level = class_of(spec).default_noise if noise is None else noise
+    return open_target(
+        spec, arena, processes=processes, witness=witness, observer=observer, noise=level, key=key,
+        randomize=randomize,
+    )  # fmt: skip

@@ -1,0 +1,362 @@
+"""The gap between two platforms, measured: the same controllers carried out on both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from realitygap.errors import StudyError, whole_number
+from realitygap.evolution import Genome
+from realitygap.gap import (
+    CoverageMaps,
+    Estimate,
+    GapResult,
+    GapSide,
+    ReplayError,
+    coverage_maps,
+    difference_of_groups,
+    mean_of,
+    measure_gap,
+    replay_error,
+)
+from realitygap.platforms import SimTarget, split_spec
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.tasks import CoverageTask, Task, score_observed
+from realitygap.trials import Target, TrialPlan, is_whole
+from realitygap.world import Arena, Pose
+
+from .._controllers import Controller, have_same_score, task_of
+from .._targets import check_task, observations_head, refuse_lost, refuse_too_little
+
+Tell = Callable[[str, int, int], None]
+"""Called with what is being done, the trials done, and the trials in all."""
+
+MOST_TRIALS = 4_096
+"""Of a controller: trial k of controller i has the number 4096 i + k, whatever the number of trials and controllers."""
+
+MOST_CONTROLLERS = 1_024
+TARGET_FROM = MOST_TRIALS * MOST_CONTROLLERS
+"""Numbers of the target's trials begin here: they never draw the noise of those in simulation."""
+
+REEVOLVED_FROM = 2 * TARGET_FROM
+REPLAYED_FROM = 3 * TARGET_FROM
+
+STEPS = 100
+"""Commands in a trial."""
+
+REPLAYS = 4
+"""How often the commands of a trial are replayed in simulation."""
+
+MOST_REPLAYED = 60
+"""Trials that are replayed: the first of each controller, then the second, and so on."""
+
+
+@dataclass(frozen=True)
+class GapStudy:
+    """A gap that was measured, and what figures of it are drawn from.
+
+    Attributes:
+        result: All measures.
+        source: Trials in simulation.
+        target: Trials on the target.
+        controllers: Row k of both is of controller k.
+        arena: Where.
+        source_trials: Trial after trial of controller after controller.
+        target_trials: Likewise.
+        maps: Where trials go on both sides.
+        task: What scored the trials.
+        replay: Open-loop replays; None where nobody saw the target's robot.
+        observe: How much was seen of the target.
+        step_s: How long commands lasted in simulation [s].
+    """
+
+    result: GapResult
+    source: GapSide
+    target: GapSide
+    controllers: tuple[Controller, ...]
+    arena: Arena
+    source_trials: tuple[ObservedTrial, ...]
+    target_trials: tuple[ObservedTrial, ...]
+    maps: CoverageMaps | None
+    task: Task
+    replay: ReplayError | None
+    observe: Observe
+    step_s: float
+
+
+def study_gap(
+    source: Target,
+    target: Target,
+    controllers: Sequence[Controller],
+    *,
+    task: Task | None = None,
+    trials: int = 10,
+    margin: float | None = None,
+    observe: Observe | None = None,
+    misspecified: bool | None = None,
+    reevolved: Sequence[Controller] = (),
+    seed: int = 1,
+    tell: Tell | None = None,
+    results: str | Path | None = None,
+    at_its_pace: bool = False,
+    steps: int = STEPS,
+) -> GapStudy:
+    """Try the same controllers on a simulator and on a target, and measure the gap.
+
+    Args:
+        source: The simulator.
+        target: Where trials are costly. Its trials go round the controllers, so that what changes over time, such as
+            a battery, is no controller's alone.
+        controllers: At least 2, see `sample_controllers`; of champions it is said how much of their score was luck.
+        task: Scores the trials of both sides, from what an observer has of them: with the noise of readings. Coverage
+            of the driven line if not given.
+        trials: Of each controller on each platform, 1 to 4096.
+        margin: Of equivalence in level, in units of the score.
+        observe: How much is seen of the target; with `track` commands are replayed in simulation as well. If not given,
+            as much as the task needs, and the crossed cells if nobody has to count them.
+        misspecified: Whether a check found that the simulator cannot make what was observed.
+        reevolved: Champions that were evolved on the target: tried there, too, and set beside the champions among
+            `controllers` in simulation.
+        seed: Of the bootstrap.
+        tell: Called as trials are done.
+        results: A file where the target's trials are kept as they come; those in it are not carried out again.
+        at_its_pace: Whether commands of a `sim` that was not calibrated last as long as those of the target did.
+        steps: Commands in each trial.
+
+    Raises:
+        ValueError: A number is out of range, or so much cannot be seen.
+        StudyError: The two platforms are in different arenas, or the task needs to see more.
+        TaskError: The task cannot be scored in the arena.
+        RecordError: The file has trials of something else, or cannot be written.
+        RobotError: The robot failed; what was kept is safe.
+    """
+    trials = whole_number("trials", trials, 1, MOST_TRIALS)
+    whole_number("number of controllers", len(controllers), 2, MOST_CONTROLLERS)
+    if source.arena.grid != target.arena.grid:
+        raise StudyError(f"{source.name} and {target.name} have different grids, expected the same arena.")
+    task = task or CoverageTask()
+    check_task(task, target.arena)
+    observe = refuse_too_little(task, target, observe)
+    seen = max(_as_much(observe, source), task.observe, key=OBSERVATIONS.index)
+    sees_end = task.needs_trace
+    plans = plans_of([each.genome for each in controllers], trials, TARGET_FROM, steps, sees_end=sees_end)
+    more = plans_of([each.genome for each in reevolved], trials, REEVOLVED_FROM, steps, sees_end=sees_end)
+    for platform in (source, target):
+        refuse_inputs(controllers, platform)
+    refuse_inputs(reevolved, target)
+    on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
+    source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
+    own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
+    in_source = _carry_out(source, own, seen, tell)
+    one = side_of(source, in_source, len(controllers), task)
+    other = side_of(target, on_target[: len(plans)], len(controllers), task)
+    result = measure_gap(one, other, margin=margin, misspecified=misspecified, seed=seed)
+    reevolved_there = on_target[len(plans) :]
+    result = replace(
+        result,
+        score=task.score_name,
+        luck=_luck(controllers, task),
+        reevolved=_reevolved(controllers, source, one, reevolved, reevolved_there, target, task),
+        notes=said,
+    )
+    return GapStudy(
+        result,
+        one,
+        other,
+        tuple(controllers),
+        target.arena,
+        tuple(_by_controller(in_source, len(controllers))),
+        tuple(_by_controller(on_target[: len(plans)], len(controllers))),
+        coverage_maps(one, other),
+        task,
+        _replay(source, on_target[: len(plans)], len(controllers), tell),
+        observe,
+        source.step_s,
+    )
+
+
+def _paced(
+    source: Target, target: Target, on_target: Sequence[ObservedTrial]
+) -> tuple[Target, tuple[str, ...]]:
+    """The simulator with commands as long as most of a robot's trials had, and what there is to say of it."""
+    step_s = float(np.median([trial.step_s for trial in on_target]))
+    if not (isinstance(source, SimTarget) and source.is_paced and target.is_paced):
+        return source, ()
+    if step_s == source.step_s:
+        return source, ()
+    lasted = f"{step_s:g} s in place of {source.step_s:g} s"
+    said = f"Commands of {source.name} last {lasted}, as those of {target.name} did."
+    return source.lasting(step_s), (said,)
+
+
+# trials
+
+
+def refuse_inputs(controllers: Sequence[Controller], platform: Target) -> None:
+    """Refuse controllers that see what a platform lacks, before a trial is spent.
+
+    Raises:
+        ControllerError: One does.
+    """
+    for each in controllers:
+        if platform.inputs is not None:
+            each.genome.interface.check(platform.inputs, each.name, platform.name)
+
+
+def plans_of(
+    genomes: Sequence[Genome], trials: int, first: int, steps: int = STEPS, *, sees_end: bool = False
+) -> list[TrialPlan]:
+    """Round the controllers, again and again."""
+    return [
+        TrialPlan(genome=genome, steps=steps, number=first + MOST_TRIALS * i + k, sees_end=sees_end)
+        for k in range(trials)
+        for i, genome in enumerate(genomes)
+    ]
+
+
+def _as_much(observe: Observe, platform: Target) -> Observe:
+    return OBSERVATIONS[min(OBSERVATIONS.index(observe), OBSERVATIONS.index(platform.observes))]
+
+
+def _carry_out(
+    platform: Target, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None
+) -> list[ObservedTrial]:
+    def told(k: int, _: ObservedTrial) -> None:
+        if tell is not None:
+            tell(platform.name, k + 1, len(plans))
+
+    trials = platform.carry_out(plans, observe, told)
+    refuse_lost(sum(not is_whole(trial) for trial in trials), platform.name)
+    return trials
+
+
+def _carry_out_kept(
+    target: Target,
+    plans: Sequence[TrialPlan],
+    observe: Observe,
+    results: str | Path | None,
+    tell: Tell | None,
+) -> list[ObservedTrial]:
+    """Trials of the target in the order of their plans: those in the file, and the others, kept as they come."""
+    if results is None:
+        return _carry_out(target, plans, observe, tell)
+    with ObservationsFile(results, observations_head(target, observe)) as file:
+        kept = {(trial.number, trial.genome): trial for trial in file.trials if is_whole(trial)}
+        keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
+        missing = [k for k, key in enumerate(keys) if key not in kept]
+
+        def keep(k: int, trial: ObservedTrial) -> None:
+            file.append(trial)
+            if not is_whole(trial):
+                return
+            kept[keys[missing[k]]] = trial
+            if tell is not None:
+                tell(target.name, len(plans) - len(missing) + k + 1, len(plans))
+
+        if missing:
+            target.carry_out([plans[k] for k in missing], observe, keep)
+    refuse_lost(sum(key not in kept for key in keys), target.name, f" The others are kept in {results}.")
+    return [kept[key] for key in keys]
+
+
+def _by_controller(trials: Sequence[ObservedTrial], n: int) -> list[ObservedTrial]:
+    """Trials that went round n controllers, those of a controller together."""
+    return [trials[k] for i in range(n) for k in range(i, len(trials), n)]
+
+
+def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int, task: Task) -> GapSide:
+    """Trials that went round n controllers, as a side of a gap.
+
+    Raises:
+        TaskError: A trial has less than the task needs.
+    """
+    n_cells = platform.arena.grid.n_cells
+    ordered = _by_controller(trials, n)
+    cells = np.zeros((len(ordered) if all(trial.cells for trial in ordered) else 0, n_cells), np.bool_)
+    for row, trial in zip(cells, ordered, strict=False):
+        row[list(trial.cells)] = True
+    ends = np.empty((0, 0, 2))
+    if all(len(trial.poses) for trial in ordered):
+        ends = np.array([trial.poses[-1, :2] for trial in ordered]).reshape(n, -1, 2)
+    scores = score_observed(task, ordered, platform.arena)
+    crossed = cells.reshape(n, -1, n_cells) if len(cells) else np.empty((0, 0, 0), np.bool_)
+    return GapSide(platform.name, platform.label, scores.reshape(n, -1), crossed, ends)
+
+
+def _replay(
+    source: Target, observed: Sequence[ObservedTrial], n: int, tell: Tell | None
+) -> ReplayError | None:
+    """The target's commands replayed in simulation from where its robot was; its trials went round n controllers."""
+    t = min((len(trial.commands) for trial in observed), default=0)
+    seen = [k for k, trial in enumerate(observed) if len(trial.poses) > t][:MOST_REPLAYED]
+    there = [observed[k] for k in seen]
+    if not there or t == 0 or source.observes != "track":
+        return None
+    plans = [
+        TrialPlan(
+            start=Pose(*there[i].poses[0].tolist()),
+            commands=np.clip(there[i].commands[:t], -1, 1),
+            number=REPLAYED_FROM + MOST_TRIALS * i + k,
+            purpose="replay",
+        )
+        for k in range(REPLAYS)
+        for i in range(len(there))
+    ]
+    replayed = _carry_out(source, plans, "track", tell)
+    poses = np.array([trial.poses[: t + 1] for trial in replayed])
+    return replay_error(
+        np.array([trial.poses[: t + 1] for trial in there]),
+        poses.reshape(REPLAYS, len(there), t + 1, 3),
+        np.array(seen) % n,
+    )
+
+
+# what is kept apart from the transfer gap
+
+
+def _luck(controllers: Sequence[Controller], task: Task) -> Estimate:
+    """What champions lose on fresh seeds, on the platform where they were selected."""
+    if not have_same_score(task_of(controllers), task):
+        return Estimate.refusal(0, f"The controllers were selected for another score than {task.score_name}.")
+    lost = [
+        each.selected_score - each.fresh_score
+        for each in controllers
+        if each.selected_score is not None and each.fresh_score is not None
+    ]
+    if not lost:
+        return Estimate.refusal(0, "No controller was selected for its score where it can be tried again.")
+    return mean_of(np.array(lost))
+
+
+def _reevolved(
+    controllers: Sequence[Controller],
+    source: Target,
+    in_source: GapSide,
+    reevolved: Sequence[Controller],
+    on_target: Sequence[ObservedTrial],
+    target: Target,
+    task: Task,
+) -> Estimate:
+    """Quality of what was evolved on the target, there, less that of what was evolved in simulation, in simulation."""
+    if not reevolved:
+        return Estimate.refusal(0, "Nothing was evolved on the target (--reevolved).")
+    champions = [(k, each) for k, each in enumerate(controllers) if each.kind == "champion"]
+    if not champions:
+        return Estimate.refusal(
+            0,
+            "The controllers are no champions of a simulator (--controllers STUDY), so nothing was evolved there.",
+        )
+    family = (
+        source.identity.partition(" ")[0] if isinstance(source, SimTarget) else split_spec(source.name)[0]
+    )
+    elsewhere = {each.selected_on for _, each in champions if split_spec(each.selected_on)[0] != family}
+    if elsewhere:
+        return Estimate.refusal(
+            0, f"The controllers were evolved on {', '.join(sorted(elsewhere))}, and not on {source.name}."
+        )
+    here = in_source.means[[k for k, _ in champions]]
+    there = side_of(target, on_target, len(reevolved), task).means
+    return difference_of_groups(here, there)

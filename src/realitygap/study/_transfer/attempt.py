@@ -1,0 +1,117 @@
+"""One attempt to transfer: what a strategy has at hand, and what all strategies share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from realitygap.evolution import Genome
+from realitygap.runs import Condition
+from realitygap.tasks import score_observed
+from realitygap.trials import TrialPlan
+from realitygap.world import Calibration, RobotModel
+
+from .simulated import Champion, evolve_champions
+from .target import KeptTarget
+
+
+class Simulation:
+    """Evolution in simulation, the same for all strategies: so many runs of so many repeats.
+
+    Args:
+        runs: Runs in a replicate.
+        repeats: Trials of each individual.
+    """
+
+    def __init__(self, runs: int, repeats: int) -> None:
+        self.runs, self.repeats = runs, repeats
+        self._known: dict[tuple[str, int, int, str], list[Champion]] = {}
+
+    def champions(
+        self,
+        condition: Condition,
+        replicate: int,
+        *,
+        runs: int | None = None,
+        rank_on: Condition | None = None,
+    ) -> list[Champion]:
+        """The champions of a replicate's runs under a condition, the best in simulation first.
+
+        Args:
+            condition: As `evolve_champions` wants it.
+            replicate: Of the transfer.
+            runs: How many of the replicate's runs; all when not given.
+            rank_on: On what they are ranked; `condition` when not given.
+        """
+        n = self.runs if runs is None else runs
+        key = (condition.hash(), replicate, n, "" if rank_on is None else rank_on.hash())
+        if key not in self._known:
+            first = replicate * self.runs
+            self._known[key] = evolve_champions(
+                condition, range(first, first + n), repeats=self.repeats, rank_on=rank_on
+            )
+        return self._known[key]
+
+
+class Calibrates(Protocol):
+    """How calibrations come about that strategies share."""
+
+    def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
+        """The calibration where so many trials are left, and the robot on whose numbers it builds.
+
+        Its `trials` are what it spends of them.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What a strategy has at hand.
+
+    Attributes:
+        condition: Evolved in simulation.
+        target: Where trials cost; it allows `budget` of them.
+        budget: Trials on the target.
+        replicate: Of the transfer, from 0 on.
+        simulation: That evolves.
+        calibration: Makes or reads a calibration.
+    """
+
+    condition: Condition
+    target: KeptTarget
+    budget: int
+    replicate: int
+    simulation: Simulation
+    calibration: Calibrates
+
+    @property
+    def left(self) -> int:
+        """Trials that are left."""
+        return self.budget - self.target.spent
+
+    def champions(self, condition: Condition | None = None) -> list[Champion]:
+        """Champions evolved under a condition, the attempt's own when not given; the best in simulation first."""
+        return self.simulation.champions(condition or self.condition, self.replicate)
+
+    def try_on_target(
+        self, genomes: Sequence[Genome], purpose: str = "controller"
+    ) -> tuple[list[float], list[tuple[int, ...]]]:
+        """Try genomes on the target, once each; the score of each, and the cells that it visited, if they are known."""
+        plans = plans_of(self.condition, genomes, self.target.spent, purpose)
+        trials = self.target.carry_out(plans, self.target.looks_at)
+        scores = score_observed(self.condition.task_of_trials, trials, self.target.arena)
+        return scores.tolist(), [trial.cells for trial in trials]
+
+    def score_on_target(self, champions: Sequence[Champion]) -> list[float]:
+        """Return the score of each champion in one trial on the target."""
+        return self.try_on_target([champion.genome for champion in champions])[0]
+
+
+def plans_of(condition: Condition, genomes: Sequence[Genome], first: int, purpose: str) -> list[TrialPlan]:
+    """A trial for each genome, as long as those of the condition, numbered from `first` on."""
+    steps, sees_end = condition.on.steps, condition.task_of_trials.needs_trace
+    return [
+        TrialPlan(genome=genome, steps=steps, number=first + k, purpose=purpose, sees_end=sees_end)
+        for k, genome in enumerate(genomes)
+    ]

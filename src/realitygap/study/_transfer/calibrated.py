@@ -1,0 +1,140 @@
+"""Strategies that make the simulator agree with the target first: calibrated and posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from realitygap.errors import StudyError
+from realitygap.platforms import SimPlatform
+from realitygap.records import Observe, write_whole
+from realitygap.runs import Condition
+from realitygap.trials import Target
+from realitygap.world import Calibration, RobotModel, load_calibration, load_robot
+
+from .._calibrate.one import refuse_other_sensors
+from .._calibrate.whole import calibrate_all
+from .attempt import Attempt
+from .noise import needs_sim
+from .selected import best_on_target
+from .simulated import Champion
+from .target import KeptTarget
+
+SELECTING = 2
+"""One trial in so many is kept for choosing among champions where calibrating is on the budget: a fit that is a little
+wrong costs less where its champions are tried, and one by half of the trials is hardly worse."""
+
+
+def calibrated(attempt: Attempt) -> Champion:
+    """Evolved in the simulator with the numbers that were fitted; trials that are left choose as in select."""
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "no")))
+
+
+def posterior(attempt: Attempt) -> Champion:
+    """Evolved with a robot of the posterior drawn for each trial; trials that are left choose as in select."""
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "posterior")))
+
+
+def _fitted(attempt: Attempt, randomize: Literal["no", "posterior"]) -> Condition:
+    needs_sim(attempt.condition, "calibrated" if randomize == "no" else "posterior")
+    calibration, base = attempt.calibration(attempt.condition, attempt.left)
+    attempt.target.spent += calibration.trials
+    return fitted_condition(attempt.condition, calibration, randomize, base)
+
+
+def fitted_condition(
+    condition: Condition,
+    calibration: Calibration,
+    randomize: Literal["no", "posterior"],
+    base: RobotModel | None = None,
+) -> Condition:
+    """The condition on a simulator that was calibrated.
+
+    Args:
+        condition: On platform `sim`; what it sets itself of the robot's numbers stays.
+        calibration: The fit.
+        randomize: `no`: the estimate; `posterior`: a draw for each trial.
+        base: The robot on whose numbers the fit builds; as the calibration names it when not given.
+    """
+    keep = ("steps", "step_s", "contact", "noise", "noisy_reading", "precision", "set")
+    platform = needs_sim(condition, "calibrated")
+    old = {name: getattr(platform, name) for name in keep}
+    robot = (base or load_robot(calibration.robot)).with_numbers(calibration.numbers)
+    fitted = {"robot": robot.model_copy(update=calibration.step), "draws": dict(calibration.draws)}
+    sim = SimPlatform(**{**old, **fitted, "randomize": randomize})
+    name = "calibrated" if randomize == "no" else "posterior"
+    return condition.model_copy(update={"on": sim, "name": name})
+
+
+@dataclass(frozen=True)
+class Calibrating:
+    """Reads the calibration that was given, or makes one on the budget; `calibrated` and `posterior` share it.
+
+    Attributes:
+        target: What is observed.
+        folder: Where calibrations and their trials are kept.
+        first_number: Of the trials.
+        replicate: Of the transfer.
+        seed: Of the trials' commands, and of what is drawn while fitting.
+        observe: How much is seen.
+        file: The calibration that was given; None where there is none.
+        tell: Told what is going on.
+    """
+
+    target: Target
+    folder: Path
+    first_number: int
+    replicate: int
+    seed: int
+    observe: Observe
+    file: Path | None
+    tell: Callable[[str], None]
+
+    def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
+        """The calibration for a budget of `left` trials, and the robot on whose numbers it builds."""
+        if self.file is None:
+            return self._on_budget(condition, left - left // SELECTING), needs_sim(
+                condition, "calibrated"
+            ).robot
+        calibration = load_calibration(self.file)
+        return calibration, load_robot(calibration.robot)
+
+    def refuse(self, condition: Condition, left: int) -> None:
+        """Return where there can be a calibration for a budget of `left` trials.
+
+        Raises:
+            StudyError: The one that was given took more trials than that, or the target has other sensors than the
+                robot of the condition.
+        """
+        if self.file is None:
+            if left:
+                refuse_other_sensors(needs_sim(condition, "calibrated").robot, self.target)
+        elif (trials := load_calibration(self.file).trials) > left:
+            raise StudyError(
+                f"{self.file} took {trials} trials, more than a budget of {left}. Give a larger budget, or a "
+                "calibration of fewer trials."
+            )
+
+    def _on_budget(self, condition: Condition, n: int) -> Calibration:
+        """A calibration by n trials, or the one that is there."""
+        name = f"{n}-{self.observe}-{self.replicate}"
+        path = self.folder / f"{name}.toml"
+        if path.exists():
+            return load_calibration(path)
+        self.tell(f"calibrating by {n} trials, {self.observe} observed")
+        trials = self.folder / f"{name}.jsonl"
+        with KeptTarget(self.target, trials, n, self.first_number, observe=self.observe) as kept:
+            try:
+                calibration = calibrate_all(
+                    kept,
+                    robot=needs_sim(condition, "calibrated").robot,
+                    observe=self.observe,
+                    budget=n,
+                    seed=self.seed,
+                )
+            except ValueError as error:
+                raise StudyError(f"{error} The trials are kept in {trials}.") from error
+        write_whole(path, calibration.to_toml().encode(), within=self.folder)
+        return calibration

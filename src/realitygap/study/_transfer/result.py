@@ -1,0 +1,153 @@
+"""What came of a transfer: quality on the target by strategy and budget, with intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap import _special as special
+from realitygap.gap import CONFIDENCE, COVERAGE, Estimate
+
+
+@dataclass(frozen=True)
+class Transferred:
+    """One champion on the target.
+
+    Attributes:
+        strategy: That chose it.
+        budget: Trials on the target that the strategy was given.
+        spent: Of these, how many it used.
+        replicate: Of the transfer.
+        genome: As JSON text.
+        simulated: Its mean score in the simulation in which it was ranked; None where in none.
+        scores: (t,) the same on the target, in each fresh trial.
+    """
+
+    strategy: str
+    budget: int
+    spent: int
+    replicate: int
+    genome: str
+    simulated: float | None
+    scores: tuple[float, ...]
+
+    @property
+    def quality(self) -> float:
+        """Its mean score on the target."""
+        return float(np.mean(self.scores))
+
+
+@dataclass(frozen=True)
+class Strategist:
+    """What came of a strategy with one budget.
+
+    Attributes:
+        strategy: Its name.
+        budget: Trials on the target.
+        quality: Score on the target in fresh trials, over replicates.
+        regret: How much less that is than the best known champion's on this target.
+        simulated: Mean score in simulation; None where it evolved in none.
+    """
+
+    strategy: str
+    budget: int
+    quality: Estimate
+    regret: Estimate
+    simulated: float | None
+
+
+@dataclass(frozen=True)
+class TransferResult:
+    """A transfer, carried out.
+
+    Attributes:
+        study: Folder or catalogue name of what was evolved.
+        condition: Of the study, that was evolved.
+        target: Where it was tried.
+        label: What the target says it is.
+        replicates: Of each strategy.
+        fresh_trials: Of each champion; they are not of the budget.
+        strategies: By strategy and budget, in the order asked.
+        best_known: Mean score of the champion that is best in its fresh trials: as the best of many, luck
+            lifts it somewhat, and regret with it.
+        champions: Each with its fresh trials.
+        score: What trials were scored by, with its unit.
+    """
+
+    study: str
+    condition: str
+    target: str
+    label: str
+    replicates: int
+    fresh_trials: int
+    strategies: tuple[Strategist, ...]
+    best_known: float
+    champions: tuple[Transferred, ...]
+    score: str = COVERAGE
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, for JSON; `strategies` has `quality` and `regret` with `estimate`, `low`, `high`, `n`.
+
+        Scores of champions are named `coverage` if they are that; otherwise `scores`, and `score` says of what.
+        """
+        found = asdict(self)
+        if self.score == COVERAGE:
+            del found["score"]
+            for champion in found["champions"]:
+                champion["coverage"] = champion.pop("scores")
+        for row, strategist in zip(found["strategies"], self.strategies, strict=True):
+            row |= {"quality": strategist.quality.to_dict(), "regret": strategist.regret.to_dict()}
+        return found
+
+
+def summarize_transfer(
+    champions: Sequence[Transferred],
+    known: Sequence[float] = (),
+    score_range: tuple[float, float] = (0.0, 1.0),
+) -> tuple[tuple[Strategist, ...], float]:
+    """Quality and regret by strategy and budget, in the order in which they come, and the best known quality.
+
+    Intervals are of means over replicates; of a single replicate they are of its fresh trials, and nothing is said of
+    another evolution. Regret is to the best, taken as it is.
+
+    Args:
+        champions: With their fresh trials.
+        known: Qualities of others on the same target.
+        score_range: The least and the greatest score that there can be.
+    """
+    best = max([*known, *(champion.quality for champion in champions)])
+    groups: dict[tuple[str, int], list[Transferred]] = {}
+    for champion in champions:
+        groups.setdefault((champion.strategy, champion.budget), []).append(champion)
+    rows = []
+    for (strategy, budget), group in groups.items():
+        scores = np.array([champion.scores for champion in group])
+        quality = estimate_mean(scores, score_range)
+        low, high = (None if end is None else best - end for end in (quality.high, quality.low))
+        regret = Estimate(best - float(scores.mean()), low, high, quality.n)
+        simulated = [champion.simulated for champion in group if champion.simulated is not None]
+        mean = float(np.mean(simulated)) if simulated else None
+        rows.append(Strategist(strategy, budget, quality, regret, mean))
+    return tuple(rows), best
+
+
+def estimate_mean(values: NDArray[np.float64], within: tuple[float, float] = (0.0, 1.0)) -> Estimate:
+    """The mean of scores (r, t), t trials of each of r replicates, with Student's interval over replicates.
+
+    A resampling of two or three would repeat each of them, and end at the extremes. Replicates that happen to be alike
+    are as uncertain as their trials make them. Of one replicate the interval is over its trials; of one trial there is
+    none.
+    """
+    r, t = values.shape
+    mean, means = float(values.mean()), values.mean(axis=1)
+    if r * t == 1:
+        return Estimate(mean, None, None, r)
+    of_trials = float(values.var(axis=1, ddof=1).mean()) / (r * t) if t > 1 else 0.0
+    variance = max(float(means.var(ddof=1)) / r, of_trials) if r > 1 else of_trials
+    reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2)) * math.sqrt(variance)
+    return Estimate(mean, max(mean - reach, within[0]), min(mean + reach, within[1]), r)

@@ -1,0 +1,48 @@
+"""Strategies that spend trials on choosing among champions of the simulation: plain, select and halving."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .attempt import Attempt
+from .simulated import Champion
+
+
+def plain(attempt: Attempt) -> Champion:
+    """The best champion in simulation; no trial on the target."""
+    return attempt.champions()[0]
+
+
+def select(attempt: Attempt) -> Champion:
+    """The N best champions in simulation, each tried once on the target: the best there; of equals the first."""
+    return best_on_target(attempt, attempt.champions())
+
+
+def halving(attempt: Attempt) -> Champion:
+    """Champions tried in rounds, each with half of what is left on those that were best so far.
+
+    Source: successive halving (Karnin, Koren & Somekh, 2013). Differs: one trial each in a round, so that rounds halve
+    the trials as well; means are over all rounds.
+    """
+    contenders = attempt.champions()
+    sums = [0.0] * len(contenders)
+    places = list(range(len(contenders)))
+    rounds = 0
+    while attempt.left:
+        places = places[: max(1, -(-attempt.left // 2))]
+        places = places[: attempt.left]
+        tried = attempt.score_on_target([contenders[k] for k in places])
+        rounds += 1
+        for k, score in zip(places, tried, strict=True):
+            sums[k] += score
+        places.sort(key=lambda k: (-sums[k], k))
+    return contenders[places[0]]
+
+
+def best_on_target(attempt: Attempt, champions: Sequence[Champion]) -> Champion:
+    """What is left of the budget, spent on the first of some champions once each; the first when nothing is left."""
+    tried = champions[: attempt.left]
+    if not tried:
+        return champions[0]
+    scores = attempt.score_on_target(tried)
+    return tried[max(range(len(tried)), key=lambda k: (scores[k], -k))]

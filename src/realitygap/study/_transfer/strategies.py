@@ -1,0 +1,412 @@
+"""Controllers evolved in simulation, tried on a target: which strategy makes the most of few trials?"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
+from realitygap.evolution import ControllerInterface, Genome
+from realitygap.records import (
+    CALIBRATES,
+    OBSERVATIONS,
+    Observe,
+    not_compared,
+    read_object,
+    read_observations,
+    refuse_links,
+    refuse_links_in,
+    write_whole,
+)
+from realitygap.runs import Condition
+from realitygap.tasks import score_observed
+from realitygap.trials import Target, is_whole
+from realitygap.world import load_calibration, load_robot
+
+from .._code import allowed_task
+from .._file import load_study
+from .._study import Study
+from .._targets import check_task, refuse_more_than_is_seen, refuse_too_little
+from .attempt import Attempt, Simulation, plans_of
+from .calibrated import Calibrating, calibrated, posterior
+from .direct import direct
+from .noise import needs_sim, noise, randomized
+from .result import Transferred, TransferResult, summarize_transfer
+from .selected import halving, plain, select
+from .simulated import Champion, refuse_unevolved
+from .target import KeptTarget
+from .transferability import transferability
+
+STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
+    "plain": plain,
+    "select": select,
+    "halving": halving,
+    "noise": noise,
+    "randomized": randomized,
+    "calibrated": calibrated,
+    "posterior": posterior,
+    "transferability": transferability,
+    "direct": direct,
+}
+"""What each does is in the docstring of the function."""
+
+CALIBRATE = ("calibrated", "posterior")
+"""Strategies that share calibrations."""
+
+NEED_SIM = ("randomized", *CALIBRATE)
+"""Strategies that change numbers of the simulated robot."""
+
+WITHOUT_TRIALS = ("plain",)
+"""Strategies that spend nothing: carried out once for all budgets."""
+
+SEED_STRIDE = 1_000
+"""Between the seeds of calibrations of transfers with different seeds: there are at most so many replicates."""
+
+NUMBERS = 10_000
+"""Trials of a replicate have numbers of their own, so many apart; the fresh ones are in the upper half."""
+
+
+@dataclass(frozen=True)
+class TransferPlan:
+    """What a transfer does; a folder belongs to one plan.
+
+    Attributes:
+        study: Name or file.
+        condition: Of the study.
+        settings: Of that condition, as resolved.
+        target: Its name.
+        identity: What tells it from others whatever its name; empty where only the name does.
+        budgets: Trials on the target, one transfer each.
+        replicates: Times that everything is done, each with evolution of its own.
+        fresh_trials: Of each champion.
+        runs: Evolutions in simulation that a replicate has.
+        repeats: Trials of each individual in simulation.
+        observe: How much calibrating sees of a trial.
+        calibration: File of one that was made before; empty to calibrate on the budget.
+        fit: SHA-256 of what that file says: it may lie elsewhere the next time.
+        seed: Of all random numbers.
+    """
+
+    study: str
+    condition: str
+    settings: dict[str, Any]
+    target: str
+    identity: str
+    budgets: tuple[int, ...]
+    replicates: int = 1
+    fresh_trials: int = 20
+    runs: int = 100
+    repeats: int = 8
+    observe: Observe = "cells"
+    calibration: str = ""
+    fit: str = ""
+    seed: int = 1
+
+
+def transfer(
+    study: Study | str | Path,
+    target: Target,
+    strategies: str | Sequence[str] = "all",
+    budget: int | Sequence[int] = 20,
+    *,
+    out: str | Path,
+    condition: str | None = None,
+    replicates: int = 1,
+    fresh_trials: int = 20,
+    runs: int = 100,
+    repeats: int = 8,
+    observe: Observe = "cells",
+    calibration: str | Path | None = None,
+    seed: int = 1,
+    allow_code: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> TransferResult:
+    """Evolve in simulation, spend a budget of trials on a target, and try what each strategy chose on fresh trials.
+
+    All strategies have the same evolution in simulation: `runs` runs of the condition, every individual tried `repeats`
+    times. Where the study does not say how long a command of `sim` lasts, it is as long as the target's. Every trial on
+    the target is kept as it comes; the same call goes on where an interrupted one stopped.
+
+    Args:
+        study: A study, its name or its file.
+        target: Where trials cost.
+        strategies: Names in `STRATEGIES`; all of them when 'all'.
+        budget: Trials on the target that each strategy may spend; several are carried out one by one.
+        out: Folder for trials and result.
+        condition: Of the study; when not given, its first one that selects for the score, best on `sim`.
+        replicates: Times that everything is done, each with evolution of its own.
+        fresh_trials: By which each champion is judged; they are not of the budget.
+        runs: Evolutions in simulation of each replicate, at least the largest budget.
+        repeats: Trials of each individual in simulation.
+        observe: How much calibrating sees of a trial.
+        calibration: File of a calibration; its trials count as spent. Without one, calibrating spends of the budget.
+        seed: Of all random numbers.
+        allow_code: Whether the Python file of a task may run that the user has not allowed before.
+        tell: Told what is going on, in words.
+
+    Raises:
+        StudyError: No such study, condition or strategy, or so much cannot be seen of the target.
+        ControllerError: The target lacks what controllers see.
+        TaskError: The task cannot be scored in the target's arena, or its Python file is not allowed.
+        DescriptionError: The calibration is none, or of no robot that can be.
+        RecordError: The folder belongs to another transfer.
+        RobotError: The target failed; what was tried is safe.
+        TypeError, ValueError: A number that is none, or out of its range.
+    """
+    budgets = _budgets(budget)
+    seen = _known_observation(observe)
+    refuse_more_than_is_seen(target, seen)
+    plan = TransferPlan(
+        study=study.about.name if isinstance(study, Study) else str(study),
+        condition="",
+        settings={},
+        target=target.name,
+        identity=target.identity,
+        budgets=budgets,
+        replicates=whole_number("replicates", replicates, 1, 1000),
+        fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
+        runs=max(whole_number("runs", runs, 1), *budgets),
+        repeats=whole_number("repeats", repeats, 1),
+        observe=seen,
+        calibration="" if calibration is None else str(calibration),
+        fit="" if calibration is None else _fit_of(calibration),
+        seed=whole_number("seed", seed, 0, 2**63 - 1),
+    )
+    chosen = allowed_task(choose_condition(study, condition, plan.seed), allow_code)
+    chosen = _at_the_pace_of(target, chosen)
+    plan = _with(plan, condition=chosen.name, settings=chosen.settings())
+    names = strategy_names(strategies)
+    folder = Path(out)
+    work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
+    work.refuse(names)
+    _adopt(folder, plan)
+    champions = [
+        work.carry_out(name, n, r) for name in names for n in budgets for r in range(plan.replicates)
+    ]
+    task = chosen.task_of_trials
+    rows, best = summarize_transfer(champions, work.known(), task.score_range)
+    result = TransferResult(
+        plan.study,
+        plan.condition,
+        target.name,
+        target.label,
+        plan.replicates,
+        plan.fresh_trials,
+        rows,
+        best,
+        tuple(champions),
+        task.score_name,
+    )
+    write_whole(folder / "result.json", json.dumps(result.to_dict(), indent=2).encode(), within=folder)
+    return result
+
+
+def strategy_names(strategies: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of strategies, 'all' resolved.
+
+    Raises:
+        StudyError: One is unknown.
+    """
+    given = [strategies] if isinstance(strategies, str) else list(strategies)
+    names = tuple(STRATEGIES) if given == ["all"] else tuple(dict.fromkeys(given))
+    for name in names:
+        if name not in STRATEGIES:
+            raise StudyError(f"Unknown strategy {name!r}. {did_you_mean(name, [*STRATEGIES, 'all'])}")
+    return names
+
+
+def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> Condition:
+    """The condition of a study that is evolved, with a seed.
+
+    Raises:
+        StudyError: No such study or condition, or one that cannot be transferred.
+    """
+    resolved = study if isinstance(study, Study) else load_study(study)
+    conditions = {condition.name: condition for condition in resolved.conditions}
+    if name is None:
+        ranked = sorted(
+            resolved.conditions,
+            key=lambda each: (
+                each.selection != "coverage",
+                each.selection != "fitness",
+                each.on.robot_model is None,
+            ),
+        )
+        chosen = ranked[0]
+    elif name in conditions:
+        chosen = conditions[name]
+    else:
+        raise StudyError(
+            f"Study {resolved.about.name!r} has no condition {name!r}. {did_you_mean(name, conditions)}"
+        )
+    refuse_unevolved(chosen)
+    if chosen.arena.robots > 1:
+        raise StudyError(
+            f"Condition {chosen.name!r} has {chosen.arena.robots} robots in the arena, expected 1: controllers are "
+            "transferred to one robot."
+        )
+    return chosen.model_copy(update={"seed": seed})
+
+
+def _at_the_pace_of(target: Target, condition: Condition) -> Condition:
+    """The condition with a robot whose commands last as long as the target's, unless it says itself how long."""
+    if not target.is_paced:
+        return condition
+    return condition.model_copy(update={"on": condition.on.at_pace(target.step_s)})
+
+
+@dataclass
+class _Work:
+    """A transfer under way."""
+
+    plan: TransferPlan
+    condition: Condition
+    target: Target
+    folder: Path
+    tell: Callable[[str], None]
+    simulation: Simulation = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.simulation = Simulation(self.plan.runs, self.plan.repeats)
+
+    def refuse(self, strategies: Sequence[str]) -> None:
+        """Return where all strategies can be carried out, before trials are spent on one of them.
+
+        Raises:
+            StudyError: One cannot be.
+        """
+        task = self.condition.task_of_trials
+        check_task(task, self.target.arena)
+        refuse_too_little(task, self.target)
+        if self.target.inputs is not None:
+            interface = ControllerInterface(self.condition.network_inputs, self.condition.output_names)
+            interface.check(self.target.inputs, f"Condition {self.condition.name!r}", self.target.name)
+        for strategy in strategies:
+            if strategy in NEED_SIM:
+                needs_sim(self.condition, strategy)
+            if strategy in CALIBRATE:
+                for budget in self.plan.budgets:
+                    self._calibration(0).refuse(self.condition, budget)
+
+    def carry_out(self, strategy: str, budget: int, replicate: int) -> Transferred:
+        """The champion of a strategy, with its fresh trials."""
+        spends = strategy not in WITHOUT_TRIALS
+        name = f"{strategy}-{budget if spends else 0}-{replicate}"
+        self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
+        first = replicate * NUMBERS
+        path = self.folder / "trials" / f"{name}.jsonl"
+        with KeptTarget(self.target, path, budget, first, observe=self._looks_at(strategy)) as kept:
+            attempt = Attempt(
+                condition=self.condition,
+                target=kept,
+                budget=budget,
+                replicate=replicate,
+                simulation=self.simulation,
+                calibration=self._calibration(replicate),
+            )
+            champion = STRATEGIES[strategy](attempt)
+        champion.genome.save(self.folder / "champions" / f"{name}.json")
+        scores = self._fresh(champion.genome, name, first + NUMBERS // 2)
+        simulated = None if champion.simulated != champion.simulated else champion.simulated
+        genome = champion.genome.to_json()
+        return Transferred(strategy, budget, kept.spent, replicate, genome, simulated, scores)
+
+    def known(self) -> list[float]:
+        """Mean scores of all champions that were tried in this folder, by this call or an earlier one."""
+        files = sorted((self.folder / "fresh").glob("*.jsonl"))
+        tried = [[each for each in read_observations(file).trials if is_whole(each)] for file in files]
+        return [
+            float(np.mean(score_observed(self.condition.task_of_trials, trials, self.target.arena)))
+            for trials in tried
+            if len(trials) >= self.plan.fresh_trials
+        ]
+
+    def _calibration(self, replicate: int) -> Calibrating:
+        """How the replicate's calibrations come about."""
+        file = Path(self.plan.calibration) if self.plan.calibration else None
+        first, observe = replicate * NUMBERS, self.plan.observe
+        seed = (SEED_STRIDE * self.plan.seed + replicate) % 2**53
+        return Calibrating(
+            self.target, self.folder / "calibrations", first, replicate, seed, observe, file, self.tell
+        )
+
+    def _looks_at(self, strategy: str) -> Observe:
+        """The least that a strategy has to see of a trial on the target."""
+        needs_cells = strategy == "transferability" or (
+            strategy == "direct" and self.condition.selection == "novelty"
+        )
+        task = self.condition.task_of_trials
+        return max(task.observe, "cells", key=OBSERVATIONS.index) if needs_cells else task.observe
+
+    def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
+        """The scores of a champion in fresh trials."""
+        n, task = self.plan.fresh_trials, self.condition.task_of_trials
+        path = self.folder / "fresh" / f"{name}.jsonl"
+        with KeptTarget(self.target, path, n, first, observe=task.observe) as fresh:
+            trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), task.observe)
+        return tuple(score_observed(task, trials, self.target.arena).tolist())
+
+
+_PARTS = ("trials", "fresh", "champions", "calibrations")
+"""Folders in that of a transfer."""
+
+
+def _adopt(folder: Path, plan: TransferPlan) -> None:
+    """Make the folder that of a plan, or see that it is; more replicates, budgets and fresh trials extend it."""
+    path = folder / "transfer.json"
+    refuse_links(folder, path, folder / "result.json")
+    refuse_links_in(folder, *_PARTS)
+    if path.exists():
+        there = read_object(path)
+        now = json.loads(json.dumps(asdict(plan)))
+        extends = ("replicates", "budgets", "fresh_trials", "calibration", not_compared(there, now))
+        different = [key for key in now if key not in extends and now[key] != there.get(key)]
+        if different:
+            shown = "; ".join(
+                f"{key} was {there.get(key)!r}, is {now[key]!r}" for key in different if key != "settings"
+            )
+            raise RecordError(
+                f"{folder} belongs to another transfer ({shown or 'the condition has other settings'}); nothing was "
+                "tried and nothing is lost. Name another folder with -o."
+            )
+    for part in _PARTS:
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    write_whole(path, json.dumps(asdict(plan), indent=2).encode(), within=folder)
+
+
+def _fit_of(calibration: str | Path) -> str:
+    """SHA-256 of what the file of a calibration says, but in words, or of when, where and by what it was made.
+
+    Of the robot on whose numbers it builds counts what it is, and not where its file lies.
+    """
+    made = load_calibration(calibration)
+    said = made.model_dump(
+        mode="json", exclude={"date", "measured", "arena", "seed", "software", "notes", "robot"}
+    )
+    said["robot"] = load_robot(made.robot).to_dict()
+    load_robot(calibration)  # refuses one that no robot can be
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def _budgets(budget: int | Sequence[int]) -> tuple[int, ...]:
+    given = [budget] if isinstance(budget, int) else list(budget)
+    if not given:
+        raise ValueError("No budget is given, expected at least one number of trials.")
+    return tuple(whole_number("budget", each, 0, NUMBERS // 2 - 1) for each in given)
+
+
+def _known_observation(observe: str) -> Observe:
+    for known in CALIBRATES:
+        if observe == known:
+            return known
+    raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, CALIBRATES)}")
+
+
+def _with(plan: TransferPlan, **changes: Any) -> TransferPlan:
+    return TransferPlan(**{**asdict(plan), **changes, "budgets": plan.budgets})

@@ -1,0 +1,99 @@
+"""A target whose trials are kept as they come: what is there already is not carried out again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from realitygap._closing import ClosedOnExit
+from realitygap.errors import RecordError
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.trials import Target, TellTrial, TrialPlan, is_whole
+
+from .._targets import observations_head, refuse_lost
+
+
+class KeptTarget(ClosedOnExit):
+    """A target with a file beside it, and a number of trials that it allows.
+
+    A trial is known by its number: who asks for the same trials in the same order, after whatever interruption, gets
+    what is in the file, and the rest is carried out. One that was cut off is kept, too, and carried out again.
+
+    Args:
+        target: What carries out trials.
+        path: The file; its folder is there.
+        budget: How many trials it allows.
+        first_number: Added to the number of each plan, so that parts of a study draw other random numbers.
+        observe: The most that is looked at; kept as `looks_at`.
+    """
+
+    def __init__(
+        self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
+    ) -> None:
+        self.name, self.label, self.arena = target.name, target.label, target.arena
+        self.identity = target.identity
+        self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
+        self.is_paced, self.inputs = target.is_paced, target.inputs
+        self.budget = budget
+        self.spent = 0
+        self.looks_at: Observe = observe
+        self._target = target
+        self._first_number = first_number
+        self._file = ObservationsFile(path, observations_head(target, observe), within=path.parent)
+        self._kept = {trial.number: trial for trial in self._file.trials if is_whole(trial)}
+
+    def carry_out(
+        self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
+    ) -> list[ObservedTrial]:
+        """As `Target.carry_out`.
+
+        Raises:
+            ValueError: More trials than the budget has.
+            RecordError: The file has another trial of this number.
+            RobotError: A trial was lost for good.
+        """
+        if self.spent + len(plans) > self.budget:
+            raise ValueError(
+                f"There are {len(plans)} trials to carry out after {self.spent}, expected at most {self.budget} in all."
+            )
+        self.spent += len(plans)
+        numbered = [replace(plan, number=self._first_number + plan.number) for plan in plans]
+        missing = [k for k, plan in enumerate(numbered) if plan.number not in self._kept]
+        for k in set(range(len(plans))) - set(missing):  # before anything more is spent
+            self._checked(numbered[k], observe)
+
+        def keep(k: int, trial: ObservedTrial) -> None:
+            self._file.append(trial)
+            if is_whole(trial):
+                self._kept[trial.number] = trial
+                if tell is not None:
+                    tell(missing[k], trial)
+
+        if missing:
+            self._target.carry_out([numbered[k] for k in missing], observe, keep)
+        n_lost = sum(plan.number not in self._kept for plan in numbered)
+        refuse_lost(n_lost, self.name, f" The others are kept in {self._file.path}.")
+        return [self._checked(plan, observe) for plan in numbered]
+
+    def _checked(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:
+        """The trial of a plan, if it is that."""
+        trial = self._kept[plan.number]
+        genome = "" if plan.genome is None else plan.genome.to_json()
+        enough = OBSERVATIONS.index(trial.observe) >= OBSERVATIONS.index(observe)
+        is_driven_so = genome or (
+            trial.commands.shape == np.shape(plan.commands)
+            and np.allclose(trial.commands, plan.commands, atol=1e-6)
+        )
+        if trial.genome != genome or not is_driven_so or not enough:
+            what = "another controller or other commands" if enough else f"only {trial.observe} observed"
+            raise RecordError(
+                f"{self._file.path}: trial {plan.number} there has {what}; nothing was lost. Name another folder."
+            )
+        return trial
+
+    def close(self) -> None:
+        """Let go of the file; whoever opened the target closes that."""
+        self._file.close()

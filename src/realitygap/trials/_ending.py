@@ -1,0 +1,52 @@
+"""Why trials ended, and which of them count."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from enum import StrEnum
+
+from realitygap.records import ObservedTrial
+
+
+class EndReason(StrEnum):
+    """Why a trial on a robot ended."""
+
+    STEP_LIMIT = "step limit"
+    """After its last step."""
+    ABORTED = "aborted"
+    """By the operator."""
+    LOST = "lost"
+    """The robot, or the link to it, failed."""
+    INTERRUPTED = "interrupted"
+    """The program was stopped."""
+
+
+def is_whole(trial: ObservedTrial) -> bool:
+    """Return whether a trial came to its own end, and was not cut off."""
+    return trial.end == EndReason.STEP_LIMIT
+
+
+def taken_back(trial: ObservedTrial) -> ObservedTrial:
+    """Return a trial as one that the operator does not let count."""
+    return replace(trial, end=str(EndReason.ABORTED))
+
+
+def is_taken_back(trial: ObservedTrial) -> bool:
+    """Return whether a trial is the record that the one before it, of the same plan, does not count."""
+    return trial.end == EndReason.ABORTED
+
+
+def those_that_count(trials: Iterable[ObservedTrial]) -> list[ObservedTrial]:
+    """Return the trials that came to their own end and were not taken back.
+
+    If trials of one plan were driven again, only the last of them is returned.
+    """
+    last: dict[object, ObservedTrial] = {}
+    for trial in trials:
+        what = (trial.purpose, trial.number, trial.start, trial.genome)
+        if is_whole(trial):
+            last[what] = trial
+        elif is_taken_back(trial):
+            last.pop(what, None)
+    return list(last.values())

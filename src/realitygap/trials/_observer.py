@@ -1,0 +1,126 @@
+"""An observer knows of a robot what its sensors do not tell; that of a simulated robot is the simulation."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import RobotError
+from realitygap.records import Observe, Score
+from realitygap.robots import Clock, Robot
+from realitygap.world import Arena
+
+from ._target import TrialPlan
+
+
+class Observer(Protocol):
+    """Sees a trial from outside; asked only for what is to be observed."""
+
+    def battery_v(self) -> float:
+        """Voltage of the robot at the start of a trial [V]; nan if it is not known."""
+        ...
+
+    def wheels(self) -> tuple[float, float] | None:
+        """Way of the left and the right wheel since the start of the trial, by encoders [m]; None: it has none."""
+        ...
+
+    def look(self) -> None:
+        """Remember where the robot is: before each command, and after the last."""
+        ...
+
+    def poses(self) -> NDArray[np.float64]:
+        """(n, 3) x [m], y [m], heading [rad] at each look of the trial."""
+        ...
+
+    def cells(self) -> tuple[int, ...]:
+        """The cells that were crossed, in any order."""
+        ...
+
+
+class PortObserver(Observer, Protocol):
+    """Observes a robot on a port, which it has to meet and to put at the start of a trial.
+
+    Attributes:
+        observes: The most that can be seen with it.
+        identity: Of the robot that was met, as `Target.identity`.
+        who: Enters the scores that it reports.
+    """
+
+    who: str
+
+    @property
+    def observes(self) -> Observe:
+        """As above."""
+        ...
+
+    @property
+    def identity(self) -> str:
+        """As above."""
+        ...
+
+    def meet(self, robot: Robot, arena: Arena | None = None) -> None:
+        """Take note of a robot that was opened, in an arena if that is known.
+
+        Raises:
+            RobotError: It cannot be observed, or it drives in another arena.
+        """
+        ...
+
+    def ready(self) -> None:
+        """Put a robot that was met where it can turn on the spot, unless a person does."""
+        ...
+
+    def clock(self, robot: Robot) -> Clock:
+        """The clock by which commands of the robot that was met are timed."""
+        ...
+
+    def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
+        """Put the robot at the start of a trial, or have a person do so.
+
+        Raises:
+            RobotError: It drives in another arena.
+        """
+        ...
+
+    def score(self, arena: Arena) -> Score | None:
+        """The score of the trial that has just ended; None if a person has to count it."""
+        ...
+
+
+class RobotObserver:
+    """Sees of a simulated robot what its simulation knows: `pose`, `visited_cells` and, where it has them, `encoders`.
+
+    Args:
+        robot: Whom to look at.
+    """
+
+    def __init__(self, robot: Any) -> None:
+        self._robot = robot
+        self._poses: list[tuple[float, float, float]] = []
+
+    def battery_v(self) -> float:
+        """Not known, where the simulation has none [V]."""
+        self._poses = []
+        return float(getattr(self._robot, "battery_v", float("nan")))
+
+    def wheels(self) -> tuple[float, float] | None:
+        """Way of the wheels by its encoders [m]."""
+        try:
+            left, right = self._robot.encoders
+        except (AttributeError, RobotError):
+            return None
+        return float(left), float(right)
+
+    def look(self) -> None:
+        """Remember its pose."""
+        self._poses.append(tuple(self._robot.pose))
+
+    def poses(self) -> NDArray[np.float64]:
+        """(n, 3) at each look."""
+        return np.array(self._poses, np.float64).reshape(-1, 3)
+
+    def cells(self) -> tuple[int, ...]:
+        """Those along its line."""
+        return tuple(self._robot.visited_cells)

@@ -1,0 +1,80 @@
+"""The observer of a robot that draws on a sheet: a person, who counts the cells that the line crosses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.records import Observe, Score
+from realitygap.robots import Clock, Robot
+from realitygap.world import Arena
+
+from ._own_senses import OwnSenses
+from ._target import TrialPlan
+
+PickCells = Callable[[Arena], Sequence[int] | None]
+"""Has a person say which cells a line crosses; None asks again."""
+
+
+class SheetObserver(OwnSenses):
+    """A person counts the cells of each trial that is drawn; an S2 reports its encoders.
+
+    Args:
+        pick: Asks the person.
+        without_line: Purposes of trials that draw no line.
+        stand: Has the robot put at the start of a trial; None where that was asked before.
+    """
+
+    who = "person"
+    observes: Observe = "cells"
+
+    def __init__(
+        self,
+        pick: PickCells,
+        without_line: Container[str] = (),
+        stand: Callable[[TrialPlan, Arena, Observe], None] | None = None,
+    ) -> None:
+        super().__init__()
+        self._pick, self._without_line, self._stand = pick, without_line, stand
+        self._plan: TrialPlan | None = None
+
+    def meet(self, robot: Robot, arena: Arena | None = None) -> None:
+        """Take note of whether it has encoders."""
+        self._met(robot)
+        self.observes = "encoders" if self.has_encoders else "cells"
+
+    def ready(self) -> None:
+        """Nothing: a person has put it there."""
+
+    def clock(self, robot: Robot) -> Clock:
+        """The robot's own."""
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
+        return clock
+
+    def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
+        """Have it put there."""
+        if self._stand is not None:
+            self._stand(plan, arena, observe)
+        self.begin()
+        self._plan, self._arena = plan, arena
+
+    def look(self) -> None:
+        """Nobody sees where it is."""
+
+    def poses(self) -> NDArray[np.float64]:
+        """None."""
+        return np.empty((0, 3))
+
+    def cells(self) -> tuple[int, ...]:
+        """Those that its line crosses."""
+        while self._plan is not None and self._plan.purpose not in self._without_line:
+            cells = self._pick(self._arena)
+            if cells is not None:
+                return tuple(cells)
+        return ()
+
+    def score(self, arena: Arena) -> Score | None:
+        """None: a person looks at the sheet later."""
+        return None

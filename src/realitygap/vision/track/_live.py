@@ -1,0 +1,86 @@
+"""A robot followed while it drives, in a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from realitygap._closing import ClosedOnExit
+from realitygap.errors import VisionError
+
+from ._source import Source
+from ._tracker import Tracker
+from ._video import Marks, Tracked
+
+PATIENCE_S = 3.0
+"""How long a picture may take before the camera counts as gone."""
+
+
+class LiveTrack(ClosedOnExit):
+    """Looks at every picture that comes; tells where the robot was since `begin`.
+
+    Args:
+        source: The camera, whose times are those of `clock`.
+        marks: Tags, arena and lens.
+        clock: Tells the time [s].
+    """
+
+    def __init__(self, source: Source, marks: Marks, clock: Callable[[], float] = time.monotonic) -> None:
+        self.marks = marks
+        self.now = clock
+        self._source = source
+        self._tracker = Tracker(marks.tag)
+        self._has_come = threading.Condition()
+        self._last = -float("inf")
+        self._is_closed = False
+        self._problem = ""
+        self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
+        self._thread.start()
+
+    def _watch(self) -> None:
+        problem = f"{self._source.name} gives no more pictures. Is it plugged in?"
+        try:
+            for at, image in self._source:
+                with self._has_come:
+                    if self._is_closed:
+                        return
+                    self._tracker.take(at, image)
+                    self._last = at
+                    self._has_come.notify_all()
+        except Exception as error:  # told to whoever waits for a picture
+            problem = f"{self._source.name} failed: {error}"
+        with self._has_come:
+            self._problem = problem
+            self._has_come.notify_all()
+
+    def begin(self) -> None:
+        """Forget where the robot was; the corner tags are remembered."""
+        with self._has_come:
+            self._tracker.forget()
+
+    def tracked(self, until_s: float | None = None) -> Tracked:
+        """What was seen since `begin`.
+
+        Args:
+            until_s: Wait for a picture of this time or later [s].
+
+        Raises:
+            VisionError: The camera is gone, or what it saw does not do, as `Marks.tracked`.
+        """
+        with self._has_come:
+            if until_s is not None:
+                self._has_come.wait_for(lambda: self._last >= until_s or bool(self._problem), PATIENCE_S)
+                if self._last < until_s:
+                    raise VisionError(
+                        self._problem or f"{self._source.name} gave no picture for {PATIENCE_S:g} s."
+                    )
+            found = self._tracker.sightings()
+        return self.marks.tracked(found)
+
+    def close(self) -> None:
+        """Let go of the camera; safe to call twice."""
+        with self._has_come:
+            self._is_closed = True
+        self._thread.join(PATIENCE_S)
+        self._source.close()

@@ -1,0 +1,188 @@
+"""A robot's way as a camera saw it."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.errors import VisionError
+from realitygap.vision._tag_layout import RobotTag
+from realitygap.world import Grid
+
+from ._camera import Camera, square_poses
+from ._tracker import Sightings
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FINE_M = 0.001  # between points at which crossed cells are looked up
+MOST_OFF = 0.08  # of a tag's side, rms of its corners: beyond, it was seen wrongly
+FASTEST_M_S = 1.5  # no robot of this size is faster
+LEAST_SEEN = 2
+SLOPE_S = 0.15  # from so much before and after a gap its speed is taken
+
+
+@dataclass(frozen=True)
+class Track:
+    """Poses of a robot over time.
+
+    Attributes:
+        times: (t,) ascending [s].
+        poses: (t, 3) x [m], y [m], heading [rad, with all full turns from the first on].
+        seen: (t,) bool; False where the pose was filled in from those around it.
+        size_error: By how much the tag looks larger than its size and height say, as a share of its side; nan where
+            that was not measured.
+    """
+
+    times: Floats
+    poses: Floats
+    seen: Bools
+    size_error: float = float("nan")
+
+    @property
+    def longest_gap_s(self) -> float:
+        """The longest time in which the robot was not seen [s]."""
+        there = self.times[self.seen]
+        return float(np.max(np.diff(there), initial=0.0))
+
+    def at(self, times: Floats) -> Floats:
+        """(n, 3) poses at other times [s], on straight lines between pictures.
+
+        Raises:
+            ValueError: A time before the first picture or after the last.
+        """
+        times = np.asarray(times, np.float64)
+        if len(times) and not (times.min() >= self.times[0] - 1e-9 and times.max() <= self.times[-1] + 1e-9):
+            raise ValueError(
+                f"times are {times.min():.2f} to {times.max():.2f} s, expected within {self.times[0]:.2f} to "
+                f"{self.times[-1]:.2f} s, which the camera saw."
+            )
+        return np.column_stack([np.interp(times, self.times, column) for column in self.poses.T])
+
+    def between(self, first_s: float, last_s: float) -> Track:
+        """The part from one time to another [s], with poses at both ends."""
+        inside = (self.times > first_s) & (self.times < last_s)
+        ends = self.at(np.array([first_s, last_s]))
+        poses = np.concatenate([ends[:1], self.poses[inside], ends[1:]])
+        seen = np.concatenate([[True], self.seen[inside], [True]])
+        times = np.concatenate([[first_s], self.times[inside], [last_s]])
+        return Track(times, poses, seen, self.size_error)
+
+    def held(self, first_s: float, last_s: float) -> Track:
+        """The same, at rest from a time before its first picture, and to one after its last [s]."""
+        times = np.concatenate([[first_s], self.times, [last_s]])
+        poses = np.concatenate([self.poses[:1], self.poses, self.poses[-1:]])
+        seen = np.concatenate([[False], self.seen, [False]])
+        there = np.concatenate(
+            [[first_s < self.times[0]], np.ones(len(self.times), np.bool_), [last_s > self.times[-1]]]
+        )
+        return Track(times[there], poses[there], seen[there], self.size_error)
+
+    def cells(self, grid: Grid) -> tuple[int, ...]:
+        """The cells that its line crosses, in the order of their first visits."""
+        return cells_along(self.poses[:, :2], grid)
+
+    def to_csv(self) -> str:
+        """As a table: time_s, x_m, y_m, heading_rad, seen (1, or 0 where it was filled in)."""
+        rows = [
+            f"{time:.4f},{x:.5f},{y:.5f},{heading:.5f},{seen:d}"
+            for time, (x, y, heading), seen in zip(self.times, self.poses, self.seen, strict=True)
+        ]
+        return "\n".join(["time_s,x_m,y_m,heading_rad,seen", *rows]) + "\n"
+
+
+def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
+    """The poses of a robot whose tag was seen.
+
+    The tag's corners are put down on the plane of its height, so its parallax is taken out; the heading is that of the
+    square in this plane. Sightings of a wrong size or shape, and leaps, count as not seen. Gaps are filled with cubic
+    curves that leave and arrive at the speed before and after; what was not seen before the first sighting and after
+    the last has no poses.
+
+    Raises:
+        VisionError: It was hardly seen.
+    """
+    flat = camera.on_plane(found.robot.reshape(-1, 2), tag.height).reshape(-1, 4, 2)
+    seen = np.isfinite(flat).all(axis=(1, 2))
+    middles, headings, off = square_poses(np.where(np.isfinite(flat), flat, 0.0), tag)
+    sides = np.hypot(*np.moveaxis(flat - np.roll(flat, 1, axis=1), -1, 0)).mean(axis=1)
+    size_error = float(np.median(sides[seen]) / tag.size - 1) if seen.any() else float("nan")
+    shape_off = np.abs(sides / (tag.size * (1 + size_error)) - 1)
+    seen &= (off < MOST_OFF * tag.size + abs(size_error) * tag.size) & (shape_off < 2 * MOST_OFF)
+    seen &= ~_leaps(found.times, middles, seen)
+    if seen.sum() < LEAST_SEEN:
+        raise VisionError(
+            f"The robot's tag was seen in {seen.sum()} of {len(seen)} pictures, expected at least {LEAST_SEEN}. Is "
+            "it lit well enough for the camera to expose shortly, and are its size and height as said (--tag-size, "
+            "--tag-height)?"
+        )
+    heading = headings - tag.turned
+    shift = np.exp(1j * heading) * (tag.ahead + 1j * tag.left)
+    poses = np.column_stack([middles[:, 0] - shift.real, middles[:, 1] - shift.imag, heading])
+    first, last = np.flatnonzero(seen)[[0, -1]]
+    inside = slice(first, last + 1)
+    return _filled(found.times[inside], poses[inside], seen[inside], size_error)
+
+
+def _leaps(times: Floats, middles: Floats, seen: Bools) -> Bools:
+    """(t,) single sightings that are farther from both neighbors than any robot drives."""
+    rows = np.flatnonzero(seen)
+    leaps = np.zeros(len(seen), np.bool_)
+    if len(rows) < 3:
+        return leaps
+    way = np.hypot(*np.diff(middles[rows], axis=0).T)
+    fast = way > FASTEST_M_S * np.diff(times[rows]) + 0.005
+    leaps[rows[1:-1]] = fast[:-1] & fast[1:]
+    return leaps
+
+
+def _filled(times: Floats, poses: Floats, seen: Bools, size_error: float) -> Track:
+    there = np.flatnonzero(seen)
+    known = poses[there].copy()
+    known[:, 2] = np.unwrap(known[:, 2])
+    filled = np.column_stack([np.interp(times, times[there], column) for column in known.T])
+    for before, after in itertools.pairwise(there):
+        if after - before > 1:
+            inside = slice(before + 1, after)
+            filled[inside] = _curve(times[there], known, times[before], times[after], times[inside])
+    return Track(times, filled, seen, size_error)
+
+
+def _curve(times: Floats, poses: Floats, before: float, after: float, at: Floats) -> Floats:
+    """(n, 3) poses at times between the last sighting before a gap and the first after it."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    left = (times > before - SLOPE_S) & (times <= before)
+    right = (times >= after) & (times < after + SLOPE_S)
+    ends = np.array([poses[times == before][0], poses[times == after][0]])
+    mean = (ends[1] - ends[0]) / (after - before)
+    slopes = [_slope(times[part], poses[part], mean) for part in (left, right)]
+    curve: Floats = CubicHermiteSpline([before, after], ends, slopes)(at)
+    return curve
+
+
+def _slope(times: Floats, poses: Floats, otherwise: Floats) -> Floats:
+    """(3,) speed over some sightings."""
+    if len(times) < 3:
+        return otherwise
+    slope: Floats = np.polyfit(times - times[0], poses, 1)[0]
+    return slope
+
+
+def cells_along(line: Floats, grid: Grid) -> tuple[int, ...]:
+    """The cells of a grid that a line crosses, each once, in the order of their first visits.
+
+    Args:
+        line: (t, 2) x [m], y [m]; straight between points. Looked up at each millimeter.
+        grid: The cells.
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    at = np.union1d(way, np.arange(0.0, way[-1], FINE_M))
+    x, y = (np.interp(at, way, column) for column in line.T)
+    column, row = np.floor((x - grid.x) / grid.cell), np.floor((y - grid.y) / grid.cell)
+    inside = (column >= 0) & (column < grid.columns) & (row >= 0) & (row < grid.rows)
+    numbers = (grid.columns * row + column)[inside].astype(int)
+    return tuple(dict.fromkeys(numbers.tolist()))

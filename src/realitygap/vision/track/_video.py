@@ -1,0 +1,109 @@
+"""From a video to a track."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from realitygap.vision._tag_layout import CORNER_SIZE_M, RobotTag, corner_tags
+from realitygap.world import Arena
+
+from ._camera import Camera, fit_camera
+from ._lens import Lens
+from ._source import Image
+from ._track import Track, track_of
+from ._tracker import Sightings, Tracker, refuse_unseen, with_family
+
+MOST_SIZE_ERROR = 0.03  # beyond, what was said of the tag cannot be
+ROUND_PX = 1.0  # by which a square looks smaller, as blurred corners are round
+MOST_MOVED_PX = 3.0
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What a camera saw of a robot.
+
+    Attributes:
+        track: Its way.
+        camera: Where the camera stands, with its lens.
+        tag: The robot's, with its family.
+        sightings: In pixels.
+        warnings: What is not as it should be, in words.
+    """
+
+    track: Track
+    camera: Camera
+    tag: RobotTag
+    sightings: Sightings
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What is known of tags and lens before a camera looks.
+
+    Attributes:
+        arena: At whose corners tags lie.
+        tag: The robot's.
+        lens: The camera's; None where it is to be fitted to the tags.
+        corner_size: As in `corner_tags`.
+        corner_inset: Likewise.
+    """
+
+    arena: Arena
+    tag: RobotTag = RobotTag()  # noqa: RUF009  # frozen
+    lens: Lens | None = None
+    corner_size: float = CORNER_SIZE_M
+    corner_inset: float | None = None
+
+    def tracked(self, found: Sightings) -> Tracked:
+        """What sightings tell.
+
+        Raises:
+            VisionError: The robot's tag or too many corner tags were not seen, or they are not where they should be.
+            ValueError: The corner tags do not fit into the arena.
+        """
+        refuse_unseen(found, self.tag)
+        tag = with_family(self.tag, found)
+        layout = corner_tags(self.arena, self.corner_size, self.corner_inset)
+        there = np.isfinite(found.robot).all(axis=(1, 2))
+        camera = fit_camera(
+            found.size, found.corners, layout, lens=self.lens, robot=found.robot[there], tag=tag
+        )
+        track = track_of(found, camera, tag)
+        return Tracked(track, camera, tag, found, tuple(_warnings(found, track)))
+
+
+def track_video(frames: Iterable[tuple[float, Image]], marks: Marks) -> Tracked:
+    """The way of a robot through a video.
+
+    Args:
+        frames: Times [s] and pictures; a `VideoFile` or another source is one.
+        marks: Tags, arena and lens.
+
+    Raises:
+        VisionError: As `Marks.tracked`.
+    """
+    tracker = Tracker(marks.tag)
+    for time, image in frames:
+        tracker.take(time, image)
+    return marks.tracked(tracker.sightings())
+
+
+def _warnings(found: Sightings, track: Track) -> list[str]:
+    said = []
+    there = found.robot[np.isfinite(found.robot).all(axis=(1, 2))]
+    side_px = float(np.median(np.hypot(*np.moveaxis(there - np.roll(there, 1, axis=1), -1, 0))))
+    if abs(track.size_error) > MOST_SIZE_ERROR + ROUND_PX / side_px:
+        how = "larger" if track.size_error > 0 else "smaller"
+        said.append(
+            f"The robot's tag looks {abs(track.size_error):.0%} {how} than its size and height say: measure both again "
+            "(--tag-size, --tag-height); where it is, is off by as much of its parallax."
+        )
+    if found.moved > MOST_MOVED_PX:
+        said.append(
+            f"A corner tag moved by {found.moved:.0f} pixels: camera and sheet should be at rest while it films."
+        )
+    return said

@@ -42,7 +42,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     "Look at results": (
         Command("report", "Write the HTML report of a study.", "_results", "report"),
         Command("show", "Draw a run, trial, network, arena, or robot.", "_show", "show"),
-        Command("export", "Export a network as JSON, ONNX, or a graph.", "_export", "export"),
+        Command("export", "Export a network as JSON, ONNX, C, or a graph.", "_export", "export"),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
     ),
     "Measure and close the gap": (
@@ -50,7 +50,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
         Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
-        Command("closing-the-gap", "Measure and shrink the gap to many twins.", "_closing", "closing"),
+        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_closing", "closing"),
         Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),

@@ -4,17 +4,18 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.platforms import SimPlatform, SimTarget
+from realitygap.platforms import SimPlatform, SimTarget, harness_path
 from realitygap.report import goal_table, write_closing_page
-from realitygap.study import SMALL, ClosingPlan, summarize_closing
+from realitygap.study import PLANS, SMALL, ClosingPlan, closing_the_gap, summarize_closing
 from realitygap.study._closing.plan import adopt_plan
-from realitygap.study._closing.summary import is_met, median_interval, share_interval
+from realitygap.study._closing.summary import is_met, median_interval, pooled_fall, share_interval
 from realitygap.study._closing.twin import ClosingTwin, held_out
 from realitygap.trials import TrialPlan
 from realitygap.world import Calibration, paper_arena
@@ -31,6 +32,11 @@ PLAN = replace(
 )
 
 
+def controllers(n):
+    """Return n held-out controllers of the plan."""
+    return held_out(n, PLAN.study, PLAN.controllers_seed, are_founders=True)
+
+
 class Twins:
     """Opens twins and calibrates them, and counts both."""
 
@@ -38,8 +44,7 @@ class Twins:
         self.right, self.n_trials, self.n_fits = right, 0, 0
         self.stop_at = 10**9
 
-    def opened(self, file):
-        family = file.stem.split("-")[0]
+    def opened(self, family):
         twins = self
 
         class Counted(SimTarget):
@@ -53,7 +58,7 @@ class Twins:
 
     def calibrate(self, target, *, robot, observe, budget, seed, effort):
         self.n_fits += 1
-        target.carry_out([TrialPlan(genome=held_out(1)[0], number=k) for k in range(budget)], observe)
+        target.carry_out([TrialPlan(genome=controllers(1)[0], number=k) for k in range(budget)], observe)
         numbers = FAMILIES[target.name.partition(":")[2]] if self.right else {"contact.friction": 0.31}
         return Calibration(
             kind="all", robot="scribbler-s2-fluke2", target=target.name, label="SIM", observe=observe, trials=budget,
@@ -64,7 +69,9 @@ class Twins:
 def carry_out(folder, twins, plan=PLAN):
     adopt_plan(folder, plan)
     for name in plan.names:
-        ClosingTwin(plan, name, folder, twins.opened, twins.calibrate, lambda _: None).carry_out()
+        ClosingTwin(
+            plan, name, folder, partial(twins.opened, name.family), twins.calibrate, lambda _: None
+        ).carry_out()
     return summarize_closing(folder)
 
 
@@ -248,9 +255,9 @@ def test_the_plan_is_that_of_the_question():
 
 
 def test_held_out_controllers_are_half_random_and_half_champions():
-    genomes = held_out(6)
+    genomes = controllers(6)
     assert len(genomes) == 6
-    assert [genome.to_json() for genome in genomes] == [genome.to_json() for genome in held_out(6)]
+    assert [genome.to_json() for genome in genomes] == [genome.to_json() for genome in controllers(6)]
 
 
 def test_intervals_of_medians_and_shares_are_those_of_the_tables():
@@ -261,3 +268,71 @@ def test_intervals_of_medians_and_shares_are_those_of_the_tables():
     # Newcombe (1998), table I, Wilson's: 81 of 263
     assert share_interval(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
     assert np.isnan([value or np.nan for value in share_interval(0, 0)]).all()
+
+
+def test_pooled_fall_is_of_mean_squares_and_its_interval_covers_the_truth():
+    assert pooled_fall([0.3, 0.4], [0.3, 0.4])["estimate"] == pytest.approx(0.0)
+    assert pooled_fall([0.3, 0.4], [0.15, 0.2]) == pytest.approx({"estimate": 0.5, "low": 0.5, "high": 0.5})
+    assert pooled_fall([0.0, 0.0], [0.1, 0.1])["estimate"] is None
+    assert pooled_fall([0.2], [0.1]) == {"estimate": 0.5, "low": None, "high": None}
+    rng = np.random.default_rng(1)
+    before = 0.08 * np.exp(0.25 * rng.normal(size=(1000, 8)))
+    after = 0.02 * np.exp(0.5 * rng.normal(size=(1000, 8)))
+    truth = 1 - 0.25 * np.exp(0.5**2 - 0.25**2)  # roots of the means of lognormal squares
+    covers = [found["low"] <= truth <= found["high"] for found in map(pooled_fall, before, after)]
+    # 93.7 %; a right interval of 95 % would be outside these limits once in a thousand seeds
+    assert 0.91 <= np.mean(covers) <= 0.975
+
+
+def test_plan_of_other_platforms_has_sittings_and_leaves_out_what_cannot_be_seen():
+    plan, small = PLANS["thymio"]
+    assert [str(name) for name in plan.names[:4]] == ["enki-1", "playground-1", "enki-2", "playground-2"]
+    assert len(plan.names) == 10
+    units = {name.family: list(plan.units(name)) for name in plan.names}
+    assert "gap-encoders-20" in units["enki"]
+    assert units["playground"] == ["judged", "gap-none-0", "gap-track-20", "gap-track-10", "gap-track-40"]
+    assert len({plan.seed_of_controllers(name) for name in plan.names}) == 8  # of each sitting
+    assert small.n_units == 4
+
+
+def test_folder_made_before_plans_of_other_platforms_opens(right, tmp_path):
+    _, folder, _ = right
+    shutil.copytree(folder, tmp_path / "old")
+    path = tmp_path / "old" / "plan.json"
+    plan = json.loads(path.read_text())
+    for name in (
+        "study",
+        "platforms",
+        "unseen",
+        "fewer",
+        "controllers_seed",
+        "has_own_controllers",
+        "transfers",
+    ):
+        del plan[name]
+    path.write_text(json.dumps(plan))
+    assert summarize_closing(tmp_path / "old")["goals"] == summarize_closing(folder)["goals"]
+    adopt_plan(tmp_path / "old", PLAN)
+
+
+@pytest.mark.skipif(
+    not harness_path().exists(), reason="needs the harness of Enki: realitygap twin build-enki"
+)
+def test_sitting_on_another_platform_is_judged_and_calibrated(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(
+        '[study]\nname = "thymio"\n[platform.sim]\nrobot = "thymio"\nstep_s = 0.5\n'
+        '[[condition]]\nname = "coverage"\nplatform = "sim"\nselection = "coverage"\n'
+    )
+    sizes = {"controllers": 4, "trials": 2, "budgets": (0, 2), "observations": ("track",)}
+    few = replace(PLANS["thymio"][1], study=str(study), **sizes)
+    summary = closing_the_gap(tmp_path, few, processes=1)
+    assert summary["n_done"] == summary["n_units"] == 3
+    assert [goal["name"] for goal in summary["goals"]] == [
+        *("fall of the RMS gap, enki, track", "fall of the RMS gap, enki, track, random"),
+        *("fall of the RMS gap, enki, track, champions", "disattenuated SRCC, enki, track"),
+    ]
+    assert summary["label"] == "EMULATED"
+    page = write_closing_page(summary, tmp_path / "page.html").read_text("utf-8")
+    assert "a simulator of other authors" in page
+    assert "TWIN" not in page

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from realitygap.errors import StudyError
+from realitygap.errors import StudyError, did_you_mean
 
 if TYPE_CHECKING:
     from realitygap.study import ClosingPlan, ClosingProgress
@@ -19,19 +19,31 @@ CLOSING = "closing-the-gap"
 
 
 def closing(
+    plan: Annotated[
+        str,
+        typer.Option(
+            metavar="PLAN",
+            help="twins: MuJoCo twins of a Scribbler; thymio: a Thymio in Enki and in Aseba's playground.",
+        ),
+    ] = "twins",
     twins: Annotated[
-        int | None, typer.Option(min=1, max=900, help="Number of twins of each family. [default: 10]")
+        int | None,
+        typer.Option(
+            min=1,
+            max=900,
+            help="Number of twins of each family, or of sittings with each robot. [default: as the plan says]",
+        ),
     ] = None,
     families: Annotated[
         str | None,
-        typer.Option(metavar="LIST", help="Families of twins. [default: close,worn,slippery,delayed]"),
+        typer.Option(metavar="LIST", help="Families of twins, or robots. [default: all of the plan]"),
     ] = None,
     budgets: Annotated[
         str | None,
         typer.Option(metavar="LIST", help="Numbers of trials to calibrate by. [default: 0,10,20,40]"),
     ] = None,
     observe: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Observation levels. [default: cells,track]")
+        str | None, typer.Option(metavar="LIST", help="Observation levels. [default: as the plan says]")
     ] = None,
     small: Annotated[
         bool, typer.Option("--small", help="Run a small version, which takes minutes and shows no result.")
@@ -39,7 +51,10 @@ def closing(
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the twins.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help=f"Folder for the results. [default: results/{CLOSING}]"),
+        typer.Option(
+            metavar="DIR",
+            help=f"Folder for the results. [default: results/{CLOSING}, or results/{CLOSING}-PLAN]",
+        ),
     ] = None,
     processes: Annotated[
         int | None,
@@ -50,20 +65,26 @@ def closing(
         bool, typer.Option("--open", help="When done, show the page in the browser.")
     ] = False,
 ) -> None:
-    """Measure and shrink the gap to many twins.
+    """Measure and shrink the gap to many robots.
 
-    Twins of several families are each calibrated by a few trials and transferred to (extra twin). Interrupt the command
-    at any moment: the same command resumes.
+    Twins of several families are each calibrated by a few trials and transferred to (extra twin). With --plan thymio,
+    the robot is a Thymio in simulators of other authors. Interrupt the command at any moment: the same command resumes.
 
     Example: realitygap closing-the-gap --small
 
+    Example: realitygap closing-the-gap --plan thymio --families enki
+
     In Python: realitygap.study.closing_the_gap("results/closing-the-gap")
     """
-    plan = _plan(small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed)
-    _run(plan, out or Path("results") / CLOSING, processes, as_json=as_json, open_page=open_page)
+    chosen = _plan(
+        plan, small=small, twins=twins, families=families, budgets=budgets, observe=observe, seed=seed
+    )
+    folder = CLOSING if plan == "twins" else f"{CLOSING}-{plan}"
+    _run(chosen, out or Path("results") / folder, processes, as_json=as_json, open_page=open_page)
 
 
 def _plan(
+    name: str,
     *,
     small: bool,
     twins: int | None,
@@ -75,19 +96,22 @@ def _plan(
     """The plan that options describe.
 
     Raises:
-        StudyError: A family, budget or observation that there is not.
+        StudyError: A plan, family, budget or observation that there is not.
     """
     from realitygap.records import CALIBRATES
     from realitygap.robots.twin import FAMILIES
-    from realitygap.study import SMALL, ClosingPlan
+    from realitygap.study import PLANS
 
+    if name not in PLANS:
+        raise StudyError(f"--plan: unknown {name!r}. {did_you_mean(name, PLANS)}")
+    base = PLANS[name][1 if small else 0]
     changes: dict[str, Any] = {}
     if twins is not None:
         changes["twins"] = twins
     if seed is not None:
         changes["seed"] = seed
     if families is not None:
-        changes["families"] = _listed(families, "--families", FAMILIES)
+        changes["families"] = _listed(families, "--families", base.platforms or FAMILIES)
     if observe is not None:
         changes["observations"] = _listed(observe, "--observe", CALIBRATES)
     if budgets is not None:
@@ -98,7 +122,7 @@ def _plan(
         if numbers[0] < 0:
             raise StudyError(f"--budgets is {budgets!r}, expected numbers of trials, such as 0,10,20,40.")
         changes["budgets"] = tuple(numbers)
-    return dataclasses.replace(SMALL if small else ClosingPlan(), **changes)
+    return dataclasses.replace(base, **changes)
 
 
 def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: bool, open_page: bool) -> None:
@@ -137,11 +161,15 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
 def _print(summary: dict[str, Any]) -> None:
     from realitygap.report import goal_table, not_counted
 
-    typer.echo(
-        f"{len(summary['twins'])} twins (TWIN), of which {summary['n_counted']} differ from the simulator (SIM) by "
-        "more than three standard errors"
-    )
-    typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'twins':>9}  verdict")
+    of, label = len(summary["twins"]), summary["label"]
+    if summary["plan"]["platforms"]:
+        typer.echo(f"{of} sittings ({label}), each with its own held-out controllers")
+    else:
+        typer.echo(
+            f"{of} twins ({label}), of which {summary['n_counted']} differ from the simulator (SIM) by more than three "
+            "standard errors"
+        )
+    typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
     for name, wanted, figure, span, n, verdict in goal_table(summary):
         typer.echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
     for sentence in not_counted(summary):
@@ -149,8 +177,6 @@ def _print(summary: dict[str, Any]) -> None:
 
 
 def _listed(text: str, option: str, known: Any) -> tuple[str, ...]:
-    from realitygap.errors import did_you_mean
-
     names = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
     for name in names:
         if name not in known:

@@ -9,7 +9,7 @@ from typing import Any
 
 from realitygap._version import __version__
 from realitygap.records import write_whole
-from realitygap.report._closing_figures import draw_closing
+from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._drawing import NARROW, WIDE, inline
 
 GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
@@ -59,6 +59,8 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
         n_units=summary["n_units"],
         n_counted=summary["n_counted"],
         n_twins=len(summary["twins"]),
+        words=words_of(summary),
+        is_of_twins=not summary["plan"].get("platforms"),
         goal_head=GOAL_HEAD,
         goals=goal_table(summary),
         not_counted=not_counted(summary),

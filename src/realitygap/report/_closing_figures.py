@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,11 +24,42 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Summary = Mapping[str, Any]
-COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "track": Ink.OURS}
+COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "encoders": Ink.PEN2, "track": Ink.OURS}
 """By what calibrating saw."""
 
-MARKERS = {"none": "o", "cells": "s", "track": "D"}
+MARKERS = {"none": "o", "cells": "s", "encoders": "s", "track": "D"}
 _HEAD, _FOOT, _LEFT, _RIGHT, _GAP = 0.52, 0.5, 0.55, 0.12, 0.34
+
+
+class Words(NamedTuple):
+    """Words for what was calibrated.
+
+    Attributes:
+        label: TWIN or EMULATED.
+        robot: Word for the robot.
+        unit: Word for one of the equal parts of the study.
+    """
+
+    label: str
+    robot: str
+    unit: str
+
+    @property
+    def units(self) -> str:
+        """The word for several of them."""
+        return f"{self.unit}s"
+
+    def number(self, n: int) -> str:
+        """Return n of them in words."""
+        return f"1 {self.unit}" if n == 1 else f"{n} {self.units}"
+
+
+def words_of(summary: Summary) -> Words:
+    """Return the words for a study of twins, or of other platforms."""
+    label = summary.get("label", "TWIN")
+    return (
+        Words(label, "robot", "sitting") if summary["plan"].get("platforms") else Words(label, "twin", "twin")
+    )
 
 
 def draw_closing(summary: Summary, *, width: float = WIDE, name: str = "closing") -> dict[str, Drawing]:
@@ -55,17 +86,18 @@ def draw_closing(summary: Summary, *, width: float = WIDE, name: str = "closing"
 
 def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") -> Drawing | None:
     """RMS gap against budget, a panel a family: each twin thin, medians thick."""
+    words = words_of(summary)
     families = [family for family in summary["plan"]["families"] if _of(summary, family)]
     if not families:
         return None
     top = 1.08 * max(twin["rms"]["estimate"] or 0 for twin in summary["twins"]) or 1.0
     budgets = sorted(summary["plan"]["budgets"])
     caption = (
-        "Root mean square over the held-out controllers of the difference between mean coverage on the twin (TWIN) and "
-        "in simulation (SIM), noise taken out, against the trials that calibrating was given; by family, and by what "
-        "it saw of these trials. Thin lines: twins. Thick lines: medians."
+        "Root mean square over the held-out controllers of the difference between mean coverage on the "
+        f"{words.robot} ({words.label}) and in simulation (SIM), noise taken out, against the trials that calibrating "
+        f"was given; by family, and by what it saw of these trials. Thin lines: {words.units}. Thick lines: medians."
     )
-    alt = "RMS gap against budget of trials, a panel for each family of twins."
+    alt = "RMS gap against budget of trials, a panel for each family."
 
     def draw(axes: Axes, family: str) -> None:
         axes.set_xlim(-0.04 * budgets[-1], 1.04 * budgets[-1] or 1)
@@ -74,13 +106,13 @@ def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") 
         for observe in summary["plan"]["observations"]:
             _budget_lines(axes, summary, family, observe)
         axes.set_xlabel("trials for calibrating", labelpad=2)
-        _title(axes, family, _twins(len(_of(summary, family))))
+        _title(axes, family, words.number(len(_of(summary, family))))
 
     with house_style():
         figure, panels = _panels(width, len(families), 1.9)
         for axes, family in zip(panels, families, strict=True):
             draw(axes, family)
-        panels[0].set_ylabel("RMS gap, TWIN less SIM", labelpad=3)
+        panels[0].set_ylabel(f"RMS gap, {words.label} less SIM", labelpad=3)
         _key(figure, [(observe, observe) for observe in summary["plan"]["observations"]])
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
@@ -119,11 +151,13 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
     ]
     if not summary["twins"]:
         return None
+    words = words_of(summary)
     caption = (
-        "Each point is a held-out controller on a twin: its mean coverage in simulation (SIM) and on the twin (TWIN); "
-        f"before, and after calibrating by {budget} trials. On the diagonal the simulation is right."
+        f"Each point is a held-out controller in one of {words.number(len(summary['twins']))}: its mean coverage in "
+        f"simulation (SIM) and on the {words.robot} ({words.label}); before, and after calibrating by {budget} trials. "
+        "On the diagonal the simulation is right."
     )
-    alt = "Coverage in simulation against that on the twin, before and after calibrating."
+    alt = f"Coverage in simulation against that on the {words.robot}, before and after calibrating."
     with house_style():
         figure, panels = _panels(width, len(kinds), 2.2)
         for axes, kind in zip(panels, kinds, strict=True):
@@ -143,8 +177,8 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
             )  # fmt: skip
             axes.set_xlabel("coverage, SIM", labelpad=2)
             title = "as it is" if kind == "none" else f"calibrated, {kind}"
-            _title(axes, title, f"{len(xs)} points, {_twins(len(means))}")
-        panels[0].set_ylabel("coverage, TWIN", labelpad=3)
+            _title(axes, title, f"{len(xs)} points, {words.number(len(means))}")
+        panels[0].set_ylabel(f"coverage, {words.label}", labelpad=3)
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
@@ -189,7 +223,7 @@ def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strat
                 draw_line(axes, [row["low"], row["high"]], [place, place], color=color, linewidth=2.0)
             draw_line(axes, [row["estimate"]], [place], color=color, marker="o", markersize=6)
         axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
-        _title(axes, "Transfer by strategy", _twins(max(row["n"] for row in rows)))
+        _title(axes, "Transfer by strategy", words_of(summary).number(max(row["n"] for row in rows)))
         return Drawing(to_svg(figure, name, alt), caption, alt, figure)
 
 
@@ -197,18 +231,19 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
     """SRCC and MMRV of each twin, before and after, beside their goals."""
     if not summary["twins"]:
         return None
-    budget = summary["budget"]
+    words, budget = words_of(summary), summary["budget"]
     groups = {"as it is": ("none", [twin["gap"] for twin in summary["twins"]])}
     for observe in summary["plan"]["observations"]:
         found = [each["gap"] for _, each in _after(summary, observe, budget)]
         if found:
             groups[f"calibrated, {observe}"] = (observe, found)
     caption = (
-        "Left: Spearman’s correlation over the held-out controllers of coverage in simulation (SIM) and on the twin "
-        "(TWIN), disattenuated. Right: mean maximum rank violation over its floor, that of one half of the twin’s "
-        f"trials by the other. Points: twins; bars: medians; lines: goals. Calibrated by {budget} trials."
+        "Left: Spearman’s correlation over the held-out controllers of coverage in simulation (SIM) and on the "
+        f"{words.robot} ({words.label}), disattenuated. Right: mean maximum rank violation over its floor, that of one "
+        f"half of the {words.robot}’s trials by the other. Points: {words.units}; bars: medians; lines: goals. "
+        f"Calibrated by {budget} trials."
     )
-    alt = "Disattenuated SRCC, and MMRV over its floor, of each twin before and after calibrating."
+    alt = "Disattenuated SRCC, and MMRV over its floor, before and after calibrating."
     goals = {"srcc_disattenuated": 0.95, "mmrv_ratio": 2.0}
     titles = {"srcc_disattenuated": "Disattenuated SRCC", "mmrv_ratio": "MMRV over its floor"}
     with house_style():
@@ -247,10 +282,6 @@ def _of(summary: Summary, family: str) -> list[Summary]:
     return [
         twin for twin in summary["twins"] if twin["family"] == family and twin["rms"]["estimate"] is not None
     ]
-
-
-def _twins(n: int) -> str:
-    return "1 twin" if n == 1 else f"{n} twins"
 
 
 def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, Summary]]:

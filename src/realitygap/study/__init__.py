@@ -9,7 +9,7 @@ from ._calibrate.whole import calibrate_all
 from ._camera_observer import CameraObserver, Looking
 from ._camera_spec import marks_of, read_camera, tag_of
 from ._closing.plan import NAME as CLOSING
-from ._closing.plan import SMALL, ClosingPlan
+from ._closing.plan import PLANS, SMALL, ClosingPlan
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
@@ -52,6 +52,7 @@ __all__ = [
     "MOST_CONTROLLERS",
     "NO_LINE",
     "PARTS",
+    "PLANS",
     "SECTIONS",
     "SMALL",
     "STRATEGIES",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
@@ -46,6 +46,10 @@ class EnkiPlatform(Platform):
     def command_s(self) -> float:
         """Duration of a command [s]."""
         return self.step_s
+
+    def at_pace(self, step_s: float) -> Self:
+        """Return the platform with commands of this duration [s]."""
+        return self.model_copy(update={"step_s": step_s})
 
     @cached_property
     def _thymio(self) -> RobotModel:

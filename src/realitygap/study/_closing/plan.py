@@ -1,10 +1,10 @@
-"""The study `closing-the-gap`: what it does, fixed before it is carried out."""
+"""The study `closing-the-gap`: its plans, fixed before they run."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -15,15 +15,17 @@ from realitygap.records import Observe, read_object, refuse_links, refuse_links_
 
 NAME = "closing-the-gap"
 
-STUDY = "sim-paper"
-"""Whose first condition on `sim` is evolved: the paper's objective search on the Scribbler."""
-
 CONTROLLERS_SEED = 20_250_101
-"""Of the held-out controllers: of no other evolution and no calibration."""
+"""Seed of the held-out controllers of twins. No other evolution and no calibration uses it."""
 
 
 class TwinName(NamedTuple):
-    """A twin of the study."""
+    """A twin of the study, or a robot of another platform in one sitting.
+
+    Attributes:
+        family: Family of the twin, or name of the platform in the plan.
+        seed: Seed of the twin; number of the sitting.
+    """
 
     family: str
     seed: int
@@ -37,8 +39,12 @@ class ClosingPlan:
     """What is done with how many twins.
 
     Attributes:
+        study: Study whose first condition on `sim` is evolved, the paper's objective search on a robot.
         families: Of twins: `close` for what is hardly wrong, and three for what goes wrong with robots most: motors,
-            friction and time.
+            friction and time. Or names of `platforms`.
+        platforms: Platforms that take the place of families of twins, by family, as users name them.
+        unseen: Pairs of a family and what cannot be seen of its robots.
+        fewer: Numbers of twins of the families that have fewer than the others, by family.
         twins: Of each family.
         first_seed: Of the first twin in each family. Results on seeds 1000 to 1009 were published while the methods
             changed, so these twins are not unseen.
@@ -54,8 +60,12 @@ class ClosingPlan:
         repeats: Trials of each individual in simulation.
         effort: How much is simulated for a calibration.
         seed: Of all random numbers.
+        controllers_seed: Seed of the held-out controllers.
+        has_own_controllers: Whether each twin has held-out controllers of its own. Otherwise all twins share them.
+        transfers: Whether what evolves is transferred to the twins.
     """
 
+    study: str = "sim-paper"
     families: tuple[str, ...] = ("close", "worn", "slippery", "delayed")
     twins: int = 10
     first_seed: int = 1000
@@ -70,28 +80,44 @@ class ClosingPlan:
     repeats: int = 8
     effort: Literal["small", "full"] = "small"
     seed: int = 1
+    platforms: dict[str, str] = field(default_factory=dict)
+    unseen: tuple[tuple[str, Observe], ...] = ()
+    fewer: dict[str, int] = field(default_factory=dict)
+    controllers_seed: int = CONTROLLERS_SEED
+    has_own_controllers: bool = False
+    transfers: bool = True
 
     @property
     def names(self) -> list[TwinName]:
         """All twins, those of all families by turns, so that whatever is done first is of all of them."""
-        seeds = range(self.first_seed, self.first_seed + self.twins)
-        return [TwinName(family, seed) for seed in seeds for family in self.families]
+        return [
+            TwinName(family, self.first_seed + k)
+            for k in range(self.twins)
+            for family in self.families
+            if k < self.fewer.get(family, self.twins)
+        ]
 
     @property
     def n_units(self) -> int:
         """Files of results in all."""
-        return len(self.names) * sum(1 for _ in self.units())
+        return sum(1 for name in self.names for _ in self.units(name))
 
-    def units(self) -> Iterator[str]:
-        """What is done with each twin, in this order; each is a file when it is done."""
+    def units(self, name: TwinName) -> Iterator[str]:
+        """Yield what is done with a twin, in this order; each is a file when it is done."""
         yield "judged"
         yield "gap-none-0"
         costly = sorted(budget for budget in self.budgets if budget)
         # what the goals are about first
         for budget in sorted(costly, key=lambda each: each != self.transfer_budget):
             for observe in self.observations:
-                yield f"gap-{observe}-{budget}"
-        yield "transfer"
+                if (name.family, observe) not in self.unseen:
+                    yield f"gap-{observe}-{budget}"
+        if self.transfers:
+            yield "transfer"
+
+    def seed_of_controllers(self, name: TwinName) -> int:
+        """Return the seed of the held-out controllers of a twin."""
+        return self.controllers_seed + (name.seed if self.has_own_controllers else 0)
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values."""
@@ -99,20 +125,42 @@ class ClosingPlan:
         return found
 
 
-SMALL = ClosingPlan(
-    families=("worn", "delayed"),
-    twins=1,
+_FEW: dict[str, Any] = {
+    "twins": 1,
+    "first_seed": 1,
+    "budgets": (0, 10),
+    "controllers": 8,
+    "trials": 4,
+    "replicates": 1,
+    "fresh_trials": 4,
+    "runs": 20,
+    "repeats": 4,
+}
+
+TWINS = ClosingPlan()
+"""The plan at its full size, which takes hours."""
+
+SMALL = replace(TWINS, families=("worn", "delayed"), **_FEW)
+"""A plan that takes minutes. It shows that everything works, and nothing else."""
+
+THYMIO = ClosingPlan(
+    study="paper-thymio",
+    families=("enki", "playground"),
+    platforms={"enki": "enki", "playground": "thymio:playground"},
+    unseen=(("playground", "encoders"),),
+    fewer={"playground": 2},  # it runs at most eight times as fast as a robot
+    twins=8,
     first_seed=1,
-    budgets=(0, 10),
-    controllers=8,
-    trials=4,
-    transfer_budget=20,
-    replicates=1,
-    fresh_trials=4,
-    runs=20,
-    repeats=4,
+    observations=("track", "encoders"),
+    trials=10,
+    controllers_seed=2026112500,
+    has_own_controllers=True,
+    transfers=False,
 )
-"""Minutes in place of hours; too little to say anything but that all of it works."""
+"""The same question for simulators that we did not write: a Thymio in Enki, and in Aseba's playground."""
+
+PLANS = {"twins": (TWINS, SMALL), "thymio": (THYMIO, replace(THYMIO, families=("enki",), **_FEW))}
+"""The plans by name: at full size, and small."""
 
 EXTENDED = ("families", "twins", "budgets")
 """What may differ between calls on one folder: the rest of its plan is fixed."""
@@ -120,6 +168,11 @@ EXTENDED = ("families", "twins", "budgets")
 
 _PARTS = ("twins", "units", "calibrations", "transfers")
 """Folders in that of the study."""
+
+_OF_PLATFORMS = (
+    *("study", "platforms", "unseen", "fewer", "controllers_seed", "has_own_controllers", "transfers"),
+)
+"""Fields that are missing from folders of twins made before there were plans for other platforms."""
 
 
 def adopt_plan(folder: Path, plan: ClosingPlan) -> None:
@@ -132,7 +185,7 @@ def adopt_plan(folder: Path, plan: ClosingPlan) -> None:
     refuse_links(folder, path, *(folder / name for name in ("summary.json", "report.html")))
     refuse_links_in(folder, *_PARTS)
     if path.exists():
-        there = read_object(path)
+        there = _stored(path)
         now = plan.to_dict()
         different = [name for name in now if name not in EXTENDED and there.get(name) != now[name]]
         if different:
@@ -154,7 +207,7 @@ def read_plan(folder: Path) -> ClosingPlan:
     path = folder / "plan.json"
     if not path.exists():
         raise RecordError(f"There is no {NAME} in {folder}. Run it: realitygap {NAME} --out {folder}")
-    values = read_object(path)
+    values = _stored(path)
     try:
         known = {field.name: values[field.name] for field in fields(ClosingPlan)}
         return TypeAdapter(ClosingPlan).validate_python(known)
@@ -162,3 +215,9 @@ def read_plan(folder: Path) -> ClosingPlan:
         raise RecordError(
             f"{path} is damaged: {str(error).splitlines()[0]}. Restore it from a copy."
         ) from None
+
+
+def _stored(path: Path) -> dict[str, Any]:
+    """Return the plan of a folder as plain values."""
+    usual = TWINS.to_dict()
+    return {name: usual[name] for name in _OF_PLATFORMS} | read_object(path)

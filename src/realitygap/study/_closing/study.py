@@ -1,4 +1,4 @@
-"""`closing-the-gap`: many twins, each calibrated by a few trials; does the simulator then say what they do?"""
+"""`closing-the-gap`: robots that are calibrated by a few trials. Does the simulator then predict what they do?"""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RobotError, from_extra, whole_number
-from realitygap.platforms import TwinTarget
+from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
 from realitygap.trials import Target
 
 from .._calibrate.whole import calibrate_all
 from .._executors import usable_processors
 from .._transfer.strategies import choose_condition
-from .plan import STUDY, ClosingPlan, TwinName, adopt_plan
+from .plan import ClosingPlan, TwinName, adopt_plan
 from .summary import summarize_closing
 from .twin import ClosingTwin
 
@@ -73,7 +73,7 @@ def closing_the_gap(
     processes = usable_processors() if processes is None else whole_number("processes", processes, 1)
     folder = Path(out)
     adopt_plan(folder, plan)
-    _write_twins(folder, plan.names)
+    _write_twins(folder, plan)
     since = time.perf_counter()
 
     def show() -> None:
@@ -99,18 +99,24 @@ def n_done(folder: Path, plan: ClosingPlan) -> int:
 
 
 def _paths(folder: Path, plan: ClosingPlan, name: TwinName) -> Iterable[Path]:
-    return [folder / "units" / f"{name}-{unit}.json" for unit in plan.units()]
+    return [folder / "units" / f"{name}-{unit}.json" for unit in plan.units(name)]
 
 
-def _write_twins(folder: Path, names: Iterable[TwinName]) -> None:
-    """The file of each twin; one that is there stays."""
+def _twin_path(folder: Path, name: TwinName) -> Path:
+    return folder / "twins" / f"{name}.toml"
+
+
+def _write_twins(folder: Path, plan: ClosingPlan) -> None:
+    """Write the file of each twin, unless it exists."""
     from realitygap.robots.twin import sample_twin
 
-    for name in names:
+    for name in plan.names:
+        if name.family in plan.platforms:
+            continue
         model = sample_twin(name.family, name.seed)
         if model.engine == "mujoco":
             from_extra("mujoco", "twin")
-        path = folder / "twins" / f"{name}.toml"
+        path = _twin_path(folder, name)
         if not path.exists():
             write_whole(path, model.to_toml().encode(), within=folder)
 
@@ -118,11 +124,15 @@ def _write_twins(folder: Path, names: Iterable[TwinName]) -> None:
 def _carry_out(
     plan: ClosingPlan, name: TwinName, folder: Path, show: Callable[[], None] | None = None
 ) -> None:
-    """One twin, in this process; the twin itself is in another."""
-    arena = choose_condition(STUDY, None, plan.seed).arena.arena()
+    """Run one twin in this process; the twin itself is in another."""
 
-    def open_twin(file: Path) -> Target:
-        return TwinTarget(str(file), arena, 1, name=f"twin:{name}")
+    def open_twin() -> Target:
+        condition = choose_condition(plan.study, None, plan.seed)
+        arena, step_s = condition.arena.arena(), condition.on.command_s
+        spec = plan.platforms.get(name.family)
+        if spec is None:
+            return TwinTarget(str(_twin_path(folder, name)), arena, 1, name=f"twin:{name}")
+        return platform_of(spec).at_pace(step_s).open(arena, Opening(spec, step_s=step_s))
 
     ClosingTwin(plan, name, folder, open_twin, calibrate_all, lambda _: show and show()).carry_out()
 

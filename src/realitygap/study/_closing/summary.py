@@ -21,11 +21,14 @@ STANDARD_ERRORS = 3.0
 """A twin counts where the simulator as it is differs from it by more than so many standard errors."""
 
 NORMAL_95 = 1.959963984540054
-FALLS = {"track": 0.6, "cells": 0.4}
+FALLS = {"track": 0.6, "cells": 0.4, "encoders": 0.4}
 """Least median fall of the RMS gap, by what calibrating sees."""
 
 STRETCH = 0.8
 """The same with `track`, where all goes well."""
+
+KINDS = ("random", "champions")
+"""The kinds of held-out controllers."""
 
 LEAST_SRCC = 0.95
 MOST_MMRV = 2.0
@@ -54,6 +57,7 @@ def summarize_closing(folder: str | Path) -> dict[str, Any]:
         "study": "closing-the-gap",
         "software": __version__,
         "plan": plan.to_dict(),
+        "label": next((found["judged"]["label"] for found in units.values() if "judged" in found), "TWIN"),
         "budget": budget,
         "n_done": sum(len(found) for found in units.values()),
         "n_units": plan.n_units,
@@ -69,7 +73,7 @@ def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
     """What is there, by twin and unit."""
     found: dict[str, dict[str, Row]] = {}
     for name in plan.names:
-        for unit in plan.units():
+        for unit in plan.units(name):
             path = folder / "units" / f"{name}-{unit}.json"
             if path.exists():
                 found.setdefault(str(name), {})[unit] = read_object(path)
@@ -91,7 +95,7 @@ def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | Non
         return None
     rms = before["gap"]["rms"]
     error = standard_error(rms)
-    after = [_calibrated(units[unit], rms) for unit in plan.units() if unit in units and _is_after(unit)]
+    after = [_calibrated(units[unit], rms) for unit in plan.units(name) if unit in units and _is_after(unit)]
     row: Row = {
         "twin": str(name),
         "family": name.family,
@@ -100,6 +104,7 @@ def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | Non
         "counts": bool(rms["estimate"] is not None and error and rms["estimate"] > STANDARD_ERRORS * error),
         "gap": _measures(before),
         "means": before["means"],
+        "parts": before.get("parts", {}),
         "calibrated": after,
     }
     if "transfer" in units:
@@ -131,6 +136,7 @@ def _calibrated(unit: Row, before: Row) -> Row:
         "fall": 1 - after["estimate"] / before["estimate"] if known else None,
         "gap": _measures(unit),
         "means": unit["means"],
+        "parts": unit.get("parts", {}),
         "misspecified": fit["misspecified"],
         "misspecification_p": fit["misspecification_p"],
         "at_prior_end": sorted(each["name"] for each in fit["fitted"] if Fitted(**each).is_at_end),
@@ -209,11 +215,15 @@ def _strategies(twins: Sequence[Row]) -> list[Row]:
 
 
 def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row]:
+    if plan.platforms:
+        for family in plan.families:
+            yield from _goals_of_platform(plan, family, twins, budget)
+        return
     counted = [twin for twin in twins if twin["counts"]]
     for observe in plan.observations:
         pairs = [(twin, after) for twin in counted if (after := _after(twin, observe, budget)) is not None]
         falls = [(twin, after, after["fall"]) for twin, after in pairs if after["fall"] is not None]
-        least = FALLS.get(observe, FALLS["cells"])
+        least = FALLS[observe]
         yield _median_goal(f"fall of the RMS gap, {observe}", falls, least, above=True)
         if observe == "track":
             yield _median_goal(f"fall of the RMS gap, {observe} (stretch)", falls, STRETCH, above=True)
@@ -224,6 +234,25 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
         yield _median_goal(f"MMRV over its split-half floor, {observe}", ratio, MOST_MMRV, above=False)
         for other, least in (("plain", 0.5), ("select", 0.5), ("direct", LEAST_OVER_DIRECT)):
             yield _wins(counted, observe, other, least)
+
+
+def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], budget: int) -> Iterable[Row]:
+    """Goals of one robot over its sittings, none of which is left out; of all controllers, and of each kind."""
+    pairs = [(twin, after) for twin in twins if twin["family"] == family for after in twin["calibrated"]]
+    for observe in plan.observations:
+        if (family, observe) in plan.unseen:
+            continue
+        at = [pair for pair in pairs if (pair[1]["observe"], pair[1]["budget"]) == (observe, budget)]
+        title = f"{family}, {observe}"
+        for part in ("", *KINDS):
+            gaps = [(row["parts"][part] if part else row["rms"])["estimate"] for pair in at for row in pair]
+            figure = pooled_fall(gaps[::2], gaps[1::2])
+            name = f"fall of the RMS gap, {title}" + (f", {part}" if part else "")
+            yield _goal(name, figure, len(at), FALLS[observe], "at least", [])
+        order = [after["gap"]["srcc_disattenuated"] for _, after in at]
+        known = [value for value in order if value is not None]
+        figure = _mean_interval(known)
+        yield _goal(f"disattenuated SRCC, {title}", figure, len(known), LEAST_SRCC, "at least", [])
 
 
 def is_met(low: float | None, high: float | None, goal: float, sense: str) -> bool | None:
@@ -381,9 +410,38 @@ def median_interval(values: Sequence[float]) -> Row:
     return found
 
 
+def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Row:
+    """Return by which share the RMS gap over all sittings falls, with a 95 % interval over sittings.
+
+    The gap is the root of the mean square over sittings. The interval is Student's for the logarithm of the ratio, by
+    the delta method: each sitting counts with the difference of its shares in both mean squares.
+
+    Args:
+        before: RMS gap of each sitting with the simulator as it is.
+        after: The same after calibration.
+
+    Returns:
+        `estimate`, `low`, `high`; None where there are too few sittings, or no gap before.
+    """
+    n = len(before)
+    squares = np.square([before, after], dtype=float)
+    if not n or not squares[0].any():
+        return {"estimate": None, "low": None, "high": None}
+    of_before, of_after = squares.mean(axis=1)
+    found: Row = {"estimate": float(1 - np.sqrt(of_after / of_before)), "low": None, "high": None}
+    if n > 1 and of_after > 0:
+        shares = squares[1] / of_after - squares[0] / of_before
+        reach = float(special.stdtrit(n - 1, 0.975)) * float(np.std(shares, ddof=1)) / (2 * math.sqrt(n))
+        ratio = 1 - found["estimate"]
+        found |= {"low": 1 - ratio * math.exp(reach), "high": 1 - ratio * math.exp(-reach)}
+    return found
+
+
 def _mean_interval(values: Sequence[float]) -> Row:
     """The mean, with Student's 95 % interval."""
     n = len(values)
+    if not n:
+        return {"estimate": None, "low": None, "high": None}
     mean = float(np.mean(values))
     if n < 2:
         return {"estimate": mean, "low": None, "high": None}

@@ -12,10 +12,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from realitygap.evolution import Genome, Population
+from realitygap.evolution import Genome
 from realitygap.gap import GapSide, measure_gap
 from realitygap.records import Observe, read_object, write_whole
-from realitygap.runs import Condition
+from realitygap.runs import Condition, named, population_of
 from realitygap.trials import NoiseKey, Target
 from realitygap.world import Calibration, load_calibration
 
@@ -25,7 +25,7 @@ from .._transfer.noise import needs_sim
 from .._transfer.simulated import crossed_cells, evolve_champions, try_repeatedly
 from .._transfer.strategies import choose_condition, transfer
 from .._transfer.target import KeptTarget
-from .plan import CONTROLLERS_SEED, STUDY, ClosingPlan, TwinName
+from .plan import ClosingPlan, TwinName
 
 JUDGING, CALIBRATING = 10_000_000, 5_000_000
 """Numbers of the first trials for it, so that no two parts of the study draw the same noise."""
@@ -42,7 +42,7 @@ class ClosingTwin:
         plan: Of the study.
         name: Which twin.
         folder: Of the study.
-        open_twin: Opens it as a target, from its file.
+        open_twin: Opens it as a target.
         calibrate: As `calibrate_all`.
         tell: Told of each unit that is done.
     """
@@ -50,16 +50,16 @@ class ClosingTwin:
     plan: ClosingPlan
     name: TwinName
     folder: Path
-    open_twin: Callable[[Path], Target]
+    open_twin: Callable[[], Target]
     calibrate: Callable[..., Calibration]
     tell: Callable[[str], None]
 
     def carry_out(self) -> None:
         """All units that are missing."""
-        missing = [unit for unit in self.plan.units() if not self._path(unit).exists()]
+        missing = [unit for unit in self.plan.units(self.name) if not self._path(unit).exists()]
         if not missing:
             return
-        with self.open_twin(self.folder / "twins" / f"{self.name}.toml") as target:
+        with self.open_twin() as target:
             for unit in missing:
                 since = time.perf_counter()
                 found = self._unit(unit, target)
@@ -82,12 +82,14 @@ class ClosingTwin:
     @cached_property
     def condition(self) -> Condition:
         """What is evolved in simulation; its platform is the simulator as it is."""
-        return choose_condition(STUDY, None, self.plan.seed)
+        return choose_condition(self.plan.study, None, self.plan.seed)
 
     @cached_property
     def genomes(self) -> list[Genome]:
         """The held-out controllers."""
-        return held_out(self.plan.controllers)
+        plan = self.plan
+        seed = plan.seed_of_controllers(self.name)
+        return held_out(plan.controllers, plan.study, seed, are_founders=not plan.has_own_controllers)
 
     # the same controllers on both sides
 
@@ -133,6 +135,10 @@ class ClosingTwin:
         gap = measure_gap(source, target, misspecified=misspecified, seed=self.plan.seed)
         found: dict[str, Any] = {"observe": "none", "budget": 0, "gap": gap.to_dict()}
         found["means"] = {"source": source.means.tolist(), "target": target.means.tolist()}
+        found["parts"] = {
+            name: measure_gap(_part(source, part), _part(target, part), seed=self.plan.seed).to_dict()["rms"]
+            for name, part in self._kinds().items()
+        }
         if calibration is not None:
             found["calibration"] = {
                 "trials": calibration.trials,
@@ -141,6 +147,11 @@ class ClosingTwin:
                 "fitted": [fitted.model_dump(exclude={"advice"}) for fitted in calibration.fitted],
             }
         return found
+
+    def _kinds(self) -> dict[str, slice]:
+        """Return which of the held-out controllers are random, and which are champions."""
+        n = self.plan.controllers // 2
+        return {"random": slice(0, n), "champions": slice(n, None)}
 
     def _calibration(self, target: Target, observe: Observe, budget: int) -> Calibration:
         """That by so many trials, which is made where it is not there; its trials are kept as they come."""
@@ -180,7 +191,7 @@ class ClosingTwin:
     ) -> list[dict[str, Any]]:
         plan = self.plan
         result = transfer(
-            STUDY,
+            plan.study,
             target,
             names,
             plan.transfer_budget,
@@ -205,19 +216,24 @@ class ClosingTwin:
         ]
 
 
-def held_out(n: int) -> list[Genome]:
-    """The controllers by which simulators are judged: the first half random, the others champions of their own runs.
+def _part(side: GapSide, part: slice) -> GapSide:
+    """Return a side of the gap with a part of its controllers."""
+    return GapSide(side.name, side.label, side.values[part], side.cells[part])
 
-    Champions are of runs of the study's condition on the simulator as it is, a run each, of seeds that nothing else
-    uses.
+
+def held_out(n: int, study: str, seed: int, *, are_founders: bool) -> list[Genome]:
+    """Return controllers by which simulators are judged: first random ones, then as many champions of separate runs.
+
+    Args:
+        n: How many.
+        study: Study whose condition on the simulator as it is evolves the champions, one run for each.
+        seed: Seed that no other evolution and no calibration uses.
+        are_founders: Whether the random ones are founders of the champions' runs. Otherwise they are of other runs.
     """
-    condition = choose_condition(STUDY, None, CONTROLLERS_SEED)
-    n_random = n // 2
+    condition = choose_condition(study, None, seed)
+    n_random, first = n // 2, 0 if are_founders else n
     random: list[Genome] = []
-    for replicate in range(-(-n_random // condition.neat.population)):
-        bias = condition.has_bias_input
-        random += Population(
-            3, 2, condition.neat, seed=CONTROLLERS_SEED, replicate=replicate, bias=bias
-        ).ask()
+    for replicate in range(first, first - (-n_random // condition.neat.population)):
+        random += [named(genome, condition) for genome in population_of(condition, replicate).ask()]
     champions = evolve_champions(condition, range(n - n_random), repeats=1)
     return random[:n_random] + [champion.genome for champion in champions]

@@ -105,6 +105,7 @@ def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | Non
         "gap": _measures(before),
         "means": before["means"],
         "parts": before.get("parts", {}),
+        "stalled": units.get("judged", {}).get("stalled", []),
         "calibrated": after,
     }
     if "transfer" in units:

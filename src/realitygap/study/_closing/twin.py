@@ -94,7 +94,7 @@ class ClosingTwin:
     # the same controllers on both sides
 
     def _judge(self, target: Target) -> dict[str, Any]:
-        """The held-out controllers on the twin: crossed cells of each trial."""
+        """The held-out controllers on the twin: crossed cells of each trial, and the share of stalled steps."""
         n = self.plan.trials
         repeated = [genome for genome in self.genomes for _ in range(n)]
         trials = target.carry_out(plans_of(self.condition, repeated, JUDGING, "held out"), "cells")
@@ -104,6 +104,7 @@ class ClosingTwin:
             "n_cells": target.arena.grid.n_cells,
             "label": target.label,
             "cells": [cells[k : k + n] for k in range(0, len(cells), n)],
+            "stalled": [float(np.mean([t.stalled for t in trials[k : k + n]])) for k in range(0, len(trials), n)],
         }
 
     def _on_twin(self) -> GapSide:

@@ -1,0 +1,154 @@
+"""The study of a Thymio in other simulators: tables, figures and sentences of the page "Closing the gap to a Thymio".
+
+    uv run python docs/make_closing_thymio.py results/closing-the-gap-thymio
+    uv run python docs/make_closing_thymio.py    # without results: tables and sentences from the stored data
+
+With results of `realitygap closing-the-gap --plan thymio`, complete or not, it writes the data of the page:
+summary.json, with the mean coverage of each held-out controller. Tables and sentences follow from it; figures are drawn
+from the results. The study takes an hour and is not run here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from make_closing import table
+from numpy.typing import NDArray
+
+from realitygap.report import FAMILY_HEAD, GOAL_HEAD, draw_closing, family_table, goal_table
+from realitygap.study import summarize_closing
+
+HERE = Path(__file__).parent
+TABLES = HERE / "data" / "closing-thymio"
+FIGURES = HERE / "images" / "closing-thymio"
+SITTING_HEAD = (
+    "sitting",
+    "RMS gap as it is",
+    "observed",
+    "RMS gap calibrated",
+    "fall",
+    "p",
+    "at an end of the prior",
+)
+RESIDUAL_HEAD = ("robot", "simulator", "controllers", "touching", "n", "mean error", "RMS error")
+
+Summary = Mapping[str, Any]
+Values = NDArray[np.float64]
+
+
+def words(summary: Summary) -> str:
+    """Return how much of the study is done, and which goals are met, as paragraphs of Markdown."""
+    plan = summary["plan"]
+    done = (
+        "All parts of the study are done."
+        if summary["n_done"] == summary["n_units"]
+        else f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
+    )
+    sizes = ", ".join(
+        f"{plan['fewer'].get(family, plan['twins'])} with `{family}`" for family in plan["families"]
+    )
+    names: dict[bool | None, list[str]] = {True: [], False: [], None: []}
+    for goal in summary["goals"]:
+        names[goal["met"]].append(goal["name"])
+    verdicts = [
+        f"{word}: {'; '.join(names[met]) or 'none'}."
+        for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
+    ]
+    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts]) + "\n"
+
+
+def sitting_table(summary: Summary) -> Iterable[Sequence[str]]:
+    """Yield each sitting and calibration at the budget of the goals, in the columns of `SITTING_HEAD`."""
+    for sitting in summary["twins"]:
+        for after in _at_goal(summary, sitting):
+            p = after["misspecification_p"]
+            yield (
+                sitting["twin"],
+                _number(sitting["rms"]["estimate"]),
+                after["observe"],
+                _number(after["rms"]["estimate"]),
+                "–" if after["fall"] is None else f"{100 * after['fall']:.0f} %".replace("-", "−"),
+                "–" if p is None else f"{p:.3f}",
+                ", ".join(after["at_prior_end"]) or "–",
+            )
+
+
+def residual_table(summary: Summary) -> Iterable[Sequence[str]]:
+    """Yield errors of predicted mean coverage by kind of controller and by how much it touches, as `RESIDUAL_HEAD`.
+
+    A controller touches more if its share of stalled steps is above the median over the sittings of its robot.
+    """
+    n_random = summary["plan"]["controllers"] // 2
+    for family in summary["plan"]["families"]:
+        sittings = [each for each in summary["twins"] if each["family"] == family]
+        if not sittings:
+            continue
+        stalled = np.concatenate([each["stalled"] for each in sittings])
+        is_random = np.concatenate([np.arange(len(each["stalled"])) < n_random for each in sittings])
+        touches = stalled > np.median(stalled)
+        for name, errors in _errors(summary, sittings).items():
+            for kind, of_kind in (("random", is_random), ("champions", ~is_random)):
+                for amount, of_amount in (("less", ~touches), ("more", touches)):
+                    part = errors[of_kind & of_amount]
+                    if len(part):
+                        figures = (np.mean(part), np.sqrt(np.mean(part**2)))
+                        yield (family, name, kind, amount, str(len(part)), *map(_number, figures))
+
+
+def _errors(summary: Summary, sittings: Sequence[Summary]) -> dict[str, Values]:
+    """Return simulated less true mean coverage of all controllers, as it is and by each calibration."""
+    means = {"as it is": [each["means"] for each in sittings]}
+    for sitting in sittings:
+        for after in _at_goal(summary, sitting):
+            means.setdefault(f"calibrated, {after['observe']}", []).append(after["means"])
+    return {
+        name: np.concatenate([np.subtract(each["source"], each["target"]) for each in rows])
+        for name, rows in means.items()
+        if len(rows) == len(sittings)
+    }
+
+
+def _at_goal(summary: Summary, sitting: Summary) -> list[Summary]:
+    return [each for each in sitting["calibrated"] if each["budget"] == summary["budget"]]
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}".replace("-", "−")
+
+
+def main() -> None:
+    """Write the data, tables, sentences and figures of the page."""
+    parser = argparse.ArgumentParser(description="Tables, figures and sentences of the study of a Thymio.")
+    parser.add_argument(
+        "folder", type=Path, nargs="?", help="results of `realitygap closing-the-gap --plan thymio`"
+    )
+    folder = parser.parse_args().folder
+    for place in (TABLES, FIGURES):
+        place.mkdir(parents=True, exist_ok=True)
+    summary = (
+        json.loads((TABLES / "summary.json").read_text("utf-8"))
+        if folder is None
+        else summarize_closing(folder)
+    )
+    files = {
+        TABLES / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
+        TABLES / "budgets.csv": table(FAMILY_HEAD, family_table(summary)),
+        TABLES / "sittings.csv": table(SITTING_HEAD, sitting_table(summary)),
+        TABLES / "residuals.csv": table(RESIDUAL_HEAD, residual_table(summary)),
+        TABLES / "words.md": words(summary),
+        TABLES / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n",
+    }
+    for name, drawing in draw_closing(summary).items():
+        files[FIGURES / f"{name}.svg"] = drawing.svg + "\n"
+    for path, text in files.items():
+        path.write_text(text, "utf-8")
+        print(f"Written: {path}")
+
+
+if __name__ == "__main__":
+    main()

@@ -38,7 +38,7 @@ from ._pictures import (
 )
 from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
-from ._robot_model import RangeSensor, RobotModel
+from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
@@ -50,6 +50,7 @@ __all__ = [
     "MOST_CORNERS",
     "MOST_ROBOTS",
     "NAMED_STARTS",
+    "SENSORS",
     "Arena",
     "ArenaFile",
     "ArenaSettings",

@@ -147,12 +147,12 @@ def twin_table(summary: Mapping[str, Any]) -> Table:
     """Twins and whether they count, in the columns of `TWIN_HEAD`."""
     return [
         (
-            twin["twin"],
-            _number(twin["rms"]["estimate"]),
-            _number(twin["standard_error"]),
-            "yes" if twin["counts"] else "no",
+            row["twin"],
+            _number(row["rms"]["estimate"]),
+            _number(row["standard_error"]),
+            "yes" if row["counts"] else "no",
         )
-        for twin in summary["twins"]
+        for row in summary["twins"]
     ]
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,13 +12,11 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import PENS, Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_dots,
     draw_line,
-    draw_widths,
+    draw_wide,
     head_axes,
     new_figure,
     place_axes,
@@ -38,7 +35,7 @@ from realitygap.report._path_figure import (
     trace_paths,
     typical_replicate,
 )
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition
 from realitygap.world import Arena, Body
 
@@ -57,11 +54,11 @@ _N_BETTER = 5
 
 
 def draw_individuals(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    width: float = WIDE,
+    name: str = "individuals",
 ) -> Drawing:
     """All individuals of each generation of one run, a pen each, as the paper's Figures 5 and 8.
 
@@ -69,32 +66,14 @@ def draw_individuals(
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
         condition: of which; the first one when not given.
         replicate: which run; when not given the typical one, as in `draw_paths`.
-        width: of the figure [in]; it decides how many panels stand side by side.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = tally.name_of(condition)
-    (drawing,) = draw_tally_individuals(tally, name, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_individuals(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "individuals",
-) -> list[Drawing]:
-    """As `draw_individuals`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run.
-        RecordVersionError: its settings are not those of this version.
-    """
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
     typical = replicate is None
@@ -124,26 +103,18 @@ def draw_tally_individuals(
         + "."
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_widths(
-        lambda width: _draw_generations(panels, arena, body, label, width), widths, name, caption, alt
-    )
+    return draw_wide(lambda width: _draw_generations(panels, arena, body, label, width), name, caption, alt)
 
 
-def draw_tally_better(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "better",
-) -> list[Drawing]:
-    """The individuals of highest coverage of one run, as the paper's Figure 9, in several widths.
+def draw_better(
+    tally: Tally, condition: str, replicate: int | None = None, *, name: str = "better"
+) -> Drawing:
+    """The individuals of highest coverage of one run, as the paper's Figure 9.
 
     Args:
         tally: the study. The trials that are shown are recomputed.
         condition: of which.
         replicate: which run; when not given the typical one, as in `draw_paths`.
-        widths: of the figures [in].
         name: what the ids begin with.
 
     Raises:
@@ -192,7 +163,7 @@ def draw_tally_better(
         draw_path_legend(places[-1], paths, small=short)
         return figure
 
-    return draw_widths(draw, widths, name, caption, alt + ".")
+    return draw_wide(draw, name, caption, alt + ".")
 
 
 def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:

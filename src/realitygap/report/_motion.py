@@ -15,7 +15,7 @@ from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in
 from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
 from realitygap.report._driven import driven_paths, refuse_replay
 from realitygap.report._path_figure import no_such_run, typical_replicate
-from realitygap.report._tally import Tally, read_tally
+from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
 from realitygap.runs import replay
@@ -24,7 +24,6 @@ from realitygap.trials import PATH_PARTS
 Each = Literal["individual", "generation", "condition"]
 """Of what several trials are shown: each individual of a generation, the best of each generation or condition."""
 
-Results = ResultsFolder | str | Path
 
 _SURPLUS: dict[Each, tuple[str, ...]] = {
     "individual": ("individual",),
@@ -258,4 +257,4 @@ def watch(
 
 
 def _listed(what: Results | MovingTrial | Iterable[Results | MovingTrial]) -> list[Results | MovingTrial]:
-    return [what] if isinstance(what, ResultsFolder | str | Path | MovingTrial) else list(what)
+    return [what] if isinstance(what, Tally | ResultsFolder | str | Path | MovingTrial) else list(what)

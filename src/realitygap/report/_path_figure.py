@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,14 +14,12 @@ import polars as pl
 from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError
 from realitygap.platforms import is_physical
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_dots,
     draw_line,
     draw_points,
-    draw_widths,
+    draw_wide,
     head_axes,
     mark_key,
     new_figure,
@@ -30,7 +27,7 @@ from realitygap.report._drawing import (
     shorten,
 )
 from realitygap.report._driven import driven_paths
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of, task_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of, task_of
 from realitygap.runs import Condition, replay
 from realitygap.world import Arena, Body, Pose
 
@@ -76,11 +73,11 @@ class TracedPath:
 
 
 def draw_paths(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    width: float = WIDE,
+    name: str = "paths",
 ) -> Drawing:
     """The best path of each generation of one run, as the paper's Figure 6.
 
@@ -89,32 +86,14 @@ def draw_paths(
         condition: of which; the first one when not given.
         replicate: which run; when not given the typical one, whose best trial by the task is the median of its
             condition (the lower of the two middle ones, and the first of several alike).
-        width: of the figure [in]; it decides how many panels stand side by side.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = tally.name_of(condition)
-    (drawing,) = draw_tally_paths(tally, name, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_paths(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "paths",
-) -> list[Drawing]:
-    """As `draw_paths`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run.
-        RecordVersionError: the condition's settings are not those of this version.
-    """
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
     typical = replicate is None
@@ -127,7 +106,7 @@ def draw_tally_paths(
         + "."
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_widths(lambda width: _draw(paths, arena, body, label, width), widths, name, caption, alt)
+    return draw_wide(lambda width: _draw(paths, arena, body, label, width), name, caption, alt)
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:

@@ -119,16 +119,22 @@ class Tally:
         return int(rows["trials"].sum())
 
 
-def read_tally(folder: ResultsFolder | str | Path, *, with_uncounted: bool = False) -> Tally:
+Results = Tally | ResultsFolder | str | Path
+"""The results of a study, the path to them, or what `read_tally` read of them."""
+
+
+def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: the results of a study, or the path to them. A tally is returned as it is.
         with_uncounted: whether conditions of which nobody counted cells are kept; their coverage is NaN.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
+    if isinstance(folder, Tally):
+        return folder
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
     parts = [
         frame.group_by("condition", "replicate", "generation", maintain_order=True).agg(

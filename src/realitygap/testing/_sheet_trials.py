@@ -8,6 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.evolution import NeatSettings, Population
+from realitygap.platforms import SimPlatform, SimTarget
+from realitygap.robots.twin import cells_along
+from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Grid, Pose
 
 PARTS = 12  # points on the arc of one command
@@ -32,10 +36,6 @@ def driven_paths(
     Returns:
         For each generation eight paths, each (12 steps + 1, 2) x and y [m].
     """
-    from realitygap.evolution import NeatSettings, Population
-    from realitygap.platforms import SimPlatform, SimTarget
-    from realitygap.trials import TrialPlan
-
     population = Population(3, 2, NeatSettings.named("rosenzweig-remy"), seed=seed)
     rng = np.random.default_rng((seed, 0x4A4D))
     sheets = []
@@ -79,6 +79,4 @@ def cells_along_path(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
         path: (n, 2) x and y [m].
         grid: Of cells.
     """
-    from realitygap.robots.twin import cells_along
-
     return cells_along(path, grid)

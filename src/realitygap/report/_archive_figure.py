@@ -25,7 +25,6 @@ from realitygap.report._path_figure import (
     arena_extent,
     draw_arena,
     draw_visited,
-    no_such_run,
     say_origin,
     trace_paths,
     typical_replicate,
@@ -62,9 +61,7 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
     described = tally.condition(chosen)
     resolved = Condition.from_settings(chosen, dict(settings_of(described)))
     replicate = typical_replicate(tally, chosen) if replicate is None else replicate
-    rows = tally.folder.read(chosen, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, chosen, replicate))
+    rows = tally.rows_of(chosen, replicate)
     members = _members(resolved, rows)
     different = list(dict.fromkeys(members))
     entered = [generation for generation, _ in members]

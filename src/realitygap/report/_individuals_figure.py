@@ -18,8 +18,6 @@ from realitygap.report._drawing import (
     draw_line,
     draw_wide,
     head_axes,
-    new_figure,
-    place_axes,
     shorten,
     write,
 )
@@ -30,7 +28,7 @@ from realitygap.report._path_figure import (
     draw_path,
     draw_path_legend,
     draw_visited,
-    no_such_run,
+    panels_of,
     say_origin,
     trace_paths,
     typical_replicate,
@@ -79,7 +77,7 @@ def draw_individuals(
     typical = replicate is None
     replicate = typical_replicate(tally, condition) if replicate is None else replicate
     column = f"coverage_{tally.measure}"
-    rows = _rows_of(tally, condition, replicate)
+    rows = tally.rows_of(condition, replicate)
     n_generations, population = int(rows["generation"].n_unique()), int(rows["individual"].n_unique())
     shown = np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS)).round().astype(int).tolist()
     rows = rows.filter(pl.col("generation").is_in(shown), pl.col("individual") < _MOST_PATHS)
@@ -126,7 +124,7 @@ def draw_better(
     typical = replicate is None
     replicate = typical_replicate(tally, condition) if replicate is None else replicate
     column = f"coverage_{tally.measure}"
-    rows = _rows_of(tally, condition, replicate)
+    rows = tally.rows_of(condition, replicate)
     n_individuals = rows.height
     best = (
         rows.sort(column, descending=True, maintain_order=True)
@@ -149,7 +147,7 @@ def draw_better(
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
 
     def draw(width: float) -> Figure:
-        figure, places = _panels(len(paths) + 1, arena, width)
+        figure, places = panels_of(len(paths) + 1, arena, width)
         short = width < 6
         for path, axes in zip(paths, places, strict=False):
             draw_arena(axes, arena, *arena_extent(arena))
@@ -166,38 +164,13 @@ def draw_better(
     return draw_wide(draw, name, caption, alt + ".")
 
 
-def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:
-    rows = tally.folder.read(condition, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition, replicate))
-    return rows
-
-
 # drawing
-
-
-def _panels(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
-    """A figure with room for n panels in rows of two or three, with a line of text below each."""
-    n_columns = 3 if width >= 6 else 2
-    x_range, y_range = arena_extent(arena)
-    gap, text_height = 0.2, 0.36
-    panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
-    panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    figure = new_figure(width, math.ceil(n / n_columns) * (panel_height + text_height))
-    places = []
-    for index in range(n):
-        row, column = divmod(index, n_columns)
-        x = 0.02 + column * (panel_width + gap)
-        places.append(
-            place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
-        )
-    return figure, places
 
 
 def _draw_generations(
     panels: list[list[TracedPath]], arena: Arena, body: Body, label: str, width: float
 ) -> Figure:
-    figure, places = _panels(len(panels) + 1, arena, width)
+    figure, places = panels_of(len(panels) + 1, arena, width)
     small = width < 6
     for panel, axes in zip(panels, places, strict=False):
         draw_arena(axes, arena, *arena_extent(arena))

@@ -14,7 +14,7 @@ from realitygap.errors import RecordError, did_you_mean
 from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in_motion, play, save_movie
 from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
 from realitygap.report._driven import driven_paths, refuse_replay
-from realitygap.report._path_figure import no_such_run, typical_replicate
+from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
@@ -144,9 +144,7 @@ def _several(
     name = tally.name_of(condition)
     tally.condition(name)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
-    rows = tally.folder.read(name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, name, replicate))
+    rows = tally.rows_of(name, replicate)
     if each == "individual":
         first = choose_trial(tally, name, replicate, generation)
         generation = int(first.row["generation"])

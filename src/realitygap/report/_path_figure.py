@@ -125,9 +125,7 @@ def typical_replicate(tally: Tally, condition: str) -> int:
 def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[TracedPath], str]:
     """The best trial of each generation shown, and why trials could not be recomputed (empty: they could)."""
     column = tally.score_column(condition.name)
-    rows = tally.folder.read(condition.name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition.name, replicate))
+    rows = tally.rows_of(condition.name, replicate)
     best = rows.filter(pl.col(column) == pl.col(column).max().over("generation")).unique(
         "generation", keep="first", maintain_order=True
     )
@@ -136,15 +134,6 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
         np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
     )
     return trace_paths(tally, condition, best[shown], f"coverage_{tally.measure}")
-
-
-def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
-    """What to say of a run that is not there."""
-    there = [int(run) for run in tally.replicates(condition)]
-    has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
-    if there and there != list(range(there[0], there[-1] + 1)):
-        has += f", {len(there)} of them"
-    return f"Condition {condition!r} has no run {replicate} in {tally.folder.path}: {has}."
 
 
 def trace_paths(
@@ -208,24 +197,31 @@ def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], proble
 
 
 def _draw(paths: list[TracedPath], arena: Arena, body: Body, label: str, width: float) -> Figure:
+    figure, places = panels_of(len(paths) + 1, arena, width)
+    for path, axes in zip(paths, places, strict=False):
+        draw_arena(axes, arena, *arena_extent(arena))
+        draw_path(axes, path, arena, body)
+        _write_below(axes, path, arena, label)
+    draw_path_legend(places[-1], paths, small=width < 6)
+    return figure
+
+
+def panels_of(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
+    """A figure with room for n panels in rows of two or three, with a line of text below each."""
     n_columns = 3 if width >= 6 else 2
-    n_rows = math.ceil((len(paths) + 1) / n_columns)
     x_range, y_range = arena_extent(arena)
     gap, text_height = 0.2, 0.36
     panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
     panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    figure = new_figure(width, n_rows * (panel_height + text_height))
-    for index in range(len(paths) + 1):
+    figure = new_figure(width, math.ceil(n / n_columns) * (panel_height + text_height))
+    places = []
+    for index in range(n):
         row, column = divmod(index, n_columns)
         x = 0.02 + column * (panel_width + gap)
-        axes = place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
-        if index < len(paths):
-            draw_arena(axes, arena, x_range, y_range)
-            draw_path(axes, paths[index], arena, body)
-            _write_below(axes, paths[index], arena, label, panel_width)
-        else:
-            draw_path_legend(axes, paths, small=width < 6)
-    return figure
+        places.append(
+            place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
+        )
+    return figure, places
 
 
 def arena_extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -331,10 +327,10 @@ def body_outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
     return placed
 
 
-def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str, width: float) -> None:
+def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str) -> None:
     n_cells = arena.grid.n_cells
     figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
-    if width > 2.5:
+    if axes.bbox.width > 2.5 * axes.figure.dpi:
         figure_text = f"{shorten(label, 12)}, coverage {figure_text}"
     else:
         figure_text = f"{path.coverage:.3f} {shorten(label, 12)}"

@@ -20,7 +20,6 @@ from realitygap.report._drawing import (
     place_axes,
     shorten,
 )
-from realitygap.report._path_figure import no_such_run
 from realitygap.report._structures import selection_of
 from realitygap.report._tally import Results, Tally, label_of, read_tally
 
@@ -119,9 +118,7 @@ def draw_species(
         if most.is_empty():
             raise ValueError(f"Condition {condition!r} has no runs yet.")
         replicate = int(most["replicate"][int(most["species"].arg_max() or 0)])
-    rows = tally.folder.read(condition, [replicate], ["generation", "species"])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition, replicate))
+    rows = tally.rows_of(condition, replicate, ["generation", "species"])
     shares = _shares(rows)
     means = species.mean_by_selection(tally)
     n_runs = tally.runs.height

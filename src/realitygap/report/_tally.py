@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -112,6 +112,21 @@ class Tally:
         values = np.full((run[-1] + 1, generation.max() + 1), np.nan)
         values[run, generation] = rows[measure].to_numpy()
         return values
+
+    def rows_of(self, condition: str, replicate: int, columns: Sequence[str] | None = None) -> pl.DataFrame:
+        """All rows of one run.
+
+        Raises:
+            ValueError: there is no such run.
+        """
+        rows = self.folder.read(condition, [replicate], columns)
+        if not rows.is_empty():
+            return rows
+        there = [int(run) for run in self.replicates(condition)]
+        has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
+        if there and there != list(range(there[0], there[-1] + 1)):
+            has += f", {len(there)} of them"
+        raise ValueError(f"Condition {condition!r} has no run {replicate} in {self.folder.path}: {has}.")
 
     def n_trials(self, condition: str | None = None) -> int:
         """How many individuals were tried, in one condition or in all."""

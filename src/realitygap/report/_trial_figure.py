@@ -25,7 +25,6 @@ from realitygap.report._path_figure import (
     arena_extent,
     draw_arena,
     draw_path,
-    no_such_run,
     typical_replicate,
 )
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
@@ -96,9 +95,7 @@ def choose_trial(
         if number is not None:
             whole_number(what, number)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
-    rows = tally.folder.read(name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, name, replicate))
+    rows = tally.rows_of(name, replicate)
     if individual is not None and generation is None:
         raise ValueError(f"Individual {individual} of which generation? Name it too.")
     last = int(rows["generation"].max())  # type: ignore[arg-type]

@@ -14,6 +14,7 @@ import polars as pl
 from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError
 from realitygap.platforms import is_physical
+from realitygap.playback import placed
 from realitygap.report._drawing import (
     Drawing,
     draw_dots,
@@ -29,7 +30,7 @@ from realitygap.report._drawing import (
 from realitygap.report._driven import driven_paths
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of, task_of
 from realitygap.runs import Condition, replay
-from realitygap.world import Arena, Body, Pose
+from realitygap.world import Arena, Body
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -277,7 +278,7 @@ def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> 
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     for start in arena.starts:
-        outline = body_outline(body, start)
+        outline = placed([*body.corners, body.corners[0]], start)
         draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
         draw_dots(axes, [start.x], [start.y], 3.4, color=Ink.TEXT, zorder=7)
 
@@ -316,15 +317,6 @@ def _draw_track(
         markeredgewidth=1.2,
         zorder=6,
     )
-
-
-def body_outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
-    """(b + 1, 2) the body's corners at a pose [m], closed."""
-    corners = np.array([*body.corners, body.corners[0]])
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    turn = np.array([[cosine, sine], [-sine, cosine]])
-    placed: npt.NDArray[np.float64] = corners @ turn + np.array([pose.x, pose.y])
-    return placed
 
 
 def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str) -> None:

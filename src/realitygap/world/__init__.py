@@ -29,12 +29,12 @@ from ._part import MOST_CORNERS, Part, rounded, why_no_part
 from ._pictures import (
     arena_picture,
     dimension_line,
+    extent_of,
     floor_shapes,
-    goal_shapes,
     length_text,
-    light_shapes,
     obstacle_shapes,
     robot_picture,
+    things_in,
 )
 from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
@@ -80,12 +80,11 @@ __all__ = [
     "dimension_line",
     "distance_to_segment",
     "enclosing_walls",
+    "extent_of",
     "floor_shapes",
-    "goal_shapes",
     "in_si",
     "is_inside",
     "length_text",
-    "light_shapes",
     "load_arena",
     "load_calibration",
     "load_robot",
@@ -97,5 +96,6 @@ __all__ = [
     "robot_names",
     "robot_picture",
     "rounded",
+    "things_in",
     "why_no_part",
 ]

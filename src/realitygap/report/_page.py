@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +44,7 @@ from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.report._task_summary import summarize_tasks
+from realitygap.report._template import render_page
 from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
@@ -134,19 +134,7 @@ def _check_out(path: Path) -> None:
 
 
 def _render(content: Mapping[str, Any]) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("realitygap.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["share"] = _share
-    environment.filters["count"] = _count
-    environment.filters["score"] = _score
-    return environment.get_template("report.html.jinja").render(content)
+    return render_page("report.html.jinja", content, share=_share, count=_count, score=_score)
 
 
 def _content(tally: Tally) -> dict[str, Any]:
@@ -164,9 +152,6 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
     return {
         "title": description.get("title") or description.get("name") or "A study",
         "name": description.get("name") or "–",
-        "css": resources.files("realitygap.report")
-        .joinpath("templates/report.css")
-        .read_text(encoding="utf-8"),
         "banners": _banners(tally),
         "facts": _facts(tally),
         "labels": _labels(tally),
@@ -188,7 +173,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "scores": _score_figures(tally),
         "paths": _path_figures(tally),
         "choices": _choices_figure(tally),
-        "gallery": _gallery.content(tally, _on_page),
+        "gallery": _gallery.content(tally, on_page),
         "replay": replay_content(tally),
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
@@ -200,7 +185,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # figures
 
 
-def _on_page(anchor: str, title: str, drawing: Drawing) -> FigureOnPage:
+def on_page(anchor: str, title: str, drawing: Drawing) -> FigureOnPage:
     from markupsafe import Markup
 
     pictures = (Markup(inline(drawing.svg)), Markup(inline(drawing.in_width(NARROW).svg)))
@@ -208,7 +193,7 @@ def _on_page(anchor: str, title: str, drawing: Drawing) -> FigureOnPage:
 
 
 def _coverage_figure(tally: Tally) -> FigureOnPage:
-    return _on_page("figure-4", "Figure 4", draw_coverage(tally))
+    return on_page("figure-4", "Figure 4", draw_coverage(tally))
 
 
 def _score_figures(tally: Tally) -> list[FigureOnPage]:
@@ -216,7 +201,7 @@ def _score_figures(tally: Tally) -> list[FigureOnPage]:
     drawn = draw_scores(tally.folder)
     numbers = ["Figure S"] if len(drawn) == 1 else [f"Figure S{k + 1}" for k in range(len(drawn))]
     return [
-        _on_page(f"figure-scores-{k}", number, drawing)
+        on_page(f"figure-scores-{k}", number, drawing)
         for k, (number, drawing) in enumerate(zip(numbers, drawn, strict=True))
     ]
 
@@ -236,7 +221,7 @@ def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
             )
         else:
-            found.append(_on_page(anchor, number, drawn))
+            found.append(on_page(anchor, number, drawn))
     return found
 
 
@@ -254,7 +239,7 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
 def _choices_figure(tally: Tally) -> FigureOnPage | None:
     if not compare_choices(tally):
         return None
-    return _on_page("figure-10", "Figure 10", draw_choices(tally))
+    return on_page("figure-10", "Figure 10", draw_choices(tally))
 
 
 # words

@@ -18,7 +18,6 @@ from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
 from realitygap.records import Observe, ObservedTrial
 from realitygap.robots import Command, Label, channels_of, select_channels
-from realitygap.robots.twin import cells_along
 from realitygap.tasks import TraceArrays
 from realitygap.trials import (
     NoiseKey,
@@ -34,7 +33,7 @@ from realitygap.trials import (
     counters_of,
     run_trial,
 )
-from realitygap.world import Arena, Pose
+from realitygap.world import Arena, Pose, cells_along
 
 from ._fleet import Array, Outline, is_signed, limited_commands
 

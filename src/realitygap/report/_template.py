@@ -29,5 +29,5 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
 
 
 def template_text(name: str) -> str:
-    """The text of a file beside the templates."""
+    """The text of a file in the folder of templates."""
     return resources.files("realitygap.report").joinpath(f"templates/{name}").read_text(encoding="utf-8")

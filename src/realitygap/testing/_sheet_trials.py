@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import NeatSettings, Population
 from realitygap.platforms import SimPlatform, SimTarget
-from realitygap.robots.twin import cells_along
 from realitygap.trials import TrialPlan
-from realitygap.world import Arena, Grid, Pose
+from realitygap.world import Arena, Pose
 
 PARTS = 12  # points on the arc of one command
 BY_HAND = (
@@ -70,13 +69,3 @@ def along_arcs(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = chord * (u + 1j * v)
         points.append(np.column_stack([x + moved.real, y + moved.imag]))
     return np.concatenate(points)
-
-
-def cells_along_path(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
-    """The cells that a path crosses, as the records count them, in order of first visit.
-
-    Args:
-        path: (n, 2) x and y [m].
-        grid: Of cells.
-    """
-    return cells_along(path, grid)

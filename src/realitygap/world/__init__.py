@@ -42,6 +42,7 @@ from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
+from ._visited import VisitedCells, cells_along
 
 __all__ = [
     "BARE_FLOOR",
@@ -73,8 +74,10 @@ __all__ = [
     "RangeSensors",
     "RobotModel",
     "Segment",
+    "VisitedCells",
     "arena_names",
     "arena_picture",
+    "cells_along",
     "check_drawn_starts",
     "check_start",
     "dimension_line",

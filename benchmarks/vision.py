@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.testing import Difficulty, cells_along_path, driven_paths, photograph_sheet
+from realitygap.testing import Difficulty, driven_paths, photograph_sheet
 from realitygap.vision import SheetLayout, read_photo, score_sheet
-from realitygap.world import paper_arena
+from realitygap.world import cells_along, paper_arena
 
 GENERATIONS = 5  # sheets of an evolution
 FIRST_JUDGED = 1  # seed of the first evolution that is judged
@@ -102,7 +102,7 @@ def read_one(job: tuple[int, int, float, bool]) -> list[Read]:
     found = []
     for trace, path in zip(score.traces, paths, strict=True):
         truth = np.zeros(arena.grid.n_cells, np.bool_)
-        truth[list(cells_along_path(path, arena.grid))] = True
+        truth[list(cells_along(path, arena.grid))] = True
         found.append(Read(number, trace.pen, truth, trace.probability, trace.features, seconds))
     return found
 

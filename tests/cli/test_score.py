@@ -13,9 +13,9 @@ import pytest
 
 from realitygap.cli import main
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.testing import cells_along_path, photograph_sheet
+from realitygap.testing import photograph_sheet
 from realitygap.vision import SheetLayout
-from realitygap.world import paper_arena
+from realitygap.world import cells_along, paper_arena
 
 from .fake_port import STUDY, open_fake
 
@@ -84,7 +84,7 @@ def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, comma
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         for trial, line in zip(ledger.trials(), lines, strict=True):
             assert trial.state == "scored"
-            known = set(cells_along_path(line, paper_arena().grid))
+            known = set(cells_along(line, paper_arena().grid))
             assert len(known & set(trial.cells)) / len(known | set(trial.cells)) > 0.9
         events = [event for event in ledger.events() if event["what"] == "scored"]
     digest = hashlib.sha256(photo.read_bytes()).hexdigest()
@@ -127,7 +127,7 @@ def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
     told = json.loads(done.stdout)
     assert [trace["pen"] for trace in told["traces"]] == ["red", "blue"]
     for trace, line in zip(told["traces"], lines, strict=True):
-        known = set(cells_along_path(line, paper_arena().grid))
+        known = set(cells_along(line, paper_arena().grid))
         assert len(known & set(trace["cells"])) / len(known | set(trace["cells"])) > 0.9
         assert len(trace["confidence"]) == len(trace["cells"])
     assert (tmp_path / "seen.png").exists()

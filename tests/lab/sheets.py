@@ -13,14 +13,13 @@ from realitygap.study import drive_study, parse_study
 from realitygap.testing import (
     Film,
     FilmedCamera,
-    cells_along_path,
     path_through,
     photograph_sheet,
     save_film,
 )
 from realitygap.trials import PATH_PARTS, Card, DrivenTrial
 from realitygap.vision import SheetLayout
-from realitygap.world import paper_arena
+from realitygap.world import cells_along, paper_arena
 from tests.study.physical import Unattended
 
 from .robot_study import FAST, TEXT
@@ -81,4 +80,4 @@ def _photograph(*lines: bytes) -> bytes:
 
 
 def true_cells(line: np.ndarray) -> set[int]:
-    return set(cells_along_path(line, paper_arena().grid))
+    return set(cells_along(line, paper_arena().grid))

@@ -29,7 +29,7 @@ def test_every_figure_says_label_and_number_of_runs(tiny_study):
 @pytest.mark.parametrize("draw", [draw_coverage, draw_paths, draw_choices])
 def test_drawing_twice_gives_the_same_bytes(tiny_study, draw):
     assert draw(tiny_study).svg == draw(tiny_study).svg
-    assert draw(tiny_study, width=NARROW).svg != draw(tiny_study).svg
+    assert draw(tiny_study).in_width(NARROW).svg != draw(tiny_study).svg
 
 
 def test_user_settings_of_matplotlib_neither_matter_nor_change(tiny_study):

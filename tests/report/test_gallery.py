@@ -17,6 +17,7 @@ from realitygap.evolution import network_picture
 from realitygap.platforms import JyroPlatform
 from realitygap.report import (
     NARROW,
+    _arena_figure,
     draw_individuals,
     draw_lineage,
     draw_networks,
@@ -25,10 +26,9 @@ from realitygap.report import (
     save_drawing,
     write_report,
 )
-from realitygap.report._arena_figure import draw_tally_arena
-from realitygap.report._drawing import WIDE, inline
+from realitygap.report._drawing import inline
 from realitygap.report._export import tables_of
-from realitygap.report._individuals_figure import _moved_apart, draw_tally_better
+from realitygap.report._individuals_figure import _moved_apart, draw_better
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._tally import read_tally
@@ -38,14 +38,14 @@ from realitygap.world import arena_picture, paper_arena
 from tests.report.results import describe, random_runs, write_results
 
 
-def draw_arena_and_robot(folder, condition=None, *, width=WIDE):
+def draw_arena_and_robot(folder, condition=None):
     tally = read_tally(folder)
-    return draw_tally_arena(tally, tally.name_of(condition), widths=[width])[0]
+    return _arena_figure.draw_arena_and_robot(tally, tally.name_of(condition), name="arena")
 
 
-def draw_better_individuals(folder, condition=None, replicate=None, *, width=WIDE):
+def draw_better_individuals(folder, condition=None, replicate=None):
     tally = read_tally(folder)
-    return draw_tally_better(tally, tally.name_of(condition), replicate, widths=[width])[0]
+    return draw_better(tally, tally.name_of(condition), replicate)
 
 
 ALL = [
@@ -90,7 +90,7 @@ def test_figures_are_sound_alone_and_on_a_page(tiny_study, draw):
 
 @pytest.mark.parametrize("draw", ALL[:-1])
 def test_narrow_figures_are_others(tiny_study, draw):
-    assert draw(tiny_study, width=NARROW).svg != draw(tiny_study).svg
+    assert draw(tiny_study).in_width(NARROW).svg != draw(tiny_study).svg
 
 
 def test_all_individuals_of_all_generations_are_drawn(tiny_study):

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
-from realitygap.testing import Difficulty, SheetPhotograph, cells_along_path, photograph_sheet
+from realitygap.testing import Difficulty, SheetPhotograph, photograph_sheet
 from realitygap.vision import SheetLayout
-from realitygap.world import paper_arena
+from realitygap.world import cells_along, paper_arena
 
 ARENA = paper_arena()
 LAYOUT = SheetLayout.of(ARENA)
@@ -27,7 +27,7 @@ def curve(number: int) -> np.ndarray:
 
 
 def truth(path: np.ndarray) -> set[int]:
-    return set(cells_along_path(path, ARENA.grid))
+    return set(cells_along(path, ARENA.grid))
 
 
 @cache

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich import box
 from rich.table import Table
 from rich.text import Text
+
+from ._tables import table_of
 
 if TYPE_CHECKING:
     from realitygap.report import Audit, Interval
@@ -16,7 +17,7 @@ _PROBLEMS = {"impossible": "no k/{n}", "cut": "cut, not rounded", "raised": "rai
 
 def conditions_table(audit: Audit, title: str) -> Table:
     """One row a condition."""
-    table = _table(title)
+    table = table_of(title)
     _columns(table, ["condition"], ["runs", "mean", "sd", "median", "its 95 % interval"])
     for each in audit.conditions:
         median = (
@@ -34,7 +35,7 @@ def conditions_table(audit: Audit, title: str) -> Table:
 def doubtful_table(audit: Audit) -> Table:
     """One row a value that is not the rounded share that it should be."""
     n = audit.denominator or 1
-    table = _table(f"Values that are not k/{n}, rounded")
+    table = table_of(f"Values that are not k/{n}, rounded")
     _columns(table, ["line", "condition", "run", "value", "problem", "nearest"], [])
     for each in audit.doubtful:
         digits = len(each.text.partition(".")[2]) + 1
@@ -52,13 +53,12 @@ def doubtful_table(audit: Audit) -> Table:
 
 def pairs_table(audit: Audit) -> Table:
     """One row for each two conditions."""
-    table = _table("Each two conditions")
-    table.caption = Text(
+    table = table_of(
+        "Each two conditions",
         "A12: how likely a run of the first is above one of the second, [95 % interval]; p by permutation, "
         "Holm's over all pairs; least p: the smallest that so many runs can give; finds: the smallest "
-        "difference found in 80 of 100 studies, in standard deviations"
+        "difference found in 80 of 100 studies, in standard deviations",
     )
-    table.caption_justify = "left"
     _columns(table, ["pair"], ["A12", "p", "Holm", "least p", "finds"])
     table.add_column("what may be said", min_width=14)
     for each in audit.pairs:
@@ -77,10 +77,6 @@ def pairs_table(audit: Audit) -> Table:
 
 def _interval(interval: Interval | None) -> str:
     return "[none]" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
-
-
-def _table(title: str) -> Table:
-    return Table(title=Text(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
 
 
 def _columns(table: Table, words: list[str], numbers: list[str]) -> None:

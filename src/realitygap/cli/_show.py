@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -107,7 +108,12 @@ def show(
         raise StudyError("Where to? Name a file with -o, such as -o run.svg.")
     from realitygap.report import save_arena, save_robot, save_view
 
-    numbers = (replicate, generation, individual)
+    numbers: dict[str, Any] = {
+        "condition": condition,
+        "replicate": replicate,
+        "generation": generation,
+        "individual": individual,
+    }
     try:
         if what != "movie":
             _refuse(what, ("--each", "--speed"), each, speed)
@@ -116,29 +122,21 @@ def show(
         if what != "arena":
             _refuse(what, ("--robot",), robot)
         if what == "movie":
-            typer.echo(f"Written: {_movie(names, out, each, speed, condition, *numbers)}")
+            typer.echo(f"Written: {_movie(names, out, each, speed, numbers)}")
             return
         name = _one_name(what, names)
         if what == "divergence":
-            typer.echo(f"Written: {_divergence(name, out, against, repeats, condition, *numbers)}")
+            typer.echo(f"Written: {_divergence(name, out, against, repeats, numbers)}")
             return
         if what in ("arena", "robot"):
-            _refuse(what, _NUMBERS, condition, *numbers)
+            _refuse(what, [f"--{key}" for key in numbers], *numbers.values())
             is_arena = what == "arena"
             path = (
                 save_arena(out, name or "paper", robot=robot) if is_arena else save_robot(out, name or "jyro")
             )
         else:
             subject, folder = _subject(what, name, out)
-            path = save_view(
-                folder,
-                out,
-                subject=subject,
-                condition=condition,
-                replicate=replicate,
-                generation=generation,
-                individual=individual,
-            )
+            path = save_view(folder, out, subject=subject, **numbers)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     typer.echo(f"Written: {path}")
@@ -166,10 +164,7 @@ def _movie(
     out: Path,
     each: str | None,
     speed: float | None,
-    condition: str | None,
-    replicate: int | None,
-    generation: int | None,
-    individual: int | None,
+    numbers: dict[str, Any],
 ) -> Path:
     from realitygap.report import write_movie
 
@@ -177,16 +172,8 @@ def _movie(
         raise StudyError(
             f"Of which results? Name a folder: realitygap show movie results/paper -o {shlex.quote(str(out))}"
         )
-    return write_movie(
-        names,
-        out,
-        each=cast("Each | None", each),
-        condition=condition,
-        replicate=replicate,
-        generation=generation,
-        individual=individual,
-        speed=1.0 if speed is None else speed,
-    )
+    chosen = cast("Each | None", each)
+    return write_movie(names, out, each=chosen, speed=1.0 if speed is None else speed, **numbers)
 
 
 def _divergence(
@@ -194,10 +181,7 @@ def _divergence(
     out: Path,
     against: str | None,
     repeats: int | None,
-    condition: str | None,
-    replicate: int | None,
-    generation: int | None,
-    individual: int | None,
+    numbers: dict[str, Any],
 ) -> Path:
     from realitygap.report import save_divergence
 
@@ -206,16 +190,7 @@ def _divergence(
             "Of which results, and tried on what beside its own condition? realitygap show divergence results/paper "
             f"--against novelty-10 -o {shlex.quote(str(out))}"
         )
-    return save_divergence(
-        name,
-        out,
-        against=against,
-        condition=condition,
-        replicate=replicate,
-        generation=generation,
-        individual=individual,
-        repeats=30 if repeats is None else repeats,
-    )
+    return save_divergence(name, out, against=against, repeats=30 if repeats is None else repeats, **numbers)
 
 
 def _one_name(what: str, names: list[str] | None) -> str | None:
@@ -226,10 +201,7 @@ def _one_name(what: str, names: list[str] | None) -> str | None:
     return names[0] if names else None
 
 
-_NUMBERS = ("--condition", "--replicate", "--generation", "--individual")
-
-
-def _refuse(what: str, options: tuple[str, ...], *given: object) -> None:
+def _refuse(what: str, options: Sequence[str], *given: object) -> None:
     surplus = [name for name, value in zip(options, given, strict=True) if value is not None]
     if surplus:
         raise StudyError(f"Of no meaning for {what}: {', '.join(surplus)}. Leave that out.")

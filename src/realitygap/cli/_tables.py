@@ -17,16 +17,10 @@ if TYPE_CHECKING:
 def summary_table(summary: pl.DataFrame, title: str) -> Table:
     """Best coverage of a run: one row a condition, along the line and at the ends of steps."""
     labels = ", ".join(sorted(set(summary["label"].to_list())))
-    table = Table(
-        title=Text(f"{title}\nBest coverage of a run, share of the reachable cells ({labels})"),
-        caption=Text(
-            "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses, "
-            "ends: cells in which steps end"
-        ),
-        title_justify="left",
-        caption_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
+    table = table_of(
+        f"{title}\nBest coverage of a run, share of the reachable cells ({labels})",
+        "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses, "
+        "ends: cells in which steps end",
     )
     table.add_column("condition", overflow="fold")
     table.add_column("runs", justify="right", no_wrap=True)
@@ -53,16 +47,10 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
     """Best fitness of a run by its task: one row a condition, and how far evolution brought it."""
     labels = ", ".join(sorted(set(summary["label"].to_list())))
     tasks = ", ".join(dict.fromkeys(summary["task"].to_list()))
-    table = Table(
-        title=Text(f"{title}\nFitness by the task {tasks} ({labels})"),
-        caption=Text(
-            "first, last: median of the best in the first and in the last generation; run: of the best of a whole run, "
-            "median [its interval, at least 95 %] and quartiles"
-        ),
-        title_justify="left",
-        caption_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
+    table = table_of(
+        f"{title}\nFitness by the task {tasks} ({labels})",
+        "first, last: median of the best in the first and in the last generation; run: of the best of a whole run, "
+        "median [its interval, at least 95 %] and quartiles",
     )
     table.add_column("condition", overflow="fold")
     for name in ("runs", "first", "last"):
@@ -80,14 +68,9 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
 
 def calibration_table(calibration: Calibration) -> Table:
     """What was fitted: one row a parameter, with its interval and whether it is identified."""
-    table = Table(
-        title=Text(
-            f"Calibration of {calibration.kind}, {calibration.target} ({calibration.label}), {calibration.trials} "
-            f"trials, observed: {calibration.observe}"
-        ),
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
+    table = table_of(
+        f"Calibration of {calibration.kind}, {calibration.target} ({calibration.label}), {calibration.trials} "
+        f"trials, observed: {calibration.observe}"
     )
     table.add_column("parameter", overflow="fold")
     table.add_column("estimate", justify="right", no_wrap=True)
@@ -97,6 +80,18 @@ def calibration_table(calibration: Calibration) -> Table:
         cells = [each.name, f"{each.estimate:.4g} {each.unit}".rstrip(), f"{each.low:.3g} to {each.high:.3g}"]
         table.add_row(*(Text(cell) for cell in cells), Text("yes" if each.identified else "no"))
     return table
+
+
+def table_of(title: str, caption: str = "") -> Table:
+    """A table without columns yet."""
+    return Table(
+        title=Text(title),
+        caption=Text(caption) if caption else None,
+        title_justify="left",
+        caption_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+    )
 
 
 def _number(value: float | None) -> str:

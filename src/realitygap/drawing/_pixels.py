@@ -9,13 +9,12 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ._ink import Ink
+from ._picture import Disc, Line, Picture, Point, Text
 from ._x11 import rgb_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw
-
-    from ._picture import Disc, Line, Picture, Point, Text
 
 FINER = 3
 """How many times finer shapes are drawn than shown, in both directions: that smooths their edges."""
@@ -60,8 +59,6 @@ class _Pen:
         self.point = width / _POINTS  # pixels for each pt
 
     def draw(self) -> None:
-        from ._picture import Disc, Line
-
         for shape in self.picture.shapes:
             if isinstance(shape, Line):
                 self.line(shape)

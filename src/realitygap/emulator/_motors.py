@@ -23,7 +23,6 @@ HALF_MM = 0.0005  # the S2's unit of distance [m]
 COUNT = HALF_MM / 2  # the S2's encoders [m]
 CIRCLE = 955  # units that each wheel of an S2 drives for a full turn on the spot
 S2_SPACING = CIRCLE * HALF_MM / math.pi  # 152 mm
-STEP_SPEED = COUNT / 0.020  # one step of speed: a count in 20 ms [m/s]
 PATH_SPEED = 7  # until a client chooses another; Myro's default
 TOP_STEP = 15
 STATISTICS_NS = 100 * MILLISECOND

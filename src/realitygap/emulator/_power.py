@@ -11,7 +11,6 @@ CAPACITY_AS = 2.0 * 3600  # of fresh AA cells [A s]; chosen
 IDLE_A, MOTORS_A = 0.15, 0.35  # chosen
 OWN_SAG = 0.015  # share of the voltage that fresh cells lose under full load; chosen
 DROP_OUT_VOLTS = 5.5  # below it Bluetooth drops out; chosen
-LOW_VOLTS = 6.15
 
 
 class Battery:

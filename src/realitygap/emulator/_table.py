@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 
-import numpy as np
-
-from realitygap.world import Arena, Grid, Pose
+from realitygap.world import Arena, Pose, VisitedCells
 
 from ._motors import STEP_NS, STEP_S, Motors
 from ._power import Battery
@@ -80,7 +77,7 @@ class Table:
     def _begin_path(self) -> None:
         self.points = array("d")  # time [s], x, y [m], heading [rad] of each point
         self._n_followed = 0  # points whose cells have been noted
-        self._cells: CellsOnLine | None = None
+        self._cells: VisitedCells | None = None
         self._note()
 
     def _note(self) -> None:
@@ -94,46 +91,8 @@ class Table:
 
     def cells(self) -> tuple[int, ...]:
         """The cells of the grid along the line since the robot was placed, in order of first visits."""
-        self._cells = self._cells or CellsOnLine(self.arena.grid)
-        self._cells.follow(self.points[4 * self._n_followed :])
+        self._cells = self._cells or VisitedCells(self.arena.grid)
+        points = self.points[4 * self._n_followed :]
+        self._cells.follow(zip(points[1::4], points[2::4], strict=True))
         self._n_followed = len(self.points) // 4
-        return self._cells.visited
-
-
-class CellsOnLine:
-    """The cells that a line visits, which comes piece by piece.
-
-    Args:
-        grid: Of cells.
-    """
-
-    def __init__(self, grid: Grid) -> None:
-        self._grid = grid
-        self._found = np.zeros(grid.n_cells, dtype=np.bool_)
-        self._order = np.zeros(grid.n_cells, dtype=np.int64)
-        self._n = 0
-        self._at: tuple[float, float] | None = None
-
-    def follow(self, points: array[float]) -> None:
-        """Go on along points of time, x, y and heading each."""
-        from realitygap.kernels.tasks.coverage import (  # compiled code takes a while to import
-            to_grid,
-            visit,
-            visit_line,
-        )
-
-        grid = self._grid
-        size = (grid.columns, grid.rows)
-        for k in range(0, len(points), 4):
-            at = to_grid(points[k + 1], grid.x, grid.cell), to_grid(points[k + 2], grid.y, grid.cell)
-            cell = (math.floor(at[0]), math.floor(at[1]))
-            if self._at is None:
-                self._n = int(visit(*cell, *size, self._found, self._order, self._n))
-            elif cell != (math.floor(self._at[0]), math.floor(self._at[1])):
-                self._n = int(visit_line(*self._at, *at, *size, self._found, self._order, self._n))
-            self._at = at
-
-    @property
-    def visited(self) -> tuple[int, ...]:
-        """In order of first visits."""
-        return tuple(self._order[: self._n].tolist())
+        return self._cells.cells

@@ -7,7 +7,7 @@ from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means
 from ._correlation import attenuated, reliability, spearman, trials_for_reliability
 from ._coverage_map import CoverageMaps, coverage_maps
 from ._energy import energy_distances, energy_test, smallest_energy_p
-from ._equivalence import Equivalence, controllers_for_margin, equivalence_power, prove_equivalence
+from ._equivalence import Equivalence, controllers_for_margin, equivalence_power, fewest, prove_equivalence
 from ._estimate import CONFIDENCE, Estimate
 from ._level import mean_difference, rms_of, shares_above, square_differences
 from ._means import difference_of_groups, mean_of
@@ -67,6 +67,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "prove_equivalence",
     "equivalence_power",
     "controllers_for_margin",
+    "fewest",
     "Needed",
     "check_plan",
     "plan_effect",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,15 +103,19 @@ def controllers_for_margin(
     margin: float, spread: float, difference: float = 0.0, power: float = POWER
 ) -> int | None:
     """The fewest controllers that show equivalence so often; None where 100,000 do not."""
-    low, high = 1, 2
-    while equivalence_power(margin, spread, high, difference) < power:
+    return fewest(lambda n: equivalence_power(margin, spread, n, difference), power)
+
+
+def fewest(
+    power_of: Callable[[int], float], power: float, smallest: int = 2, most: int = MOST_CONTROLLERS
+) -> int | None:
+    """The smallest n, from `smallest` on, of which a growing function reaches a power; None if above `most`."""
+    low, high = smallest - 1, smallest
+    while power_of(high) < power:
         low, high = high, 2 * high
-        if low > MOST_CONTROLLERS:
+        if low > most:
             return None
     while high - low > 1:
         middle = (low + high) // 2
-        if equivalence_power(margin, spread, middle, difference) < power:
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if power_of(middle) < power else (low, middle)
     return high

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from realitygap import _special as special
 
 from ._bootstrap import SMALLEST_N
 from ._correlation import attenuated, spearman
-from ._equivalence import controllers_for_margin
+from ._equivalence import controllers_for_margin, fewest
 from ._side import Values
 
 ALPHA = 0.05
@@ -79,7 +78,7 @@ def plan_effect(
     check_plan(power, effect=effect)
     _check(noise=noise + spread)
     sd = spread_of_differences(spread, noise, trials)
-    n = _fewest(lambda n: _t_power(effect / sd, n), power, smallest=SMALLEST_N)
+    n = fewest(lambda n: _t_power(effect / sd, n), power, smallest=SMALLEST_N)
     if n is None:
         return Needed(trials, None)
     means, errors = _simulated(effect, sd, n, seed)
@@ -124,7 +123,7 @@ def plan_correlation(
     """
     check_plan(power, correlation=correlation, least=least)
     seen, floor = (attenuated(each, reliability, reliability) for each in (correlation, least))
-    n = _fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
+    n = fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
     while n is not None and n <= MOST:
         found = _simulated_correlations(correlation, reliability, floor, n, seed)
         share, low, high = _share(found)
@@ -173,18 +172,6 @@ def _check(**values: float) -> None:
         if not (math.isfinite(value) and 0 < value < above):
             limit = " and below 1" if above == 1.0 else ""
             raise ValueError(f"{name} is {value}, expected a number above 0{limit}.")
-
-
-def _fewest(power_of: Callable[[int], float], power: float, smallest: int = 2) -> int | None:
-    low, high = smallest - 1, smallest
-    while power_of(high) < power:
-        low, high = high, 2 * high
-        if low > MOST:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if power_of(middle) < power else (low, middle)
-    return high
 
 
 def _t_power(effect: float, n: int) -> float:

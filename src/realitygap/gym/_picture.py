@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Picture, Shape, to_image
 from realitygap.platforms import Array, Outline, Points
-from realitygap.world import Arena, floor_shapes, goal_shapes, light_shapes, obstacle_shapes
+from realitygap.world import Arena, Pose, floor_shapes, things_in
 
 WIDTH = 480
 """Width of a picture [pixels]."""
@@ -34,12 +34,10 @@ def draw_robot(
         x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
         corners = ((x, y), (x + grid.cell, y), (x + grid.cell, y + grid.cell), (x, y + grid.cell))
         shapes.append(Line(corners, None, closed=True, fill=Ink.VISITED))
-    shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
-    shapes += [shape for light in arena.lights for shape in light_shapes(light)]
-    shapes += goal_shapes(arena.goal) if arena.goal is not None else []
+    shapes += things_in(arena)
     shapes += [Line(((x1, y1), (x2, y2)), Ink.TEXT, 2.4) for x1, y1, x2, y2 in arena.walls]
     shapes.append(Line(tuple(map(tuple, path[:, :2].tolist())), Ink.OURS, 1.4))
-    pose = path[-1]
+    pose = Pose(*path[-1].tolist())
     for (ahead, left, direction), length in zip(outline.mounts, readings.tolist(), strict=True):
         far = (ahead + length * math.cos(direction), left + length * math.sin(direction))
         shapes.append(Line(_placed(((ahead, left), far), pose), Ink.PUBLISHED, 0.9))
@@ -52,13 +50,9 @@ def draw_robot(
     return np.asarray(to_image(picture, WIDTH), np.uint8).copy()
 
 
-def _placed(points: Points, pose: Array) -> Points:
-    """Return points of the robot as x and y in the arena [m]."""
-    x, y, heading = pose.tolist()
-    sine, cosine = math.sin(heading), math.cos(heading)
-    return tuple(
-        (x + ahead * cosine - left * sine, y + ahead * sine + left * cosine) for ahead, left in points
-    )
+def _placed(points: Points, pose: Pose) -> Points:
+    """Points of a robot in the arena."""
+    return tuple(pose.point(*point) for point in points)
 
 
 def _extent(arena: Arena) -> tuple[float, float, float, float]:

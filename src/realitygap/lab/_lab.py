@@ -249,8 +249,8 @@ class Lab:
             raise StudyError(
                 f"A gap cannot be named {shown(name)}: expected letters, digits, '.', '-' and '_'."
             )
-        for key in ("sim", "target", "controllers"):
-            refuse_platform(self.root, values[key])
+        for spec in (values["sim"], values["target"], values["controllers"]):
+            refuse_platform(self.root, spec)
         with self._lock:
             if names_a_port(values["target"]):
                 self.refuse_second_robot()

@@ -14,7 +14,6 @@ from realitygap.playback import pack_scene, pack_trials
 from realitygap.records import ResultsFolder
 from realitygap.report import (
     NARROW,
-    WIDE,
     Drawing,
     choose_moving,
     draw_archive,
@@ -36,7 +35,6 @@ FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "species": draw_species,
     "archive": draw_archive,
 }
-WIDTHS = {"wide": WIDE, "narrow": NARROW}
 IDLE_S = 60.0
 """After so long without a wish the process ends; the next wish begins another [s]."""
 _POLITE = 10
@@ -84,19 +82,18 @@ def _draw_all(channel: Channel, folder: Path) -> None:
     began = time.process_time()
     for name, draw in FIGURES.items():
         try:
-            drawn = [draw(folder, width=width) for width in WIDTHS.values()]
+            drawn = draw(folder)
         except (RealityGapError, ValueError) as error:
             channel.say("figure", name=name, text=str(error))
             continue
-        lists = [each if isinstance(each, list) else [each] for each in drawn]
-        for number, (wide, narrow) in enumerate(zip(*lists, strict=True)):
+        for number, wide in enumerate(drawn if isinstance(drawn, list) else [drawn]):
             channel.say(
                 "figure",
                 name=f"{name}-{number}" if number else name,
                 caption=wide.caption,
                 alt=wide.alt,
                 wide=wide.svg,
-                narrow=narrow.svg,
+                narrow=wide.in_width(NARROW).svg,
             )
     channel.say("drawn", seconds=time.process_time() - began)
 

@@ -166,9 +166,9 @@ def to_svg(simulation: Watched) -> str:
         shapes.append(Line(tuple(line), Ink.OURS, 1.4))
     pose = simulation.pose()
     shapes.append(
-        Line(tuple(_placed(pose, *corner) for corner in SCRIBBLER_BODY.corners), Ink.BODY, 1.6, closed=True)
+        Line(tuple(pose.point(*corner) for corner in SCRIBBLER_BODY.corners), Ink.BODY, 1.6, closed=True)
     )
-    nose = (_placed(pose, 0.06, 0.03), _placed(pose, 0.089, 0.0), _placed(pose, 0.06, -0.03))
+    nose = (pose.point(0.06, 0.03), pose.point(0.089, 0.0), pose.point(0.06, -0.03))
     shapes += [Line(nose, Ink.BODY, 1.6), Disc(pose.x, pose.y, 2.4, fill=Ink.OURS)]
     seen = (
         f"A robot at ({pose.x:.2f}, {pose.y:.2f}) m, facing {math.degrees(pose.heading):.0f} degrees, has visited "
@@ -218,8 +218,3 @@ def _bounds(simulation: Watched) -> tuple[float, float, float, float]:
 
 def _rectangle(x: float, y: float, size: float) -> tuple[tuple[float, float], ...]:
     return ((x, y), (x + size, y), (x + size, y + size), (x, y + size))
-
-
-def _placed(pose: Pose, forward: float, left: float) -> tuple[float, float]:
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    return (pose.x + forward * cosine - left * sine, pose.y + forward * sine + left * cosine)

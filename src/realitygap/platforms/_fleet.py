@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.trials import NoiseKey
-from realitygap.world import Arena, Body, RangeSensors, RobotModel
+from realitygap.world import SENSORS, Arena, Body, RangeSensors, RobotModel
 
 Array = NDArray[np.float64]
 Points = tuple[tuple[float, float], ...]
@@ -102,7 +102,8 @@ class Fleet(Protocol):
 
 def is_signed(name: str) -> bool:
     """Return whether an input is within -1..1, and not within 0..1."""
-    return name.partition(".")[0] in ("encoder", "last_move", "last_turn")
+    kind = name.partition(".")[0]
+    return SENSORS[kind].is_signed if kind in SENSORS else kind in ("encoder", "last_move", "last_turn")
 
 
 def limited_commands(commands: Array) -> Array:

@@ -12,7 +12,7 @@ from realitygap.world import Arena
 
 from ._platform import Opening, Platform
 from ._python import EXPECTED, PYTHON, loaded_platform
-from ._registry import platform_class, platform_names
+from ._registry import built_in_platforms, platform_class, platform_names
 
 
 def split_spec(spec: str) -> tuple[str, str]:
@@ -40,8 +40,6 @@ def class_of(spec: str) -> type[Platform]:
 
 def known_specs() -> tuple[str, ...]:
     """Return the ways to name platforms, those of other packages by their names alone."""
-    from ._registry import built_in_platforms
-
     own = [spec for each in built_in_platforms() for spec in each.specs()]
     return (
         *own,

@@ -17,8 +17,7 @@ from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface,
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
 from realitygap.records import Observe, ObservedTrial
-from realitygap.robots import Command, Label, Robot, channels_of, select_channels
-from realitygap.robots.twin import cells_along
+from realitygap.robots import Command, Label, channels_of, select_channels
 from realitygap.tasks import TraceArrays
 from realitygap.trials import (
     NoiseKey,
@@ -34,32 +33,16 @@ from realitygap.trials import (
     counters_of,
     run_trial,
 )
-from realitygap.world import Arena, Pose
+from realitygap.world import Arena, Pose, cells_along
 
 from ._fleet import Array, Outline, is_signed, limited_commands
 
 if TYPE_CHECKING:
     from ._platform import Platform
 
-MOST_NUMBER = 2**32 - 1
-"""The greatest number of a trial."""
-
-
-class SeenRobot(Robot, Protocol):
-    """A simulated robot whose pose is known.
-
-    It may also have `number`, which chooses the noise of the trial that the next `reset` begins, `visited_cells`, the
-    cells along its line in order of first visit, and `encoders`, the distance that each wheel drove [m].
-    """
-
-    @property
-    def pose(self) -> Pose:
-        """Its present pose."""
-        ...
-
 
 class FollowedRobot:
-    """A `SeenRobot` with `visited_cells`: the cells along the straight lines between its poses.
+    """A robot that knows its pose, with `visited_cells`: the cells along the straight lines between its poses.
 
     Args:
         robot: The robot, without such a list.
@@ -134,7 +117,7 @@ def trial_of(
     """Run a trial of a network.
 
     Args:
-        robot: A `SeenRobot`.
+        robot: One that knows its pose, with `visited_cells`.
         arena: Where.
         network: The controller.
         interface: Names of the inputs and outputs of the network.
@@ -529,7 +512,7 @@ class StepwiseTarget(ClosedOnExit):
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`."""
-        check_plans(plans, observe, self, MOST_NUMBER)
+        check_plans(plans, observe, self)
         trials = []
         for k, plan in enumerate(plans):
             choose_number(self._robot, plan.number)

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RealityGapError
-from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
 from realitygap.platforms import ScribblerPlatform
 from realitygap.robots import Command, Label, Observation, Robot, channels_of, select_channels
-from realitygap.world import Arena, Grid, Pose
+from realitygap.world import Arena, Grid, Pose, VisitedCells
 
 from ._moving import MovingTrial, RobotShape
 from ._player import check_speed, pack_rays, pack_scene, pack_trials, player_class
@@ -199,7 +198,6 @@ class WatchedRobot:
         """What it did since it was reset."""
         with self._lock:
             poses = np.array(self._poses, np.float64).reshape(-1, 3)
-            cells, rows = self._visits.cells, self._visits.steps
             return MovingTrial(
                 f"{type(self.robot).__name__}",
                 self.label,
@@ -209,8 +207,8 @@ class WatchedRobot:
                 poses,
                 np.array(self._rays, np.float64).reshape(len(poses), -1),
                 np.array(self._stalled, np.bool_),
-                tuple(cells),
-                tuple(rows),
+                self._cells,
+                tuple(self._visited_at),
             )
 
     def _begin(self, pose: Pose) -> None:
@@ -218,10 +216,19 @@ class WatchedRobot:
         self._rays: list[NDArray[np.float64]] = [np.full(len(self._shape.reach), np.nan)]
         self._stalled: list[bool] = [False]
         self._n_steps, self._time = 0, 0.0
-        self._visits = _Visits(self._arena.grid if self._arena else None)
-        self._visits.go(pose, 0)
+        self._visited = VisitedCells(self._arena.grid) if self._arena else None
+        self._cells: tuple[int, ...] = ()
+        self._visited_at: list[int] = []
+        self._visit(pose)
         self._trail: list[tuple[float, float]] = []
         self._sent = _Sent()
+
+    def _visit(self, pose: Pose) -> None:
+        """Note the cells on the way to a place."""
+        if self._visited is not None:
+            self._visited.follow([(pose.x, pose.y)])
+            self._cells = self._visited.cells
+            self._visited_at += [self._n_steps] * (len(self._cells) - len(self._visited_at))
 
     def _now(self) -> Pose:
         return Pose(0.0, 0.0, 0.0) if self._where is None else Pose(*self._where())
@@ -234,7 +241,7 @@ class WatchedRobot:
     def _show(self, lasts: float, *, at_once: bool = False) -> None:
         """Tell the page where the robot is, unless it was told a moment ago; nothing that it did is left out."""
         pose = self._now()
-        self._visits.go(pose, self._n_steps)
+        self._visit(pose)
         self._trail.append((round(pose.x, 4), round(pose.y, 4)))
         if at_once or time.monotonic() - self._sent.time >= PERIOD_S:
             self._tell(pose, lasts)
@@ -252,11 +259,11 @@ class WatchedRobot:
                 "step": self._n_steps,
                 "time": round(self._time, 3),
                 "trail": self._trail[sent.n_points : -1],
-                "cells": self._visits.cells[sent.n_cells :],
+                "cells": list(self._cells[sent.n_cells :]),
                 "lasts": lasts,
             }
         )
-        self._sent = _Sent(time.monotonic(), len(self._trail), len(self._visits.cells))
+        self._sent = _Sent(time.monotonic(), len(self._trail), len(self._cells))
 
     def _asked(self, _widget: Any, content: dict[str, Any], _buffers: Any) -> None:
         """A page that is opened later is told everything."""
@@ -304,34 +311,6 @@ class _Sent:
 
     def __init__(self, time: float = float("-inf"), n_points: int = 0, n_cells: int = 0) -> None:
         self.time, self.n_points, self.n_cells = time, n_points, n_cells
-
-
-class _Visits:
-    """Cells along a line that grows, in order of first visit, and the step of each."""
-
-    def __init__(self, grid: Grid | None) -> None:
-        self._grid = grid
-        n_cells = grid.n_cells if grid else 0
-        self._visited, self._order = np.zeros(n_cells, np.bool_), np.zeros(n_cells, np.uint8)
-        self._at: tuple[float, float] | None = None
-        self.cells: list[int] = []
-        self.steps: list[int] = []
-
-    def go(self, pose: Pose, step: int) -> None:
-        """On to a place in a straight line."""
-        if self._grid is None:
-            return
-        grid = self._grid
-        u, v = to_grid(pose.x, grid.x, grid.cell), to_grid(pose.y, grid.y, grid.cell)
-        n, shape = len(self.cells), (grid.columns, grid.rows)
-        if self._at is None:
-            n = visit(int(np.floor(u)), int(np.floor(v)), *shape, self._visited, self._order, n)
-        elif self._at != (u, v):
-            n = visit_line(*self._at, u, v, *shape, self._visited, self._order, n)
-        self._at = (u, v)
-        fresh = self._order[len(self.cells) : n].tolist()
-        self.cells += fresh
-        self.steps += [step] * len(fresh)
 
 
 def _whereabouts(robot: Robot, witness: Any) -> Callable[[], Pose] | None:

@@ -10,7 +10,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import Shape
 from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
 from realitygap.world import (
     Arena,
@@ -18,10 +17,7 @@ from realitygap.world import (
     Grid,
     RangeSensors,
     RobotModel,
-    floor_shapes,
-    goal_shapes,
-    light_shapes,
-    obstacle_shapes,
+    extent_of,
 )
 
 Outline = tuple[tuple[float, float], ...]
@@ -296,30 +292,11 @@ def first_visits(
     return order[: n[-1]].astype(np.int64), steps, end_steps
 
 
-def things_in(arena: Arena) -> list[Shape]:
-    """What lies and stands in an arena beside its walls, as plain shapes, from the hindmost to the foremost."""
-    shapes = floor_shapes(arena.floor)
-    shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
-    shapes += [shape for light in arena.lights for shape in light_shapes(light)]
-    return shapes + (goal_shapes(arena.goal) if arena.goal is not None else [])
-
-
 def extent(arena: Arena) -> tuple[float, float, float, float]:
-    """Left, right, lower and upper end of what is shown of an arena [m]."""
-    grid = arena.grid
-    points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
-    points += [(light.x, light.y) for light in arena.lights]
-    points += [point for obstacle in arena.obstacles for point in obstacle.outline()]
-    if not arena.walls:
-        points += [(grid.x, grid.y), (grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell)]
-    xs, ys = np.array(points, np.float64).T
-    margin = 0.012 * float(np.ptp(xs))
-    return (
-        float(xs.min()) - margin,
-        float(xs.max()) + margin,
-        float(ys.min()) - margin,
-        float(ys.max()) + margin,
-    )
+    """Left, right, bottom and top of what is shown [m]."""
+    left, bottom, right, top = extent_of(arena)
+    margin = 0.012 * (right - left)
+    return left - margin, right + margin, bottom - margin, top + margin
 
 
 def placed(points: Sequence[tuple[float, float]], pose: tuple[float, float, float]) -> NDArray[np.float64]:

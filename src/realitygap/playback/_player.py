@@ -12,9 +12,9 @@ import numpy as np
 
 from realitygap.drawing import PENS, Disc, Ink, Line, Shape
 from realitygap.errors import RealityGapError
-from realitygap.world import Arena
+from realitygap.world import Arena, floor_shapes, things_in
 
-from ._moving import MovingTrial, all_trials, extent, things_in
+from ._moving import MovingTrial, all_trials, extent
 from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED
 
 _DIGITS = 4
@@ -106,7 +106,7 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
     return {
         "title": title,
         "extent": [round(float(end), _DIGITS) for end in extent(arena)],
-        "shapes": [_pack_shape(shape) for shape in things_in(arena)],
+        "shapes": [_pack_shape(shape) for shape in (*floor_shapes(arena.floor), *things_in(arena))],
         "walls": [list(wall) for wall in arena.walls],
         "grid": {"x": grid.x, "y": grid.y, "cell": grid.cell, "columns": grid.columns, "rows": grid.rows},
         "colors": _COLORS,

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import PENS, Disc, Ink, Line, Shape
-from realitygap.world import Arena
+from realitygap.world import Arena, floor_shapes, things_in
 
-from ._moving import Moment, MovingTrial, extent, nearness, placed, ray_ends, things_in
+from ._moving import Moment, MovingTrial, extent, nearness, placed, ray_ends
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -167,7 +167,7 @@ class Screen:
         corners = np.array(tiles)[:, [0, 1, 3, 2]]
         self._tiles = PolyCollection(list(corners), linewidths=0, zorder=0.1)
         self._field.add_artist(self._tiles)
-        for shape in things_in(arena):
+        for shape in (*floor_shapes(arena.floor), *things_in(arena)):
             _draw_shape(self._field, shape)
         walls = [[(x1, y1), (x2, y2)] for x1, y1, x2, y2 in arena.walls]
         self._field.add_artist(

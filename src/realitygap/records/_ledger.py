@@ -204,7 +204,6 @@ class Ledger(LedgerReader):
         steps: Sequence[Step],
         *,
         stalls: int,
-        problem: str = "",
         score: Score | None = None,
         last: Step | None = None,
     ) -> None:
@@ -213,7 +212,7 @@ class Ledger(LedgerReader):
         `last` is what the robot observed after its last command, if it looked.
         """
         with self._writing():
-            self._keep_steps(number, end, steps, stalls=stalls, problem=problem, last=last)
+            self._keep_steps(number, end, steps, stalls=stalls, last=last)
             self._drive(number, {"end": end})
             if score is not None:
                 self._score(number, score, "score")
@@ -318,7 +317,7 @@ class Ledger(LedgerReader):
         steps: Sequence[Step],
         *,
         stalls: int,
-        problem: str,
+        problem: str = "",
         last: Step | None = None,
     ) -> None:
         self._require(number, "running")

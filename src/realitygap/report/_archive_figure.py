@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,12 +11,10 @@ import polars as pl
 
 from realitygap.drawing import PENS, Ink
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_points,
-    draw_widths,
+    draw_wide,
     head_axes,
     new_figure,
     place_axes,
@@ -28,13 +25,12 @@ from realitygap.report._path_figure import (
     arena_extent,
     draw_arena,
     draw_visited,
-    no_such_run,
     say_origin,
     trace_paths,
     typical_replicate,
 )
 from realitygap.report._structures import selection_of
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition
 from realitygap.world import Arena, Body
 
@@ -48,49 +44,24 @@ _HEIGHT = 2.25
 """Of the curves [in]."""
 
 
-def draw_archive(
-    folder: ResultsFolder | str | Path,
-    condition: str | None = None,
-    replicate: int | None = None,
-    *,
-    width: float = WIDE,
-) -> Drawing:
+def draw_archive(folder: Results, condition: str | None = None, replicate: int | None = None) -> Drawing:
     """Whose behaviors the novelty archive holds at the end of one run, and the novelty of generations in all runs.
 
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
         condition: of which; the first that selects by novelty when not given.
         replicate: which run; when not given the typical one, as in `draw_paths`.
-        width: of the figure [in].
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run, or it has no archive.
     """
-    (drawing,) = draw_tally_archive(read_tally(folder), condition, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_archive(
-    tally: Tally,
-    condition: str | None = None,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "archive",
-) -> list[Drawing]:
-    """As `draw_archive`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run, or it has no archive.
-    """
+    tally = read_tally(folder)
     chosen = _chosen(tally, condition)
     described = tally.condition(chosen)
     resolved = Condition.from_settings(chosen, dict(settings_of(described)))
     replicate = typical_replicate(tally, chosen) if replicate is None else replicate
-    rows = tally.folder.read(chosen, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, chosen, replicate))
+    rows = tally.rows_of(chosen, replicate)
     members = _members(resolved, rows)
     different = list(dict.fromkeys(members))
     entered = [generation for generation, _ in members]
@@ -113,20 +84,9 @@ def draw_tally_archive(
         + ", ".join(f"{each} {values[-1]:.2f}" for each, values in novelty.items())
         + "."
     )
-    return draw_widths(
-        lambda width: _draw(
-            paths,
-            novelty,
-            resolved.placed_arena,
-            resolved.on.body,
-            unit,
-            label_of(described),
-            width,
-        ),
-        widths,
-        name,
-        caption,
-        alt,
+    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
+    return draw_wide(
+        lambda width: _draw(paths, novelty, arena, body, unit, label, width), "archive", caption, alt
     )
 
 

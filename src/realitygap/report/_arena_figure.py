@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from realitygap.report._drawing import WIDE, Drawing, draw_widths, new_figure, place_axes
+from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes
 from realitygap.report._shapes_drawing import draw_picture
 from realitygap.report._tally import Tally, label_of, settings_of
 from realitygap.runs import Condition
@@ -15,15 +15,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_tally_arena(
-    tally: Tally, condition: str, *, widths: Sequence[float] = (WIDE,), name: str = "arena"
-) -> list[Drawing]:
+def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
     """The arena of a condition with the robot at its start, and the robot by itself, as the paper's Figure 2.
 
     Args:
         tally: the study.
         condition: of which.
-        widths: of the figures [in]; in a narrow one the robot stands below the arena.
         name: what the ids begin with.
 
     Raises:
@@ -52,7 +49,7 @@ def draw_tally_arena(
         draw_picture(place_axes(figure, *place, across[1], up[1]), robot, scale=scale)
         return figure
 
-    return draw_widths(draw, widths, name, caption, alt)
+    return draw_wide(draw, name, caption, alt)
 
 
 def _caption(tally: Tally, condition: Condition, described: Mapping[str, Any]) -> str:

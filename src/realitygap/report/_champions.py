@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,9 @@ import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.platforms import retry_genomes
-from realitygap.records import ResultsFolder
 from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
 from realitygap.report._statistics import Interval
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, genome_of, partners_of
 from realitygap.trials import NoiseKey
 
@@ -71,7 +69,7 @@ class Champions:
         return mean_interval(self.expected)
 
 
-def retry_champions(folder: ResultsFolder | str | Path) -> list[Champions]:
+def retry_champions(folder: Results) -> list[Champions]:
     """Try the best network of each run 20 times on fresh noise, for up to 100 runs a condition.
 
     The best of 40 noisy trials is above what its network does on average. Only the mean on fresh noise says
@@ -86,11 +84,7 @@ def retry_champions(folder: ResultsFolder | str | Path) -> list[Champions]:
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return retry_tally(read_tally(folder))
-
-
-def retry_tally(tally: Tally) -> list[Champions]:
-    """As `retry_champions`, of what was read already."""
+    tally = read_tally(folder)
     with_runs = set(tally.runs["condition"])
     return [_retry(tally, each) for each in tally.conditions if each["name"] in with_runs]
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from realitygap.drawing import Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
-    draw_widths,
+    draw_wide,
     mark_key,
     new_figure,
     place_axes,
@@ -24,7 +21,7 @@ from realitygap.report._drawing import (
     write,
 )
 from realitygap.report._statistics import SMALLEST_N, Interval, median_interval, quartiles
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +57,7 @@ class Choice:
     published: tuple[float, ...]
 
 
-def compare_choices(folder: ResultsFolder | str | Path) -> list[list[Choice]]:
+def compare_choices(folder: Results) -> list[list[Choice]]:
     """Every condition that names a baseline, beside it: one list per baseline.
 
     Returns:
@@ -70,11 +67,7 @@ def compare_choices(folder: ResultsFolder | str | Path) -> list[list[Choice]]:
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return compare_tally_choices(read_tally(folder))
-
-
-def compare_tally_choices(tally: Tally) -> list[list[Choice]]:
-    """As `compare_choices`, of what was read already."""
+    tally = read_tally(folder)
     names = [condition["name"] for condition in tally.conditions]
     groups: list[list[Choice]] = []
     for baseline in names:
@@ -117,34 +110,22 @@ def _choice(tally: Tally, condition: Mapping[str, Any], baseline: str, reference
     )
 
 
-def draw_choices(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> Drawing:
+def draw_choices(folder: Results) -> Drawing:
     """How much each changed choice moves the median best coverage, sorted, with intervals.
 
     Args:
         folder: the results of a study whose conditions name a baseline, or the path to them.
-        width: of the figure [in]; a narrow one has the words above the marks.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: no condition of the study names a baseline.
     """
-    (drawing,) = draw_tally_choices(read_tally(folder), widths=[width])
-    return drawing
-
-
-def draw_tally_choices(
-    tally: Tally, *, widths: Sequence[float] = (WIDE,), name: str = "choices"
-) -> list[Drawing]:
-    """As `draw_choices`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: no condition of the study names a baseline.
-    """
-    groups = compare_tally_choices(tally)
+    tally = read_tally(folder)
+    groups = compare_choices(tally)
     if not groups:
         raise ValueError("No condition of this study names a baseline, so there are no choices to compare.")
     caption, alt = _caption(tally, groups), _alt(groups)
-    return draw_widths(lambda width: _draw(groups, width), widths, name, caption, alt)
+    return draw_wide(lambda width: _draw(groups, width), "choices", caption, alt)
 
 
 # drawing

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from realitygap._version import __version__
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._drawing import NARROW, WIDE, inline
+from realitygap.report._template import render_page
 
 GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
 FAMILY_HEAD = (
@@ -41,34 +41,23 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
     Raises:
         RecordError: It cannot be written.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("realitygap.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     wide, narrow = draw_closing(summary, width=WIDE), draw_closing(summary, width=NARROW, name="narrow")
-    css = resources.files("realitygap.report").joinpath("templates/report.css").read_text(encoding="utf-8")
-    page = environment.get_template("closing.html.jinja").render(
-        version=__version__,
-        css=css,
-        n_done=summary["n_done"],
-        n_units=summary["n_units"],
-        n_counted=summary["n_counted"],
-        n_twins=len(summary["twins"]),
-        words=words_of(summary),
-        is_of_twins=not summary["plan"].get("platforms"),
-        goal_head=GOAL_HEAD,
-        goals=goal_table(summary),
-        not_counted=not_counted(summary),
-        why_head=WHY_HEAD,
-        why=why_table(summary),
-        family_head=FAMILY_HEAD,
-        families=family_table(summary),
-        figures=[
+    content = {
+        "version": __version__,
+        "n_done": summary["n_done"],
+        "n_units": summary["n_units"],
+        "n_counted": summary["n_counted"],
+        "n_twins": len(summary["twins"]),
+        "words": words_of(summary),
+        "is_of_twins": not summary["plan"].get("platforms"),
+        "goal_head": GOAL_HEAD,
+        "goals": goal_table(summary),
+        "not_counted": not_counted(summary),
+        "why_head": WHY_HEAD,
+        "why": why_table(summary),
+        "family_head": FAMILY_HEAD,
+        "families": family_table(summary),
+        "figures": [
             {
                 "anchor": key,
                 "wide": inline(drawing.svg),
@@ -77,7 +66,8 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
             }
             for key, drawing in wide.items()
         ],
-    )
+    }
+    page = render_page("closing.html.jinja", content)
     path = Path(out)
     write_whole(path, page.encode())
     return path
@@ -149,12 +139,12 @@ def twin_table(summary: Mapping[str, Any]) -> Table:
     """Twins and whether they count, in the columns of `TWIN_HEAD`."""
     return [
         (
-            twin["twin"],
-            _number(twin["rms"]["estimate"]),
-            _number(twin["standard_error"]),
-            "yes" if twin["counts"] else "no",
+            row["twin"],
+            _number(row["rms"]["estimate"]),
+            _number(row["standard_error"]),
+            "yes" if row["counts"] else "no",
         )
-        for twin in summary["twins"]
+        for row in summary["twins"]
     ]
 
 

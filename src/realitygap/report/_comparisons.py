@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
-from realitygap.records import ResultsFolder
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
     RESAMPLES,
@@ -35,7 +33,7 @@ from realitygap.report._permutation import (
     smallest_p,
 )
 from realitygap.report._statistics import CONFIDENCE, Interval
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 _MOST_RUNS_NAMED = 100_000
 
@@ -150,7 +148,7 @@ def is_within(interval: Interval | None) -> bool | None:
     return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
 
 
-def compare_conditions(folder: ResultsFolder | str | Path) -> list[Comparison]:
+def compare_conditions(folder: Results) -> list[Comparison]:
     """Conditions of a study in pairs, on the best coverage of each run.
 
     Compared are conditions that differ in the noise level alone, in the selection alone, and every condition
@@ -167,11 +165,7 @@ def compare_conditions(folder: ResultsFolder | str | Path) -> list[Comparison]:
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return compare_tally(read_tally(folder))
-
-
-def compare_tally(tally: Tally) -> list[Comparison]:
-    """As `compare_conditions`, of what was read already."""
+    tally = read_tally(folder)
     parts = []
     for one, other, reason in _pairs(tally):
         values = paired_values(tally, one["name"], other["name"])

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap.drawing import Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
-    draw_widths,
+    draw_wide,
     mark_key,
     new_figure,
     place_axes,
@@ -24,7 +21,7 @@ from realitygap.report._drawing import (
     write,
 )
 from realitygap.report._statistics import SMALLEST_N, median_interval, quartiles
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,32 +76,18 @@ class Panel:
     published: tuple[float, ...]
 
 
-def draw_coverage(
-    folder: ResultsFolder | str | Path, *, points: Points | None = None, width: float = WIDE
-) -> Drawing:
+def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
     """Best coverage by generation, as the paper's Figure 4, with every condition and every run.
 
     Args:
         folder: the results of a study, or the path to them.
         points: what a run's line shows at each generation: the best of that generation, or the best so far;
             the study's own choice when not given.
-        width: of the figure [in]; it decides how many panels stand side by side.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    (drawing,) = draw_tally_coverage(read_tally(folder), points=points, widths=[width])
-    return drawing
-
-
-def draw_tally_coverage(
-    tally: Tally,
-    *,
-    points: Points | None = None,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "coverage",
-) -> list[Drawing]:
-    """As `draw_coverage`, of what was read already, in several widths; ids begin with `name`."""
+    tally = read_tally(folder)
     points = points or _points_of(tally.description)
     panels = [_panel(tally, condition, points) for condition in tally.conditions]
     caption = _caption(tally, panels, points)
@@ -112,8 +95,8 @@ def draw_tally_coverage(
         f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the "
         "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
-    return draw_widths(
-        lambda width: draw_panels(panels, width, _coverage_axis(panels)), widths, name, caption, alt
+    return draw_wide(
+        lambda width: draw_panels(panels, width, _coverage_axis(panels)), "coverage", caption, alt
     )
 
 

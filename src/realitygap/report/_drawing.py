@@ -11,9 +11,9 @@ import re
 import textwrap
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
@@ -84,34 +84,46 @@ class Drawing:
         caption: what is drawn, of how many runs, with which interval.
         alt: the same for those who cannot see it, in a sentence; it is in `svg` as well.
         figure: what it was drawn as, for other formats.
+        draw: what makes the figure of a width [in]; None if it has one width only.
+        name: what the ids in `svg` begin with.
     """
 
     svg: str
     caption: str
     alt: str
     figure: Figure | None = field(default=None, repr=False, compare=False)
+    draw: Callable[[float], Figure] | None = field(default=None, repr=False, compare=False)
+    name: str = field(default="", repr=False, compare=False)
 
     def _repr_svg_(self) -> str:
         return self.svg
 
+    def in_width(self, width: float) -> Drawing:
+        """The same figure in another width [in], for the same page.
 
-def draw_widths(
-    draw: Callable[[float], Figure], widths: Sequence[float], name: str, caption: str, alt: str
-) -> list[Drawing]:
-    """A figure in several widths.
+        Raises:
+            ValueError: it has one width only.
+        """
+        if self.draw is None:
+            raise ValueError("This figure has one width only.")
+        return _drawn(self, self.draw, width, 1)
+
+
+def draw_wide(draw: Callable[[float], Figure], name: str, caption: str, alt: str) -> Drawing:
+    """A figure in the width of a desktop's page, which `Drawing.in_width` draws in another one.
 
     Args:
         draw: makes the figure of a width [in].
-        widths: of the figures [in].
-        name: what the ids in the drawings begin with.
+        name: what the ids in the drawing begin with.
         caption, alt: as in `Drawing`.
     """
-    drawings = []
+    return _drawn(Drawing("", caption, alt, draw=draw, name=name), draw, WIDE, 0)
+
+
+def _drawn(drawing: Drawing, draw: Callable[[float], Figure], width: float, number: int) -> Drawing:
     with house_style():
-        for index, width in enumerate(widths):
-            figure = draw(width)
-            drawings.append(Drawing(to_svg(figure, f"{name}-{index}", alt), caption, alt, figure))
-    return drawings
+        figure = draw(width)
+        return replace(drawing, svg=to_svg(figure, f"{drawing.name}-{number}", drawing.alt), figure=figure)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
+from realitygap.gap import fewest
 from realitygap.kernels.math.resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
 from realitygap.report._statistics import CONFIDENCE, Interval
@@ -107,8 +108,6 @@ def bca_interval(
     other: Values,
     *,
     paired: bool,
-    confidence: float = CONFIDENCE,
-    n_resamples: int = RESAMPLES,
 ) -> Interval | None:
     """The bootstrap interval of an effect, corrected for bias and skewness.
 
@@ -117,8 +116,6 @@ def bca_interval(
         one: (n,) and
         other: (m,) values; in pairs where `paired`, which are then resampled together.
         paired: whether value k of the two belongs together.
-        confidence: between 0 and 1.
-        n_resamples: drawn with a fixed seed.
 
     Returns:
         The interval; None below 10 runs, or where all resamples give the same.
@@ -130,9 +127,7 @@ def bca_interval(
     `scipy.stats.bootstrap`, which draws the same resamples. Differs: they are kept as counts, and what
     is equal but for rounding counts as a tie.
     """
-    (interval,) = bca_intervals(
-        [statistic], one, other, paired=paired, confidence=confidence, n_resamples=n_resamples
-    )
+    (interval,) = bca_intervals([statistic], one, other, paired=paired)
     return interval
 
 
@@ -142,8 +137,6 @@ def bca_intervals(
     other: Values,
     *,
     paired: bool,
-    confidence: float = CONFIDENCE,
-    n_resamples: int = RESAMPLES,
 ) -> list[Interval | None]:
     """As `bca_interval`, of several effects of the same samples, which are resampled once."""
     if paired and len(one) != len(other):
@@ -152,11 +145,11 @@ def bca_intervals(
         return [None] * len(statistics)
     values, codes = np.unique(np.concatenate([one, other]), return_inverse=True)
     samples = _Samples(values, codes[: len(one)], codes[len(one) :], paired)
-    resampled = samples.resample(statistics, n_resamples)
-    return [_bca(*each, samples, confidence) for each in zip(statistics, resampled, strict=True)]
+    resampled = samples.resample(statistics, RESAMPLES)
+    return [_bca(*each, samples) for each in zip(statistics, resampled, strict=True)]
 
 
-def _bca(statistic: Statistic, resampled: Values, samples: _Samples, confidence: float) -> Interval | None:
+def _bca(statistic: Statistic, resampled: Values, samples: _Samples) -> Interval | None:
     if not np.isfinite(resampled).all() or np.ptp(resampled) == 0:
         return None
     observed = float(statistic(samples.values, *(counts[None] for counts in samples.counts))[0])
@@ -164,7 +157,7 @@ def _bca(statistic: Statistic, resampled: Values, samples: _Samples, confidence:
     below = ((resampled < observed - ties).mean() + (resampled <= observed + ties).mean()) / 2
     bias = special.ndtri(below)
     skewness = samples.acceleration(statistic)
-    tails = np.array([(1 - confidence) / 2, (1 + confidence) / 2])
+    tails = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     shifted = bias + special.ndtri(tails)
     bounds = np.quantile(resampled, special.ndtr(bias + shifted / (1 - skewness * shifted)))
     if not np.isfinite(bounds).all():
@@ -260,18 +253,17 @@ def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Dra
     return list(_draw(n, m, n_resamples, block))
 
 
-def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDENCE) -> Interval:
+def newcombe_interval(share: float, n: int, m: int) -> Interval:
     """An interval of A12 for few runs: no resampling, and it has a width also where all runs are above.
 
     Args:
         share: A12 as observed [0..1].
         n: runs of one condition.
         m: of the other.
-        confidence: between 0 and 1.
 
     Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
     """
-    z = special.ndtri((1 + confidence) / 2)
+    z = special.ndtri((1 + CONFIDENCE) / 2)
     others = (n + m) / 2 - 1
 
     def excess(at: float) -> float:
@@ -284,14 +276,13 @@ def newcombe_interval(share: float, n: int, m: int, confidence: float = CONFIDEN
     return Interval(float(low), float(high), "Newcombe")
 
 
-def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> int | None:
+def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | None:
     """Runs a condition with which a t test finds a difference of `effect` standard deviations so often.
 
     Args:
         effect: difference of means over the standard deviation of a run (`paired`: of a difference).
         paired: whether runs come in pairs.
         alpha: two-sided level.
-        power: how often it is found.
 
     Returns:
         The number, at least 2; None above a million.
@@ -299,22 +290,11 @@ def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA, power: flo
     Source: Cohen (1988), chapter 2, by the noncentral t distribution. It assumes normal values; the
     permutation tests here need about as many.
     """
-    low, high = 1, 2
-    while _power(effect, high, paired, alpha) < power:
-        low, high = high, 2 * high
-        if low > MOST_RUNS:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        if _power(effect, middle, paired, alpha) < power:
-            low = middle
-        else:
-            high = middle
-    return high
+    return fewest(lambda n: _power(effect, n, paired, alpha), POWER, most=MOST_RUNS)
 
 
 @functools.lru_cache
-def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> float | None:
+def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA) -> float | None:
     """The smallest difference [standard deviations] that n runs a condition find so often; None below 2.
 
     Source: as `runs_needed`.
@@ -322,9 +302,9 @@ def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: floa
     if n < 2:
         return None
     high = 1.0
-    while _power(high, n, paired, alpha) < power:
+    while _power(high, n, paired, alpha) < POWER:
         high *= 2
-    return _root(lambda effect: _power(effect, n, paired, alpha) - power, 0.0, high)
+    return _root(lambda effect: _power(effect, n, paired, alpha) - POWER, 0.0, high)
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

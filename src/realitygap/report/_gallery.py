@@ -2,48 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.report import _networks_figure
-from realitygap.report._arena_figure import draw_tally_arena
+from realitygap.report._arena_figure import draw_arena_and_robot
 from realitygap.report._drawing import Drawing
-from realitygap.report._individuals_figure import draw_tally_better, draw_tally_individuals
-from realitygap.report._lineage_figure import draw_chosen_lineage
-from realitygap.report._species_figure import count_species, draw_tally_species
+from realitygap.report._individuals_figure import draw_better, draw_individuals
+from realitygap.report._lineage_figure import draw_lineage
+from realitygap.report._species_figure import count_species, draw_species
 from realitygap.report._structures import Structures
 from realitygap.report._tally import Tally, settings_of
-from realitygap.report._trial_figure import choose_trial
 
 
-def content(
-    tally: Tally, widths: Sequence[float], on_page: Callable[[str, str, Sequence[Drawing]], Any]
-) -> dict[str, Any]:
-    """What the page shows of these figures, each in all widths, or why one is missing.
+def content(tally: Tally, on_page: Callable[[str, str, Drawing], Any]) -> dict[str, Any]:
+    """What the page shows of these figures, or why one is missing.
 
     Args:
         tally: the study.
-        widths: of the figures [in].
-        on_page: makes of anchor, title and drawings what the template shows.
+        on_page: makes of anchor, title and drawing what the template shows.
     """
 
-    def placed(number: str, drawn: list[Drawing] | str) -> Any:
+    def placed(number: str, drawn: Drawing | str) -> Any:
         return drawn if isinstance(drawn, str) else on_page(f"figure-{number}", f"Figure {number}", drawn)
 
-    def draw(number: str, condition: str, figure: Callable[..., list[Drawing]]) -> Any:
+    def draw(number: str, condition: str, figure: Callable[..., Drawing]) -> Any:
         try:
-            return placed(number, figure(tally, condition, widths=widths, name=f"figure-{number}"))
+            return placed(number, figure(tally, condition, name=f"figure-{number}"))
         except RecordVersionError:
             return (
                 f"Figure {number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}. Use the version that ran the study."
             )
 
-    networks, structures = _networks_figure.content(tally, widths)
+    networks, structures = _networks_figure.content(tally)
     found: dict[str, Any] = {
-        "arena": draw("2", tally.runs["condition"][0], draw_tally_arena),
+        "arena": draw("2", tally.runs["condition"][0], draw_arena_and_robot),
         "networks": placed("7", networks),
         "structures": [_listed(group, tally) for group in structures],
         "structure_groups": structures,
@@ -52,25 +48,18 @@ def content(
     found["individuals"] = [
         draw(number, condition, figure)
         for number, condition, figure in (
-            ("5", _first(tally, "coverage", driven=True), draw_tally_individuals),
-            ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_tally_individuals),
-            ("9", novelty, draw_tally_better),
+            ("5", _first(tally, "coverage", driven=True), draw_individuals),
+            ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_individuals),
+            ("9", novelty, draw_better),
         )
         if condition is not None
     ]
     species = count_species(tally)
     condition = objective or str(tally.runs["condition"][0])
-    found["species"] = placed(
-        "11", draw_tally_species(tally, species, condition, widths=widths, name="figure-11")
-    )
+    found["species"] = placed("11", draw_species(tally, condition, species=species, name="figure-11"))
     found["species_counts"] = species
-    found["lineage"] = draw("12", condition, _draw_lineage)
+    found["lineage"] = draw("12", condition, draw_lineage)
     return found
-
-
-def _draw_lineage(tally: Tally, condition: str, **how: Any) -> list[Drawing]:
-    """The lineage of the champion of a condition's typical run."""
-    return draw_chosen_lineage(tally, choose_trial(tally, condition), **how)
 
 
 def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: bool = False) -> str | None:

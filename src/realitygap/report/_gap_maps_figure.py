@@ -5,18 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from realitygap.drawing import Ink
-from realitygap.report._drawing import WIDE, Drawing, house_style, new_figure, place_axes, shorten, to_svg
+from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes, shorten
 from realitygap.report._path_figure import arena_extent, draw_arena
 from realitygap.study import GapStudy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _FAINTEST = 0.02
 """Shares below are left white."""
 
 
-def draw_gap_maps(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
+def draw_gap_maps(gap: GapStudy) -> Drawing | None:
     """Share of trials that cross each cell on both sides and their difference; None where cells are not known."""
     maps = gap.maps
     if maps is None:
@@ -42,8 +43,9 @@ def draw_gap_maps(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
         (f"{target.label} {shorten(target.name, 20)}", maps.target, most),
         (f"{target.label} less {source.label}", maps.difference, apart),
     ]
-    columns = 3 if width > 6 else 1
-    with house_style():
+
+    def draw(width: float) -> Figure:
+        columns = 3 if width > 6 else 1
         x_range, y_range = arena_extent(gap.arena)
         across = (width - 0.06 - 0.25 * (columns - 1)) / columns
         up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
@@ -54,7 +56,9 @@ def draw_gap_maps(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
             draw_arena(axes, gap.arena, x_range, y_range)
             _draw_shares(axes, gap, values / full)
             axes.set_title(title, loc="left", fontsize=8.5, pad=3)
-        return Drawing(to_svg(figure, "gap-maps", alt), caption, alt, figure)
+        return figure
+
+    return draw_wide(draw, "gap-maps", caption, alt)
 
 
 def _draw_shares(axes: Axes, gap: GapStudy, shares: Any) -> None:

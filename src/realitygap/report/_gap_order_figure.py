@@ -11,30 +11,28 @@ from realitygap import _special as special
 from realitygap.drawing import Ink
 from realitygap.gap import GapSide
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_dots,
     draw_line,
-    house_style,
+    draw_wide,
     mark_key,
     new_figure,
     place_axes,
     shorten,
-    to_svg,
 )
 from realitygap.study import GapStudy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST_ACROSS = 4.4
 """Of the square of a scatter [in]."""
 
 
-def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
+def draw_gap_pairs(gap: GapStudy) -> Drawing:
     """Mean quality of each controller on both sides, with intervals, beside the line of no gap."""
     source, target = gap.source, gap.target
-    size = min(width - 0.75, _MOST_ACROSS)
     order, score = _order_in_words(gap), gap.result.score
     caption = (
         f"Mean {score} of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
@@ -42,7 +40,9 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
         f"On the line there is no gap. {order}"
     )
     alt = f"Scatter of {source.n} controllers: {score} on {source.name} against {score} on {target.name}. {order}"
-    with house_style():
+
+    def draw(width: float) -> Figure:
+        size = min(width - 0.75, _MOST_ACROSS)
         figure = new_figure(width, size + 0.6)
         axes = place_axes(figure, 0.55, 0.1, size, size)
         ends = _ends(source, target, *gap.task.score_range)
@@ -60,7 +60,9 @@ def draw_gap_pairs(gap: GapStudy, *, width: float = WIDE) -> Drawing:
         axes.set_xlabel(f"{score} on {shorten(source.name, 24)} ({source.label})", labelpad=3)
         axes.set_ylabel(f"{score} on {shorten(target.name, 24)} ({target.label})", labelpad=3)
         _legend(axes, kinds)
-        return Drawing(to_svg(figure, "gap-pairs", alt), caption, alt, figure)
+        return figure
+
+    return draw_wide(draw, "gap-pairs", caption, alt)
 
 
 def _draw_pairs(axes: Axes, x: Any, y: Any, across: Any, up: Any, color: str, marker: str) -> None:
@@ -97,7 +99,7 @@ def _order_in_words(gap: GapStudy) -> str:
     return words + "."
 
 
-def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
+def draw_gap_differences(gap: GapStudy) -> Drawing:
     """The difference of means of each controller in order, with intervals, the level, and the margin."""
     source, target, level = gap.source, gap.target, gap.result.level
     score = gap.result.score
@@ -113,7 +115,8 @@ def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
     )
     span = f"{differences.min():.2f} to {differences.max():.2f}"
     alt = f"Differences of {source.n} controllers from {span}; mean {level}."
-    with house_style():
+
+    def draw(width: float) -> Figure:
         figure = new_figure(width, 2.6)
         axes = place_axes(figure, 0.6, 0.12, width - 0.68, 2.1)
         n = source.n
@@ -133,7 +136,9 @@ def draw_gap_differences(gap: GapStudy, *, width: float = WIDE) -> Drawing:
         axes.set_xticks([])
         axes.set_xlabel("controllers in order", labelpad=3)
         axes.set_ylabel(f"difference in {score}", labelpad=3)
-        return Drawing(to_svg(figure, "gap-differences", alt), caption, alt, figure)
+        return figure
+
+    return draw_wide(draw, "gap-differences", caption, alt)
 
 
 def _reaches(side: GapSide) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +9,12 @@ from realitygap._version import __version__
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, Estimate, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
-from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
 from realitygap.report._gap_maps_figure import draw_gap_maps
 from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
 from realitygap.report._gap_replay_figure import draw_gap_replay
 from realitygap.report._gap_why_figure import draw_gap_why
-from realitygap.report._page import LABELS, FigureOnPage
+from realitygap.report._page import LABELS, on_page
+from realitygap.report._template import render_page
 from realitygap.study import GapBetween
 
 _APART = (
@@ -65,21 +63,9 @@ def write_gap_report(gap: GapBetween, path: str | Path) -> Path:
         RecordError: The file cannot be written, or would take the place of a file of results.
     """
     refuse_gap_page(path)
-    write_whole(Path(path), _render(gap).encode("utf-8", "replace"))
+    page = render_page("gap.html.jinja", _content(gap))
+    write_whole(Path(path), page.encode("utf-8", "replace"))
     return Path(path)
-
-
-def _render(gap: GapBetween) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("realitygap.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("gap.html.jinja").render(_content(gap))
 
 
 def _content(gap: GapBetween) -> dict[str, Any]:
@@ -87,9 +73,6 @@ def _content(gap: GapBetween) -> dict[str, Any]:
     result = study.result
     labels = list(dict.fromkeys(result.labels))
     return {
-        "css": resources.files("realitygap.report")
-        .joinpath("templates/report.css")
-        .read_text(encoding="utf-8"),
         "version": __version__,
         "title": f"The gap from {result.source} to {result.target}",
         "labels": [(label, LABELS[label]) for label in labels],
@@ -100,35 +83,25 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         "apart": [_row(result, *each) for each in _APART],
         "advice": None if why is None else why.advice,
         "figures": [
-            figure
-            for figure in (
-                _figure("pairs", "Figure 1", lambda width: draw_gap_pairs(study, width=width)),
-                _figure("differences", "Figure 2", lambda width: draw_gap_differences(study, width=width)),
-                _figure("maps", "Figure 3", lambda width: draw_gap_maps(study, width=width)),
-                _figure("replay", "Figure 4", lambda width: draw_gap_replay(study, width=width)),
+            on_page(anchor, f"Figure {number}", drawing)
+            for number, (anchor, drawing) in enumerate(
+                (
+                    ("pairs", draw_gap_pairs(study)),
+                    ("differences", draw_gap_differences(study)),
+                    ("maps", draw_gap_maps(study)),
+                    ("replay", draw_gap_replay(study)),
+                ),
+                1,
             )
-            if figure is not None
+            if drawing is not None
         ],
-        "why": None
-        if why is None
-        else _figure("why", "Figure 5", lambda width: draw_gap_why(why, study, width=width)),
+        "why": None if why is None else on_page("why", "Figure 5", draw_gap_why(why, study)),
         "controllers": [
             (each.name, *(f"{side.means[k]:.3f}" for side in (study.source, study.target)))
             for k, each in enumerate(study.controllers)
         ],
         "names": [f"{side.label} {side.name}" for side in (study.source, study.target)],
     }
-
-
-def _figure(anchor: str, title: str, draw: Callable[[float], Drawing | None]) -> FigureOnPage | None:
-    from markupsafe import Markup
-
-    wide, narrow = draw(WIDE), draw(NARROW)
-    if wide is None or narrow is None:
-        return None
-    # ids inside one page differ
-    small = narrow.svg.replace(f"gap-{anchor}-", f"gap-{anchor}-narrow-")
-    return FigureOnPage(anchor, title, wide.caption, Markup(inline(wide.svg)), Markup(inline(small)), wide)
 
 
 def _facts(gap: GapBetween) -> list[tuple[str, str]]:

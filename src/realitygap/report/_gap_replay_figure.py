@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from realitygap.drawing import Ink
-from realitygap.report._drawing import WIDE, Drawing, house_style, new_figure, place_axes, to_svg
+from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes
 from realitygap.study import GapStudy
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def draw_gap_replay(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
+
+def draw_gap_replay(gap: GapStudy) -> Drawing | None:
     """Distance and difference in heading over steps beside what noise does; None where nobody saw the robot."""
     replay = gap.replay
     if replay is None:
@@ -31,8 +35,9 @@ def draw_gap_replay(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
         ("apart [m]", replay.distance, replay.noise_distance, None),
         ("headings apart [rad]", replay.heading, replay.noise_heading, math.pi),
     )
-    columns = 2 if width > 6 else 1
-    with house_style():
+
+    def draw(width: float) -> Figure:
+        columns = 2 if width > 6 else 1
         high, across = 1.6, (width - 0.1) / columns - 0.62
         figure = new_figure(width, (2 // columns) * (high + 0.55))
         for k, (title, between, noise, most) in enumerate(panels):
@@ -58,4 +63,6 @@ def draw_gap_replay(gap: GapStudy, *, width: float = WIDE) -> Drawing | None:
             axes.set_ylabel(title, labelpad=3)
             if k == 0:
                 axes.legend(loc="upper left", frameon=False, fontsize=7.5)
-        return Drawing(to_svg(figure, "gap-replay", alt), caption, alt, figure)
+        return figure
+
+    return draw_wide(draw, "gap-replay", caption, alt)

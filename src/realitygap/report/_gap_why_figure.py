@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from realitygap.drawing import Ink
 from realitygap.gap import Why
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_line,
-    house_style,
+    draw_wide,
     new_figure,
     place_axes,
-    to_svg,
 )
 from realitygap.study import GapStudy
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def draw_gap_why(why: Why, gap: GapStudy, *, width: float = WIDE) -> Drawing:
+
+def draw_gap_why(why: Why, gap: GapStudy) -> Drawing:
     """A bar for each part of the model: by how much the RMS gap falls when the fit takes the default's place."""
     order = why.order
     values = [why.falls[k].estimate or 0.0 for k in order]
@@ -27,7 +30,8 @@ def draw_gap_why(why: Why, gap: GapStudy, *, width: float = WIDE) -> Drawing:
         "drawn anew and, with them, the posterior of the fit."
     )
     alt = "Bars: " + "; ".join(f"{why.parts[k]} {why.falls[k]}" for k in order) + "."
-    with house_style():
+
+    def draw(width: float) -> Figure:
         high = 0.3 * len(order)
         figure = new_figure(width, high + 0.5)
         axes = place_axes(figure, 1.05, 0.08, width - 1.2, high)
@@ -45,4 +49,6 @@ def draw_gap_why(why: Why, gap: GapStudy, *, width: float = WIDE) -> Drawing:
         axes.tick_params(axis="y", length=0)
         axes.locator_params(axis="x", nbins=5 if width > 6 else 3)
         axes.set_xlabel("fall of the RMS gap", labelpad=3)
-        return Drawing(to_svg(figure, "gap-why", alt), caption, alt, figure)
+        return figure
+
+    return draw_wide(draw, "gap-why", caption, alt)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,16 +12,12 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import PENS, Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_dots,
     draw_line,
-    draw_widths,
+    draw_wide,
     head_axes,
-    new_figure,
-    place_axes,
     shorten,
     write,
 )
@@ -33,12 +28,12 @@ from realitygap.report._path_figure import (
     draw_path,
     draw_path_legend,
     draw_visited,
-    no_such_run,
+    panels_of,
     say_origin,
     trace_paths,
     typical_replicate,
 )
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition
 from realitygap.world import Arena, Body
 
@@ -57,11 +52,11 @@ _N_BETTER = 5
 
 
 def draw_individuals(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    width: float = WIDE,
+    name: str = "individuals",
 ) -> Drawing:
     """All individuals of each generation of one run, a pen each, as the paper's Figures 5 and 8.
 
@@ -69,38 +64,20 @@ def draw_individuals(
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
         condition: of which; the first one when not given.
         replicate: which run; when not given the typical one, as in `draw_paths`.
-        width: of the figure [in]; it decides how many panels stand side by side.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = tally.name_of(condition)
-    (drawing,) = draw_tally_individuals(tally, name, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_individuals(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "individuals",
-) -> list[Drawing]:
-    """As `draw_individuals`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run.
-        RecordVersionError: its settings are not those of this version.
-    """
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
     typical = replicate is None
     replicate = typical_replicate(tally, condition) if replicate is None else replicate
     column = f"coverage_{tally.measure}"
-    rows = _rows_of(tally, condition, replicate)
+    rows = tally.rows_of(condition, replicate)
     n_generations, population = int(rows["generation"].n_unique()), int(rows["individual"].n_unique())
     shown = np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS)).round().astype(int).tolist()
     rows = rows.filter(pl.col("generation").is_in(shown), pl.col("individual") < _MOST_PATHS)
@@ -124,26 +101,18 @@ def draw_tally_individuals(
         + "."
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_widths(
-        lambda width: _draw_generations(panels, arena, body, label, width), widths, name, caption, alt
-    )
+    return draw_wide(lambda width: _draw_generations(panels, arena, body, label, width), name, caption, alt)
 
 
-def draw_tally_better(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "better",
-) -> list[Drawing]:
-    """The individuals of highest coverage of one run, as the paper's Figure 9, in several widths.
+def draw_better(
+    tally: Tally, condition: str, replicate: int | None = None, *, name: str = "better"
+) -> Drawing:
+    """The individuals of highest coverage of one run, as the paper's Figure 9.
 
     Args:
         tally: the study. The trials that are shown are recomputed.
         condition: of which.
         replicate: which run; when not given the typical one, as in `draw_paths`.
-        widths: of the figures [in].
         name: what the ids begin with.
 
     Raises:
@@ -155,7 +124,7 @@ def draw_tally_better(
     typical = replicate is None
     replicate = typical_replicate(tally, condition) if replicate is None else replicate
     column = f"coverage_{tally.measure}"
-    rows = _rows_of(tally, condition, replicate)
+    rows = tally.rows_of(condition, replicate)
     n_individuals = rows.height
     best = (
         rows.sort(column, descending=True, maintain_order=True)
@@ -178,7 +147,7 @@ def draw_tally_better(
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
 
     def draw(width: float) -> Figure:
-        figure, places = _panels(len(paths) + 1, arena, width)
+        figure, places = panels_of(len(paths) + 1, arena, width)
         short = width < 6
         for path, axes in zip(paths, places, strict=False):
             draw_arena(axes, arena, *arena_extent(arena))
@@ -192,41 +161,16 @@ def draw_tally_better(
         draw_path_legend(places[-1], paths, small=short)
         return figure
 
-    return draw_widths(draw, widths, name, caption, alt + ".")
-
-
-def _rows_of(tally: Tally, condition: str, replicate: int) -> pl.DataFrame:
-    rows = tally.folder.read(condition, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition, replicate))
-    return rows
+    return draw_wide(draw, name, caption, alt + ".")
 
 
 # drawing
 
 
-def _panels(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
-    """A figure with room for n panels in rows of two or three, with a line of text below each."""
-    n_columns = 3 if width >= 6 else 2
-    x_range, y_range = arena_extent(arena)
-    gap, text_height = 0.2, 0.36
-    panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
-    panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    figure = new_figure(width, math.ceil(n / n_columns) * (panel_height + text_height))
-    places = []
-    for index in range(n):
-        row, column = divmod(index, n_columns)
-        x = 0.02 + column * (panel_width + gap)
-        places.append(
-            place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
-        )
-    return figure, places
-
-
 def _draw_generations(
     panels: list[list[TracedPath]], arena: Arena, body: Body, label: str, width: float
 ) -> Figure:
-    figure, places = _panels(len(panels) + 1, arena, width)
+    figure, places = panels_of(len(panels) + 1, arena, width)
     small = width < 6
     for panel, axes in zip(panels, places, strict=False):
         draw_arena(axes, arena, *arena_extent(arena))

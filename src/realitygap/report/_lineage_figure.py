@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,17 +12,15 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
-    draw_widths,
+    draw_wide,
     head_axes,
     new_figure,
     place_axes,
     shorten,
 )
-from realitygap.report._tally import Tally, read_tally
+from realitygap.report._tally import Results, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 
 if TYPE_CHECKING:
@@ -69,13 +66,13 @@ class Ancestor:
 
 
 def draw_lineage(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     generation: int | None = None,
     individual: int | None = None,
     *,
-    width: float = WIDE,
+    name: str = "lineage",
 ) -> Drawing:
     """The ancestors of an individual, from the first generation on, and their coverage.
 
@@ -85,7 +82,7 @@ def draw_lineage(
         replicate: which run; the typical one when not given.
         generation: of the run; that of its best trial, the champion, when not given.
         individual: of the generation; the best one by the task when not given.
-        width: of the figure [in].
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -93,14 +90,6 @@ def draw_lineage(
     """
     tally = read_tally(folder)
     trial = choose_trial(tally, condition, replicate, generation, individual)
-    (drawing,) = draw_chosen_lineage(tally, trial, widths=[width])
-    return drawing
-
-
-def draw_chosen_lineage(
-    tally: Tally, trial: ChosenTrial, *, widths: Sequence[float] = (WIDE,), name: str = "lineage"
-) -> list[Drawing]:
-    """As `draw_lineage`, of an individual chosen already, in several widths; ids begin with `name`."""
     row = trial.row
     rows = tally.folder.read(row["condition"], [row["replicate"]])
     lineage = tally.folder.derive("lineage", row["condition"], [row["replicate"]])
@@ -127,7 +116,7 @@ def draw_chosen_lineage(
         f"Lineage of {trial.title}, coverage {champion.coverage:.3f}, with {len(ancestors) - 1} ancestors. "
         f"New structure: {'; '.join(brought) or 'none'}."
     )
-    return draw_widths(lambda width: _draw(trial, rows, ancestors, width), widths, name, caption, alt)
+    return draw_wide(lambda width: _draw(trial, rows, ancestors, width), name, caption, alt)
 
 
 # who they are

@@ -14,8 +14,8 @@ from realitygap.errors import RecordError, did_you_mean
 from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in_motion, play, save_movie
 from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
 from realitygap.report._driven import driven_paths, refuse_replay
-from realitygap.report._path_figure import no_such_run, typical_replicate
-from realitygap.report._tally import Tally, read_tally
+from realitygap.report._path_figure import typical_replicate
+from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
 from realitygap.runs import replay
@@ -24,7 +24,6 @@ from realitygap.trials import PATH_PARTS
 Each = Literal["individual", "generation", "condition"]
 """Of what several trials are shown: each individual of a generation, the best of each generation or condition."""
 
-Results = ResultsFolder | str | Path
 
 _SURPLUS: dict[Each, tuple[str, ...]] = {
     "individual": ("individual",),
@@ -145,9 +144,7 @@ def _several(
     name = tally.name_of(condition)
     tally.condition(name)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
-    rows = tally.folder.read(name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, name, replicate))
+    rows = tally.rows_of(name, replicate)
     if each == "individual":
         first = choose_trial(tally, name, replicate, generation)
         generation = int(first.row["generation"])
@@ -258,4 +255,4 @@ def watch(
 
 
 def _listed(what: Results | MovingTrial | Iterable[Results | MovingTrial]) -> list[Results | MovingTrial]:
-    return [what] if isinstance(what, ResultsFolder | str | Path | MovingTrial) else list(what)
+    return [what] if isinstance(what, Tally | ResultsFolder | str | Path | MovingTrial) else list(what)

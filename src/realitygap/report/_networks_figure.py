@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import polars as pl
@@ -12,11 +11,9 @@ from realitygap._version import __version__
 from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
-    draw_widths,
+    draw_wide,
     head_axes,
     house_style,
     new_figure,
@@ -25,7 +22,7 @@ from realitygap.report._drawing import (
 )
 from realitygap.report._shapes_drawing import draw_picture
 from realitygap.report._structures import Structures, count_structures
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, genome_of
 
 _MARKS = (
@@ -37,34 +34,22 @@ _N_COMMON = 3
 """Common structures drawn beside the first run's network."""
 
 
-def draw_networks(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> Drawing:
+def draw_networks(
+    folder: Results, structures: Sequence[Structures] | None = None, *, name: str = "networks"
+) -> Drawing:
     """Networks of the last generation: the first objective run's best, and the most common structures.
 
     Args:
         folder: the results of a study, or the path to them.
-        width: of the figure [in]; in a narrow one the networks stand below each other.
+        structures: as `count_structures` returns them; counted if not given.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         RecordVersionError: the settings are not those of this version.
     """
     tally = read_tally(folder)
-    (drawing,) = draw_tally_networks(tally, count_structures(tally), widths=[width])
-    return drawing
-
-
-def draw_tally_networks(
-    tally: Tally,
-    structures: Sequence[Structures],
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "networks",
-) -> list[Drawing]:
-    """As `draw_networks`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        RecordVersionError: the settings are not those of this version.
-    """
+    structures = count_structures(tally) if structures is None else structures
     condition = _first_objective(tally)
     group = next(each for each in structures if condition in each.conditions)
     replicate = int(tally.replicates(condition)[0])
@@ -81,19 +66,16 @@ def draw_tally_networks(
         pictures.append((f"structure {letter}", share, _picture(tally, _row_of(tally, structure.example))))
     caption = _caption(tally, condition, group)
     alt = "Networks. " + " ".join(f"{title}: {picture.description}" for title, _, picture in pictures)
-    return draw_widths(lambda width: _draw(pictures, width), widths, name, caption, alt)
+    return draw_wide(lambda width: _draw(pictures, width), name, caption, alt)
 
 
-def draw_network(
-    condition: Condition, row: Mapping[str, Any], measure: str, *, name: str = "network"
-) -> Drawing:
+def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> Drawing:
     """The network of a row of results.
 
     Args:
         condition: as resolved.
         row: of its results, with the genome.
         measure: the column of coverage that is shown.
-        name: what the ids in the drawing begin with.
 
     Raises:
         ValueError: the genome is not one of this version.
@@ -104,7 +86,7 @@ def draw_network(
     text = f"{condition.label}, coverage {row[measure]:.3f}"
     with house_style():
         figure = _draw([(title, text, picture)], 5.9)
-        return Drawing(to_svg(figure, name, picture.description), caption, picture.description, figure)
+        return Drawing(to_svg(figure, "network", picture.description), caption, picture.description, figure)
 
 
 def _first_objective(tally: Tally) -> str:
@@ -183,11 +165,11 @@ def _caption(tally: Tally, condition: str, group: Structures) -> str:
     )
 
 
-def content(tally: Tally, widths: Sequence[float]) -> tuple[list[Drawing] | str, list[Structures]]:
-    """The figure in these widths, or why it is missing, and the structures counted."""
+def content(tally: Tally) -> tuple[Drawing | str, list[Structures]]:
+    """The figure, or why it is missing, and the structures counted."""
     structures = count_structures(tally)
     try:
-        return draw_tally_networks(tally, structures, widths=widths, name="figure-7"), structures
+        return draw_networks(tally, structures, name="figure-7"), structures
     except (ValueError, RealityGapError):
         return (
             f"Figure 7 is missing: this realitygap ({__version__}) cannot read the genomes. Use the version that ran "

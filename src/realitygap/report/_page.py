@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -29,22 +28,23 @@ from realitygap.records import (
 )
 from realitygap.report import _gallery
 from realitygap.report._assumed import sim_assumptions
-from realitygap.report._choices_figure import compare_tally_choices, draw_tally_choices
-from realitygap.report._coverage_figure import draw_tally_coverage
-from realitygap.report._drawing import NARROW, WIDE, Drawing, inline
+from realitygap.report._choices_figure import compare_choices, draw_choices
+from realitygap.report._coverage_figure import draw_coverage
+from realitygap.report._drawing import NARROW, Drawing, inline
 from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
-from realitygap.report._path_figure import draw_tally_paths
+from realitygap.report._path_figure import draw_paths
 from realitygap.report._replay import content as replay_content
-from realitygap.report._score_figure import draw_scores_in
+from realitygap.report._score_figure import draw_scores
 from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
-from realitygap.report._summary import summarize_tally
+from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.report._task_summary import summarize_tasks
+from realitygap.report._template import render_page
 from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
@@ -134,19 +134,7 @@ def _check_out(path: Path) -> None:
 
 
 def _render(content: Mapping[str, Any]) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("realitygap.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["share"] = _share
-    environment.filters["count"] = _count
-    environment.filters["score"] = _score
-    return environment.get_template("report.html.jinja").render(content)
+    return render_page("report.html.jinja", content, share=_share, count=_count, score=_score)
 
 
 def _content(tally: Tally) -> dict[str, Any]:
@@ -159,14 +147,11 @@ def _content(tally: Tally) -> dict[str, Any]:
 
 
 def _words_and_figures(tally: Tally) -> dict[str, Any]:
-    summary = summarize_tally(tally)
+    summary = summarize(tally)
     description = tally.description
     return {
         "title": description.get("title") or description.get("name") or "A study",
         "name": description.get("name") or "–",
-        "css": resources.files("realitygap.report")
-        .joinpath("templates/report.css")
-        .read_text(encoding="utf-8"),
         "banners": _banners(tally),
         "facts": _facts(tally),
         "labels": _labels(tally),
@@ -188,9 +173,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "scores": _score_figures(tally),
         "paths": _path_figures(tally),
         "choices": _choices_figure(tally),
-        "gallery": _gallery.content(
-            tally, (WIDE, NARROW), lambda anchor, title, drawn: _on_page(anchor, title, *drawn)
-        ),
+        "gallery": _gallery.content(tally, on_page),
         "replay": replay_content(tally),
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
@@ -202,24 +185,24 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # figures
 
 
-def _on_page(anchor: str, title: str, wide: Drawing, narrow: Drawing) -> FigureOnPage:
+def on_page(anchor: str, title: str, drawing: Drawing) -> FigureOnPage:
     from markupsafe import Markup
 
-    pictures = (Markup(inline(wide.svg)), Markup(inline(narrow.svg)))
-    return FigureOnPage(anchor, title, wide.caption, *pictures, wide)
+    pictures = (Markup(inline(drawing.svg)), Markup(inline(drawing.in_width(NARROW).svg)))
+    return FigureOnPage(anchor, title, drawing.caption, *pictures, drawing)
 
 
 def _coverage_figure(tally: Tally) -> FigureOnPage:
-    return _on_page("figure-4", "Figure 4", *draw_tally_coverage(tally, widths=(WIDE, NARROW)))
+    return on_page("figure-4", "Figure 4", draw_coverage(tally))
 
 
 def _score_figures(tally: Tally) -> list[FigureOnPage]:
     """A figure for each score of another task than coverage."""
-    drawn = draw_scores_in(tally.folder, (WIDE, NARROW))
+    drawn = draw_scores(tally.folder)
     numbers = ["Figure S"] if len(drawn) == 1 else [f"Figure S{k + 1}" for k in range(len(drawn))]
     return [
-        _on_page(f"figure-scores-{k}", number, *pair)
-        for k, (number, pair) in enumerate(zip(numbers, drawn, strict=True))
+        on_page(f"figure-scores-{k}", number, drawing)
+        for k, (number, drawing) in enumerate(zip(numbers, drawn, strict=True))
     ]
 
 
@@ -231,14 +214,14 @@ def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
         number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
         anchor = f"figure-6-{index}"
         try:
-            drawn = draw_tally_paths(tally, condition, widths=(WIDE, NARROW), name=anchor)
+            drawn = draw_paths(tally, condition, name=anchor)
         except RecordVersionError:
             found.append(
                 f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
                 f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
             )
         else:
-            found.append(_on_page(anchor, number, *drawn))
+            found.append(on_page(anchor, number, drawn))
     return found
 
 
@@ -254,9 +237,9 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
 
 
 def _choices_figure(tally: Tally) -> FigureOnPage | None:
-    if not compare_tally_choices(tally):
+    if not compare_choices(tally):
         return None
-    return _on_page("figure-10", "Figure 10", *draw_tally_choices(tally, widths=(WIDE, NARROW)))
+    return on_page("figure-10", "Figure 10", draw_choices(tally))
 
 
 # words

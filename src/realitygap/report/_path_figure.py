@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,14 +14,13 @@ import polars as pl
 from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError
 from realitygap.platforms import is_physical
-from realitygap.records import ResultsFolder
+from realitygap.playback import placed
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
     draw_dots,
     draw_line,
     draw_points,
-    draw_widths,
+    draw_wide,
     head_axes,
     mark_key,
     new_figure,
@@ -30,9 +28,9 @@ from realitygap.report._drawing import (
     shorten,
 )
 from realitygap.report._driven import driven_paths
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of, task_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of, task_of
 from realitygap.runs import Condition, replay
-from realitygap.world import Arena, Body, Pose
+from realitygap.world import Arena, Body
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,11 +74,11 @@ class TracedPath:
 
 
 def draw_paths(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    width: float = WIDE,
+    name: str = "paths",
 ) -> Drawing:
     """The best path of each generation of one run, as the paper's Figure 6.
 
@@ -89,32 +87,14 @@ def draw_paths(
         condition: of which; the first one when not given.
         replicate: which run; when not given the typical one, whose best trial by the task is the median of its
             condition (the lower of the two middle ones, and the first of several alike).
-        width: of the figure [in]; it decides how many panels stand side by side.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    name = tally.name_of(condition)
-    (drawing,) = draw_tally_paths(tally, name, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_paths(
-    tally: Tally,
-    condition: str,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "paths",
-) -> list[Drawing]:
-    """As `draw_paths`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run.
-        RecordVersionError: the condition's settings are not those of this version.
-    """
+    condition = tally.name_of(condition)
     described = tally.condition(condition)
     resolved = Condition.from_settings(condition, dict(settings_of(described)))
     typical = replicate is None
@@ -127,7 +107,7 @@ def draw_tally_paths(
         + "."
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_widths(lambda width: _draw(paths, arena, body, label, width), widths, name, caption, alt)
+    return draw_wide(lambda width: _draw(paths, arena, body, label, width), name, caption, alt)
 
 
 def typical_replicate(tally: Tally, condition: str) -> int:
@@ -146,9 +126,7 @@ def typical_replicate(tally: Tally, condition: str) -> int:
 def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[list[TracedPath], str]:
     """The best trial of each generation shown, and why trials could not be recomputed (empty: they could)."""
     column = tally.score_column(condition.name)
-    rows = tally.folder.read(condition.name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition.name, replicate))
+    rows = tally.rows_of(condition.name, replicate)
     best = rows.filter(pl.col(column) == pl.col(column).max().over("generation")).unique(
         "generation", keep="first", maintain_order=True
     )
@@ -157,15 +135,6 @@ def _best_paths(tally: Tally, condition: Condition, replicate: int) -> tuple[lis
         np.round(np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS))).astype(int)
     )
     return trace_paths(tally, condition, best[shown], f"coverage_{tally.measure}")
-
-
-def no_such_run(tally: Tally, condition: str, replicate: int) -> str:
-    """What to say of a run that is not there."""
-    there = [int(run) for run in tally.replicates(condition)]
-    has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
-    if there and there != list(range(there[0], there[-1] + 1)):
-        has += f", {len(there)} of them"
-    return f"Condition {condition!r} has no run {replicate} in {tally.folder.path}: {has}."
 
 
 def trace_paths(
@@ -229,24 +198,31 @@ def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], proble
 
 
 def _draw(paths: list[TracedPath], arena: Arena, body: Body, label: str, width: float) -> Figure:
+    figure, places = panels_of(len(paths) + 1, arena, width)
+    for path, axes in zip(paths, places, strict=False):
+        draw_arena(axes, arena, *arena_extent(arena))
+        draw_path(axes, path, arena, body)
+        _write_below(axes, path, arena, label)
+    draw_path_legend(places[-1], paths, small=width < 6)
+    return figure
+
+
+def panels_of(n: int, arena: Arena, width: float) -> tuple[Figure, list[Axes]]:
+    """A figure with room for n panels in rows of two or three, with a line of text below each."""
     n_columns = 3 if width >= 6 else 2
-    n_rows = math.ceil((len(paths) + 1) / n_columns)
     x_range, y_range = arena_extent(arena)
     gap, text_height = 0.2, 0.36
     panel_width = (width - 0.04 - gap * (n_columns - 1)) / n_columns
     panel_height = panel_width * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    figure = new_figure(width, n_rows * (panel_height + text_height))
-    for index in range(len(paths) + 1):
+    figure = new_figure(width, math.ceil(n / n_columns) * (panel_height + text_height))
+    places = []
+    for index in range(n):
         row, column = divmod(index, n_columns)
         x = 0.02 + column * (panel_width + gap)
-        axes = place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
-        if index < len(paths):
-            draw_arena(axes, arena, x_range, y_range)
-            draw_path(axes, paths[index], arena, body)
-            _write_below(axes, paths[index], arena, label, panel_width)
-        else:
-            draw_path_legend(axes, paths, small=width < 6)
-    return figure
+        places.append(
+            place_axes(figure, x, row * (panel_height + text_height) + 0.04, panel_width, panel_height)
+        )
+    return figure, places
 
 
 def arena_extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -302,7 +278,7 @@ def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> 
         corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
         axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
     for start in arena.starts:
-        outline = body_outline(body, start)
+        outline = placed([*body.corners, body.corners[0]], start)
         draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)
         draw_dots(axes, [start.x], [start.y], 3.4, color=Ink.TEXT, zorder=7)
 
@@ -343,19 +319,10 @@ def _draw_track(
     )
 
 
-def body_outline(body: Body, pose: Pose) -> npt.NDArray[np.float64]:
-    """(b + 1, 2) the body's corners at a pose [m], closed."""
-    corners = np.array([*body.corners, body.corners[0]])
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    turn = np.array([[cosine, sine], [-sine, cosine]])
-    placed: npt.NDArray[np.float64] = corners @ turn + np.array([pose.x, pose.y])
-    return placed
-
-
-def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str, width: float) -> None:
+def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str) -> None:
     n_cells = arena.grid.n_cells
     figure_text = f"{path.coverage:.3f} ({round(path.coverage * n_cells)} of {n_cells})"
-    if width > 2.5:
+    if axes.bbox.width > 2.5 * axes.figure.dpi:
         figure_text = f"{shorten(label, 12)}, coverage {figure_text}"
     else:
         figure_text = f"{path.coverage:.3f} {shorten(label, 12)}"

@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ import polars as pl
 
 from realitygap import _special as special
 from realitygap.evolution import largest_cell_distance
-from realitygap.records import ResultsFolder
 from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
 from realitygap.report._effects import (
@@ -26,7 +24,7 @@ from realitygap.report._effects import (
 )
 from realitygap.report._permutation import SEED, lattice
 from realitygap.report._statistics import CONFIDENCE, Interval
-from realitygap.report._tally import Tally, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, read_tally, settings_of
 from realitygap.world import ArenaSettings
 
 Values = npt.NDArray[np.float64]
@@ -184,7 +182,7 @@ class Variety:
         return len(self.jaccard)
 
 
-def measure_variety(folder: ResultsFolder | str | Path) -> list[Variety]:
+def measure_variety(folder: Results) -> list[Variety]:
     """Mean distance between the behaviors of a run, for up to 100 runs a condition.
 
     A behavior is the set of cells along the line driven. Of a run with more than 40, as many are drawn with a
@@ -201,11 +199,7 @@ def measure_variety(folder: ResultsFolder | str | Path) -> list[Variety]:
 
     Source: the distance of sorted cells, Rosenzweig & Remy, section 2.4 (by x, then y); Jaccard (1912).
     """
-    return tally_variety(read_tally(folder))
-
-
-def tally_variety(tally: Tally) -> list[Variety]:
-    """As `measure_variety`, of what was read already."""
+    tally = read_tally(folder)
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     return [_variety(tally, each) for each in with_runs]
 

@@ -12,7 +12,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
 from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report._template import template_text
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
 
@@ -66,9 +66,9 @@ def content(tally: Tally) -> dict[str, Any]:
     room = MOST_STEPS // max(len(there), 1)
     runs = [_pack_run(tally, condition, room) for condition in there]
     packed = [run.data for run in runs if run.data is not None]
-    script = _template("replay.js")
+    script = template_text("replay.js")
     return {
-        "css": Markup(_template("replay.css")),
+        "css": Markup(template_text("replay.css")),
         "script": Markup(script),
         "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         "data": _as_json({"units": UNITS, "pens": N_PENS, "measure": tally.measure, "conditions": packed}),
@@ -87,10 +87,6 @@ def _notes(runs: Sequence[_Run]) -> list[str]:
     """What is missing, each with the names of the conditions of which it is true."""
     notes = dict.fromkeys(run.note for run in runs if run.note)
     return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
-
-
-def _template(name: str) -> str:
-    return resources.files("realitygap.report").joinpath(f"templates/{name}").read_text(encoding="utf-8")
 
 
 def _as_json(values: Mapping[str, Any]) -> Markup:

@@ -18,17 +18,16 @@ from realitygap.report._coverage_figure import (
     say_interval,
     say_runs,
 )
-from realitygap.report._drawing import WIDE, Drawing, draw_widths
+from realitygap.report._drawing import Drawing, draw_wide
 from realitygap.report._tally import bests_of, label_of, labeled_conditions, settings_of, task_of
 from realitygap.runs import Condition
 
 
-def draw_scores(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> list[Drawing]:
+def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
     """Best score by generation, for conditions of other tasks than coverage.
 
     Args:
         folder: the results of a study, or the path to them.
-        width: of the figures [in]; it decides how many panels stand side by side.
 
     Returns:
         One figure for each score; none if all conditions are of coverage, or have no runs.
@@ -36,13 +35,6 @@ def draw_scores(folder: ResultsFolder | str | Path, *, width: float = WIDE) -> l
     Raises:
         RecordError: there is no such folder, or a file in it is damaged.
     """
-    return [drawings[0] for drawings in draw_scores_in(folder, (width,))]
-
-
-def draw_scores_in(
-    folder: ResultsFolder | str | Path, widths: Sequence[float], name: str = "scores"
-) -> list[list[Drawing]]:
-    """As `draw_scores`, each figure in several widths; ids begin with `name`."""
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
     panels: dict[tuple[str, float, float], list[Panel]] = {}
     labels: dict[tuple[str, float, float], set[str]] = {}
@@ -62,7 +54,7 @@ def draw_scores_in(
                 )
             )
     return [
-        _draw(score, group, sorted(labels[score]), widths, f"{name}-{number}")
+        _draw(score, group, sorted(labels[score]), f"scores-{number}")
         for number, (score, group) in enumerate(panels.items())
     ]
 
@@ -79,13 +71,7 @@ def _score_of(condition: Mapping[str, Any]) -> tuple[str, float, float] | None:
         return f"score of {kind}", -np.inf, np.inf
 
 
-def _draw(
-    of: tuple[str, float, float],
-    panels: list[Panel],
-    labels: Sequence[str],
-    widths: Sequence[float],
-    name: str,
-) -> list[Drawing]:
+def _draw(of: tuple[str, float, float], panels: list[Panel], labels: Sequence[str], name: str) -> Drawing:
     score, least, greatest = of
     axis = _axis(score, panels, least, greatest)
     caption = (
@@ -97,7 +83,7 @@ def _draw(
         f"Best {score} by generation in {len(panels)} panels, one per condition: a line for each run, the median with "
         "its interval, and the best of the runs. Their numbers are in the table of scores."
     )
-    return draw_widths(lambda width: draw_panels(panels, width, axis), widths, name, caption, alt)
+    return draw_wide(lambda width: draw_panels(panels, width, axis), name, caption, alt)
 
 
 def _axis(score: str, panels: Sequence[Panel], least: float, greatest: float) -> Axis:

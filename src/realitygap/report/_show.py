@@ -12,13 +12,13 @@ from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
 from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
-from realitygap.report._lineage_figure import draw_chosen_lineage
+from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import choose_moving
 from realitygap.report._networks_figure import draw_network
-from realitygap.report._path_figure import draw_tally_paths
-from realitygap.report._species_figure import count_species, draw_tally_species
+from realitygap.report._path_figure import draw_paths
+from realitygap.report._species_figure import draw_species
 from realitygap.report._tally import read_tally
-from realitygap.report._trial_figure import choose_trial, draw_chosen_trial
+from realitygap.report._trial_figure import choose_trial, draw_trial
 from realitygap.robots.twin import TwinModel, load_twin, twin_picture
 from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
@@ -73,11 +73,10 @@ def save_view(
     if subject == "species":
         if generation is not None or individual is not None:
             raise ValueError("Species are shown over all generations: leave out generation and individual.")
-        (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate)
-        return _save(drawing, out, "Species")
+        return _save(draw_species(tally, condition, replicate), out, "Species")
     if subject == "lineage":
         trial = choose_trial(tally, condition, replicate, generation, individual)
-        (drawing,) = draw_chosen_lineage(tally, trial)
+        drawing = draw_lineage(tally, condition, replicate, generation, individual)
         return _save(drawing, out, f"Lineage of {trial.title}")
     if subject == "network":
         trial = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
@@ -86,13 +85,12 @@ def save_view(
         )
     if generation is None and individual is None and ending not in _MOVING:
         name = tally.name_of(condition)
-        (drawing,) = draw_tally_paths(tally, name, replicate)
-        return _save(drawing, out, f"A run of {name}")
+        return _save(draw_paths(tally, name, replicate), out, f"A run of {name}")
     if ending in _MOVING:
         title, trials = choose_moving([tally.folder], None, condition, replicate, generation, individual)
         return save_movie(trials, out, title=title)
     trial = choose_trial(tally, condition, replicate, generation, individual)
-    return _save(draw_chosen_trial(trial), out, trial.title)
+    return _save(draw_trial(tally, condition, replicate, generation, individual), out, trial.title)
 
 
 def _save(drawing: Drawing, out: Path, title: str) -> Path:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,19 +12,16 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
-    WIDE,
     Drawing,
-    draw_widths,
+    draw_wide,
     head_axes,
     new_figure,
     place_axes,
     shorten,
 )
-from realitygap.report._path_figure import no_such_run
 from realitygap.report._structures import selection_of
-from realitygap.report._tally import Tally, label_of, read_tally
+from realitygap.report._tally import Results, Tally, label_of, read_tally
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,11 +87,12 @@ def count_species(tally: Tally) -> SpeciesCounts:
 
 
 def draw_species(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    width: float = WIDE,
+    species: SpeciesCounts | None = None,
+    name: str = "species",
 ) -> Drawing:
     """The shares of the species in a run over its generations, and how many species all runs have.
 
@@ -103,31 +100,15 @@ def draw_species(
         folder: the results of a study, or the path to them.
         condition: of which; the first one that selects when not given.
         replicate: which run; when not given the one with most species, the first of several alike.
-        width: of the figure [in].
+        species: as `count_species` returns them; counted if not given.
+        name: what the ids in the drawing begin with.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
     tally = read_tally(folder)
-    (drawing,) = draw_tally_species(tally, count_species(tally), condition, replicate, widths=[width])
-    return drawing
-
-
-def draw_tally_species(
-    tally: Tally,
-    species: SpeciesCounts,
-    condition: str | None = None,
-    replicate: int | None = None,
-    *,
-    widths: Sequence[float] = (WIDE,),
-    name: str = "species",
-) -> list[Drawing]:
-    """As `draw_species`, of what was read already, in several widths; ids begin with `name`.
-
-    Raises:
-        ValueError: there is no such condition or run.
-    """
+    species = count_species(tally) if species is None else species
     condition = tally.name_of(condition)
     described = tally.condition(condition)
     of_runs = species.counts.filter(pl.col("condition") == condition)
@@ -137,9 +118,7 @@ def draw_tally_species(
         if most.is_empty():
             raise ValueError(f"Condition {condition!r} has no runs yet.")
         replicate = int(most["replicate"][int(most["species"].arg_max() or 0)])
-    rows = tally.folder.read(condition, [replicate], ["generation", "species"])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, condition, replicate))
+    rows = tally.rows_of(condition, replicate, ["generation", "species"])
     shares = _shares(rows)
     means = species.mean_by_selection(tally)
     n_runs = tally.runs.height
@@ -182,7 +161,7 @@ def draw_tally_species(
         _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
         return figure
 
-    return draw_widths(draw, widths, name, caption, alt)
+    return draw_wide(draw, name, caption, alt)
 
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:

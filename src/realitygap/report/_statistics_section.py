@@ -11,12 +11,12 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.platforms import is_physical
-from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_tally
+from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_champions
 from realitygap.report._comparisons import (
     INTERVAL_NAME,
     MARGIN,
     Comparison,
-    compare_tally,
+    compare_conditions,
     comparisons_content,
     same_but_for,
     signed,
@@ -28,10 +28,10 @@ from realitygap.report._questions import (
     Share,
     Variety,
     chances,
+    measure_variety,
     plateau_length,
     plateaus,
     spreads,
-    tally_variety,
 )
 from realitygap.report._statistics import Interval
 from realitygap.report._tally import Tally, label_of, settings_of
@@ -41,7 +41,7 @@ _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "ran
 
 def statistics_content(tally: Tally) -> dict[str, Any]:
     """Everything that the template of the section shows."""
-    comparisons = compare_tally(tally)
+    comparisons = compare_conditions(tally)
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     return {
         "interval": INTERVAL_NAME,
@@ -167,7 +167,7 @@ def _percent_span(share: Share) -> str:
 
 
 def _champions(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    found = retry_tally(tally)
+    found = retry_champions(tally)
     references = _references("noise", conditions)
     by_name = {each.condition: each for each in found}
     problems = {each.problem for each in found if each.problem}
@@ -267,7 +267,7 @@ def _number(value: float, digits: int = 3) -> str:
 
 
 def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    found = [each for each in tally_variety(tally) if each.n]
+    found = [each for each in measure_variety(tally) if each.n]
     if not found:
         return None
     by_name = {each.condition: each for each in found}

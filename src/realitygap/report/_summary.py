@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from realitygap.records import ResultsFolder
 from realitygap.report._statistics import interval_ranks, median_interval, quartiles
-from realitygap.report._tally import Measure, Tally, label_of, read_tally
+from realitygap.report._tally import Measure, Results, Tally, label_of, read_tally
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")
 _MEASURES: tuple[Measure, ...] = ("line", "ends")
@@ -27,7 +25,7 @@ SUMMARY_SCHEMA = pl.Schema(
 )
 
 
-def summarize(folder: ResultsFolder | str | Path) -> pl.DataFrame:
+def summarize(folder: Results) -> pl.DataFrame:
     """One row per condition, on the best coverage of each run (the highest of all its individuals).
 
     Args:
@@ -43,11 +41,7 @@ def summarize(folder: ResultsFolder | str | Path) -> pl.DataFrame:
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    return summarize_tally(read_tally(folder, with_uncounted=True))
-
-
-def summarize_tally(tally: Tally) -> pl.DataFrame:
-    """As `summarize`, of what was read already."""
+    tally = read_tally(folder, with_uncounted=True)
     rows = []
     for condition in tally.conditions:
         name = condition["name"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -113,22 +113,43 @@ class Tally:
         values[run, generation] = rows[measure].to_numpy()
         return values
 
+    def rows_of(self, condition: str, replicate: int, columns: Sequence[str] | None = None) -> pl.DataFrame:
+        """All rows of one run.
+
+        Raises:
+            ValueError: there is no such run.
+        """
+        rows = self.folder.read(condition, [replicate], columns)
+        if not rows.is_empty():
+            return rows
+        there = [int(run) for run in self.replicates(condition)]
+        has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
+        if there and there != list(range(there[0], there[-1] + 1)):
+            has += f", {len(there)} of them"
+        raise ValueError(f"Condition {condition!r} has no run {replicate} in {self.folder.path}: {has}.")
+
     def n_trials(self, condition: str | None = None) -> int:
         """How many individuals were tried, in one condition or in all."""
         rows = self.best if condition is None else self.best.filter(pl.col("condition") == condition)
         return int(rows["trials"].sum())
 
 
-def read_tally(folder: ResultsFolder | str | Path, *, with_uncounted: bool = False) -> Tally:
+Results = Tally | ResultsFolder | str | Path
+"""The results of a study, the path to them, or what `read_tally` read of them."""
+
+
+def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: the results of a study, or the path to them. A tally is returned as it is.
         with_uncounted: whether conditions of which nobody counted cells are kept; their coverage is NaN.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
+    if isinstance(folder, Tally):
+        return folder
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
     parts = [
         frame.group_by("condition", "replicate", "generation", maintain_order=True).agg(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,6 @@ import polars as pl
 
 from realitygap.drawing import Ink
 from realitygap.errors import whole_number
-from realitygap.records import ResultsFolder
 from realitygap.report._drawing import (
     Drawing,
     head_axes,
@@ -27,10 +25,9 @@ from realitygap.report._path_figure import (
     arena_extent,
     draw_arena,
     draw_path,
-    no_such_run,
     typical_replicate,
 )
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
 
@@ -98,9 +95,7 @@ def choose_trial(
         if number is not None:
             whole_number(what, number)
     replicate = typical_replicate(tally, name) if replicate is None else replicate
-    rows = tally.folder.read(name, [replicate])
-    if rows.is_empty():
-        raise ValueError(no_such_run(tally, name, replicate))
+    rows = tally.rows_of(name, replicate)
     if individual is not None and generation is None:
         raise ValueError(f"Individual {individual} of which generation? Name it too.")
     last = int(rows["generation"].max())  # type: ignore[arg-type]
@@ -125,7 +120,7 @@ def choose_trial(
 
 
 def draw_trial(
-    folder: ResultsFolder | str | Path,
+    folder: Results,
     condition: str | None = None,
     replicate: int | None = None,
     generation: int | None = None,
@@ -145,11 +140,7 @@ def draw_trial(
             otherwise than recorded.
         ValueError: there is no such trial.
     """
-    return draw_chosen_trial(choose_trial(read_tally(folder), condition, replicate, generation, individual))
-
-
-def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
-    """As `draw_trial`, of a trial chosen already; `name` is what the ids in the drawing begin with."""
+    trial = choose_trial(read_tally(folder), condition, replicate, generation, individual)
     trajectory = _replayed(trial)
     coverage = trial.row[trial.measure]
     counted = "along the line driven" if trial.measure == "coverage_line" else "at the ends of steps"
@@ -164,7 +155,7 @@ def draw_chosen_trial(trial: ChosenTrial, *, name: str = "trial") -> Drawing:
     alt = f"Path, readings and commands of one trial. {caption}"
     with house_style():
         figure = _draw(trial, trajectory)
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        return Drawing(to_svg(figure, "trial", alt), caption, alt, figure)
 
 
 def _replayed(trial: ChosenTrial) -> Trajectory:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Self
-
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 
 
-class ProgramRobot:
+class ProgramRobot(ClosedOnExit):
     """A robot that lives in this program: it can be stopped, closed and left, and is not asked once it was closed."""
 
     _is_open = True
@@ -21,14 +19,6 @@ class ProgramRobot:
         """Stop it and let go of it; safe to call twice."""
         self.stop()
         self._is_open = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _check_open(self) -> None:
         if not self._is_open:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import statistics
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any
 
 from realitygap.errors import StudyError, did_you_mean, whole_number
@@ -17,7 +15,7 @@ from realitygap.world import load_arena
 
 from ._executors import usable_processors
 from ._run import Progress
-from ._task import checked_settings
+from ._task import checked_settings, run_in_threads
 
 MAZE_SEEDS = 40
 """Runs of each reward, as published."""
@@ -106,38 +104,15 @@ def _run_all(
     tell: Callable[[Progress], None] | None,
 ) -> list[MazeRun]:
     """All runs, those for novelty first, on threads."""
-    trials = MazeTrials(load_arena(maze.name))
-    tell = tell or (lambda _: None)
-    n_runs = len(MAZE_REWARDS) * seeds
-    tell(Progress(0, n_runs, 0, 0.0))
-    small = settings.model_copy(update={"population": 2, "generations": 2})
-    for reward in MAZE_REWARDS:
-        run_maze(maze, trials, reward, small, seed, 0)  # compiles
-    since = time.perf_counter()
-    over = threading.Event()
+    trials, over = MazeTrials(load_arena(maze.name)), threading.Event()
+
+    def compile_kernels() -> None:
+        small = settings.model_copy(update={"population": 2, "generations": 2})
+        for reward in MAZE_REWARDS:
+            run_maze(maze, trials, reward, small, seed, 0)
 
     def run(k: int) -> MazeRun:
         reward, replicate = MAZE_REWARDS[k // seeds], k % seeds
         return run_maze(maze, trials, reward, settings, seed, replicate, go_on=lambda: not over.is_set())
 
-    with ThreadPoolExecutor(threads, thread_name_prefix="run") as pool:
-        futures = [pool.submit(run, k) for k in range(n_runs)]
-        try:
-            _watch(futures, lambda done: tell(Progress(done, n_runs, done, time.perf_counter() - since)))
-        except BaseException:
-            over.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return [future.result() for future in futures]
-
-
-def _watch(futures: Sequence[Future[MazeRun]], tell: Callable[[int], None]) -> None:
-    """Wait for all, and say how many are done whenever one is."""
-    left = set(futures)
-    while left:
-        # The time-out lets Ctrl-C through on every system.
-        done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
-        for future in done:
-            future.result()  # an error ends all
-        if done:
-            tell(len(futures) - len(left))
+    return run_in_threads(run, len(MAZE_REWARDS) * seeds, threads, tell, compile_kernels, over.set)

@@ -6,7 +6,7 @@ import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from typing import Any
+from typing import Any, TypeVar
 
 from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
@@ -16,6 +16,8 @@ from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
 from ._executors import usable_processors
 from ._problems import Problems
 from ._run import Progress
+
+Run = TypeVar("Run")
 
 
 def measure_task(
@@ -140,22 +142,51 @@ def _run_all(
     tell: Callable[[Progress], None] | None,
 ) -> list[TaskRun]:
     """All runs, on threads, in the order of their replicates."""
-    if tell is not None:
-        tell(Progress(0, seeds, 0, 0.0))
-    run_task(task, settings.model_copy(update={"population": 2, "generations": 1}), seed, 0)  # compiles
+
+    def compile_kernels() -> None:
+        run_task(task, settings.model_copy(update={"population": 2, "generations": 1}), seed, 0)
+
+    return run_in_threads(
+        lambda replicate: run_task(task, settings, seed, replicate), seeds, threads, tell, compile_kernels
+    )
+
+
+def run_in_threads(
+    run: Callable[[int], Run],
+    n_runs: int,
+    threads: int,
+    tell: Callable[[Progress], None] | None,
+    begin: Callable[[], None],
+    stop: Callable[[], None] = lambda: None,
+) -> list[Run]:
+    """Compute runs 0 to n_runs - 1 on threads and return them in order; an error in one ends all.
+
+    Args:
+        run: Computes the run of a number.
+        n_runs: How many.
+        threads: Runs at once.
+        tell: Called with the progress.
+        begin: Called before the time is taken, such as to compile the kernels.
+        stop: Called when an error or Ctrl-C ends the others.
+    """
+    tell = tell or (lambda _: None)
+    tell(Progress(0, n_runs, 0, 0.0))
+    begin()
     since = time.perf_counter()
     with ThreadPoolExecutor(threads, thread_name_prefix="run") as pool:
-        futures = [pool.submit(run_task, task, settings, seed, replicate) for replicate in range(seeds)]
+        futures = [pool.submit(run, number) for number in range(n_runs)]
+        left = set(futures)
         try:
-            left = set(futures)
             while left:
                 # The time-out lets Ctrl-C through on every system.
-                _, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
-                done = seeds - len(left)
-                if tell is not None and done:
-                    tell(Progress(done, seeds, done, time.perf_counter() - since))
+                done, left = wait(left, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in done:
+                    future.result()
+                if done:
+                    n_done = n_runs - len(left)
+                    tell(Progress(n_done, n_runs, n_done, time.perf_counter() - since))
         except BaseException:
-            for future in futures:
-                future.cancel()
+            stop()
+            pool.shutdown(wait=False, cancel_futures=True)
             raise
     return [future.result() for future in futures]

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap.settings import Settings
+from realitygap.world import SENSORS
 
 
 def _as_tuple(names: Any) -> Any:
@@ -32,7 +33,8 @@ class ControllerSettings(Settings):
         (),
         max_length=256,
         description="Names of the inputs of networks, in order: obstacle (the largest range reading), stall, time, "
-        "range.K, light.K, line.K, bump.K, encoder.K, goal_sector.K, goal_distance, last_move, last_turn. The "
+        + "".join(f"{kind}.K, " for kind in SENSORS)
+        + "encoder.K, goal_sector.K, goal_distance, last_move, last_turn. The "
         "constant input is bias, the last one. The robot and the arena must have them. None: those of the task.",
     )
     outputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(

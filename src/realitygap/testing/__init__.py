@@ -5,7 +5,7 @@ from ._platform import PlatformContractError, check_platform
 from ._robot import RobotContractError, check_robot
 from ._sheet_drawing import Difficulty
 from ._sheet_photograph import SheetPhotograph, photograph_sheet
-from ._sheet_trials import cells_along_path, driven_paths
+from ._sheet_trials import driven_paths
 
 __all__ = [
     "Difficulty",
@@ -14,7 +14,6 @@ __all__ = [
     "PlatformContractError",
     "RobotContractError",
     "SheetPhotograph",
-    "cells_along_path",
     "check_platform",
     "check_robot",
     "driven_paths",

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from realitygap.errors import RealityGapError
-from realitygap.evolution import ControllerInterface, Genome, NeatSettings, Population, listed
+from realitygap.evolution import ControllerInterface, Genome, NeatSettings, Population, decode_all, listed
 from realitygap.platforms import Opening, Platform
 from realitygap.records import ObservedTrial
 from realitygap.robots import channels_of
@@ -145,8 +145,6 @@ class _Check:
 
     def batch(self) -> list[str]:
         """Many trials in one call agree with trials one by one."""
-        from realitygap.evolution import decode_all
-
         rules, bias_value = self.genomes[0].rules, self.genomes[0].bias_value
         short = self.platform.model_copy(update={"steps": STEPS})
         trials = short.prepare(

@@ -8,7 +8,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import Arena, Grid, Pose
+from realitygap.evolution import NeatSettings, Population
+from realitygap.platforms import SimPlatform, SimTarget
+from realitygap.trials import TrialPlan
+from realitygap.world import Arena, Pose
 
 PARTS = 12  # points on the arc of one command
 BY_HAND = (
@@ -32,10 +35,6 @@ def driven_paths(
     Returns:
         For each generation eight paths, each (12 steps + 1, 2) x and y [m].
     """
-    from realitygap.evolution import NeatSettings, Population
-    from realitygap.platforms import SimPlatform, SimTarget
-    from realitygap.trials import TrialPlan
-
     population = Population(3, 2, NeatSettings.named("rosenzweig-remy"), seed=seed)
     rng = np.random.default_rng((seed, 0x4A4D))
     sheets = []
@@ -70,15 +69,3 @@ def along_arcs(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         moved = chord * (u + 1j * v)
         points.append(np.column_stack([x + moved.real, y + moved.imag]))
     return np.concatenate(points)
-
-
-def cells_along_path(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
-    """The cells that a path crosses, as the records count them, in order of first visit.
-
-    Args:
-        path: (n, 2) x and y [m].
-        grid: Of cells.
-    """
-    from realitygap.robots.twin import cells_along
-
-    return cells_along(path, grid)

@@ -141,7 +141,6 @@ def drive_trial(
     *,
     interface: ControllerInterface | None = None,
     watch: Watch | None = None,
-    clock: Clock | None = None,
     sees_end: bool = False,
 ) -> DrivenTrial:
     """Run one trial of a network on a robot that stands at its start.
@@ -154,7 +153,6 @@ def drive_trial(
         n_steps: Number of commands in a whole trial, >= 1.
         interface: Names of the inputs; the paper's largest reading, stall and step / steps if not given.
         watch: Called at each step, before its command is sent.
-        clock: Clock by which steps are timed; the robot's own, or real time, if not given.
         sees_end: Whether the robot is observed once more after the last command.
 
     Returns:
@@ -168,9 +166,7 @@ def drive_trial(
     interface = interface or paper_interface(constant=False)
     interface.check(inputs_of_robot(robot.n_sensors, channels_of(robot)), "The network", "the robot")
     controller = controller_of(network, interface, n_steps)
-    return run_trial(
-        robot, controller, n_steps, watch=watch, clock=clock, sees_end=sees_end, channels=interface.channels
-    )
+    return run_trial(robot, controller, n_steps, watch=watch, sees_end=sees_end, channels=interface.channels)
 
 
 def controller_of(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.kernels.jyro import scene as kernel
+from realitygap.records import is_special, write_whole
 from realitygap.world import Case, CaseBody, CaseDevice
 
 from ..errors import CaseError, RecordError
@@ -58,8 +59,6 @@ class SceneTrack:
         Raises:
             CaseError: The file cannot be written, or belongs to a study's results.
         """
-        from ..records import write_whole
-
         try:
             write_whole(path, (f"{line}\n".encode() for line in self._lines()))
         except RecordError as error:
@@ -132,8 +131,6 @@ def simulate_file(case: str | Path, out: str | Path) -> tuple[Case, SceneTrack]:
 
 
 def _check_ending(out: Path) -> None:
-    from ..records import is_special
-
     if out.suffix.lower() not in (".csv", "") and not is_special(out):
         raise CaseError(f"{out} ends in {out.suffix}, expected .csv: a track is a CSV file.")
 

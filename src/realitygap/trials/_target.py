@@ -109,7 +109,7 @@ def check_plans(
     plans: Sequence[TrialPlan],
     observe: Observe,
     target: Target,
-    most_number: int,
+    most_number: int = 2**32 - 1,
 ) -> None:
     """Refuse plans that a target cannot carry out.
 

@@ -25,7 +25,6 @@ from ._target import TellTrial, TrialPlan, check_plans
 OnLost = Literal["retry", "skip", "stop"]
 """What follows a trial in which the link was lost: the same again, once; the next one; or nothing."""
 
-MOST_NUMBER = 2**32 - 1
 LATE = 0.02
 """How much longer than said most commands of a trial may take before what they took is kept instead."""
 
@@ -156,7 +155,7 @@ class RobotTarget(ClosedOnExit):
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
-        check_plans(plans, observe, self, MOST_NUMBER)
+        check_plans(plans, observe, self)
         trials = []
         try:
             for k, plan in enumerate(plans):

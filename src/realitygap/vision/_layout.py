@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from realitygap.world import Arena, Grid, Pose
 
+from ._tags import tag_bits
+
 PEN_NAMES = ("black", "red", "blue", "green", "orange", "purple", "brown", "pink")
 """Those that a study has when its file names none."""
 
@@ -196,8 +198,6 @@ def _outline(box: Box, gray: float, width: float) -> list[Mark]:
 
 def _tag_marks(number: int, left: float, lower: float) -> list[Mark]:
     """The black parts of a tag, row by row."""
-    from ._tags import tag_bits
-
     is_black = ~tag_bits(number)
     size = TAG_SIZE / len(is_black)
     marks = []

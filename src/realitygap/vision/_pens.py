@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap.errors import from_extra
 
+from ._errors import SheetError
 from ._ink import to_linear
 from ._layout import Box, SheetLayout
 from ._mixtures import Mixtures
@@ -185,8 +186,6 @@ def _named(pen: str) -> Floats:
         SheetError: It is no color.
     """
     from matplotlib.colors import is_color_like, to_rgb
-
-    from ._errors import SheetError
 
     if pen.lower() in COMMON_INKS:
         color = np.array(COMMON_INKS[pen.lower()], np.uint8)

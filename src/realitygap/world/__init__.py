@@ -29,19 +29,20 @@ from ._part import MOST_CORNERS, Part, rounded, why_no_part
 from ._pictures import (
     arena_picture,
     dimension_line,
+    extent_of,
     floor_shapes,
-    goal_shapes,
     length_text,
-    light_shapes,
     obstacle_shapes,
     robot_picture,
+    things_in,
 )
 from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
-from ._robot_model import RangeSensor, RobotModel
+from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
 from ._units import INCH
+from ._visited import VisitedCells, cells_along
 
 __all__ = [
     "BARE_FLOOR",
@@ -50,6 +51,7 @@ __all__ = [
     "MOST_CORNERS",
     "MOST_ROBOTS",
     "NAMED_STARTS",
+    "SENSORS",
     "Arena",
     "ArenaFile",
     "ArenaSettings",
@@ -72,19 +74,20 @@ __all__ = [
     "RangeSensors",
     "RobotModel",
     "Segment",
+    "VisitedCells",
     "arena_names",
     "arena_picture",
+    "cells_along",
     "check_drawn_starts",
     "check_start",
     "dimension_line",
     "distance_to_segment",
     "enclosing_walls",
+    "extent_of",
     "floor_shapes",
-    "goal_shapes",
     "in_si",
     "is_inside",
     "length_text",
-    "light_shapes",
     "load_arena",
     "load_calibration",
     "load_robot",
@@ -96,5 +99,6 @@ __all__ = [
     "robot_names",
     "robot_picture",
     "rounded",
+    "things_in",
     "why_no_part",
 ]

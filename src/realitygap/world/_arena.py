@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
@@ -23,6 +24,11 @@ class Pose(NamedTuple):
     x: float
     y: float
     heading: float
+
+    def point(self, ahead: float, left: float) -> tuple[float, float]:
+        """The place in the arena of a point of the robot [m]."""
+        sine, cosine = math.sin(self.heading), math.cos(self.heading)
+        return self.x + ahead * cosine - left * sine, self.y + ahead * sine + left * cosine
 
 
 @dataclass(frozen=True)

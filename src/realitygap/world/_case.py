@@ -34,12 +34,20 @@ Other keys are notes and are passed over, unless they look like a misspelt one o
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from json import JSONDecodeError
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from .._limits import MOST_JSON_BYTES, parse_json, read_file
 from ..errors import CaseError, did_you_mean
@@ -63,6 +71,17 @@ Row2 = Annotated[list[float], Field(min_length=2, max_length=2)]
 Row3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Row4 = Annotated[list[float], Field(min_length=4, max_length=4)]
 Positive = Annotated[float, Field(gt=0.0)]
+
+
+def _one_of(what: str, names: Collection[str]) -> AfterValidator:
+    """A check that a text is one of the known names."""
+
+    def check(name: str) -> str:
+        if name not in names:
+            raise ValueError(f"unknown {what} {shown(name)}. {did_you_mean(name, names)}")
+        return name
+
+    return AfterValidator(check)
 
 
 class _Part(BaseModel):
@@ -125,29 +144,15 @@ class CaseBody(_Part):
 class CaseDevice(_Part):
     """Sensors that are read together; `geometry` has a row forward, left [m], angle [rad] for each."""
 
-    kind: str
+    kind: Annotated[str, _one_of("kind of device", DEVICES)]
     type: str
     geometry: list[Row3]
     max_range: Positive
-    mode: str = "linear"
+    mode: Annotated[str, _one_of("mode", LIGHT_MODES)] = "linear"
 
     @classmethod
     def _filled(cls, data: dict[str, Any]) -> dict[str, Any]:
         return complete_device(data)
-
-    @field_validator("kind")
-    @classmethod
-    def _kind_is_known(cls, kind: str) -> str:
-        if kind not in DEVICES:
-            raise ValueError(f"unknown kind of device {shown(kind)}. {did_you_mean(kind, DEVICES)}")
-        return kind
-
-    @field_validator("mode")
-    @classmethod
-    def _mode_is_known(cls, mode: str) -> str:
-        if mode not in LIGHT_MODES:
-            raise ValueError(f"unknown mode {shown(mode)}. {did_you_mean(mode, LIGHT_MODES)}")
-        return mode
 
     @property
     def reads_light(self) -> bool:
@@ -165,18 +170,11 @@ class CaseLayer(_Part):
 class CaseController(_Part):
     """A feed-forward network from readings to v [m/s] and w [rad/s]."""
 
-    type: str = "tanh_layers"
+    type: Annotated[str, _one_of("type of controller", CONTROLLERS)] = "tanh_layers"
     inputs: list[str]
     layers: Annotated[list[CaseLayer], Field(min_length=1)]
     output_scale: Row2 = [1.0, 1.0]
     sensor_max_range: Positive = 1.0
-
-    @field_validator("type")
-    @classmethod
-    def _type_is_known(cls, name: str) -> str:
-        if name not in CONTROLLERS:
-            raise ValueError(f"unknown type of controller {shown(name)}. {did_you_mean(name, CONTROLLERS)}")
-        return name
 
     @field_validator("inputs")
     @classmethod
@@ -192,7 +190,7 @@ class CaseRobot(_Part):
     """A robot, where it starts, what it senses, and what drives it: commands or a controller."""
 
     name: str
-    robot_class: str = Field(alias="class")
+    robot_class: Annotated[str, _one_of("class of robot", ROBOT_BODIES)] = Field(alias="class")
     bounding_box: CaseBody
     start: CaseStart
     devices: list[CaseDevice] = []
@@ -220,13 +218,6 @@ class CaseRobot(_Part):
     @classmethod
     def _name_as_in_jyro(cls, name: str) -> str:
         return name.replace(" ", "_")
-
-    @field_validator("robot_class")
-    @classmethod
-    def _class_is_known(cls, name: str) -> str:
-        if name not in ROBOT_BODIES:
-            raise ValueError(f"unknown class of robot {shown(name)}. {did_you_mean(name, ROBOT_BODIES)}")
-        return name
 
 
 class Case(_Part):

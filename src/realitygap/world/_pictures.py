@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
+from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
 from ._arena import Arena, Pose
 from ._floor import BARE_FLOOR, Floor, FloorImage
@@ -34,7 +34,7 @@ def arena_picture(
         body: Outline of the robot, or the robot itself, drawn at the start.
         sensors: Its rays, drawn as far as they see.
     """
-    left, bottom, right, top = _extent(arena)
+    left, bottom, right, top = extent_of(arena)
     size = max(right - left, top - bottom) / PAPER_WIDTH  # 1 for the paper's arena
     grid = arena.grid
     cells_right, cells_top = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
@@ -83,17 +83,17 @@ def _model_shapes(model: RobotModel, pose: Pose) -> list[Shape]:
     """A robot of a file at a pose: its rays, cut off at the size of its body, and its outline."""
     shapes: list[Shape] = []
     for sensor in model.range:
-        x, y = _placed(pose, sensor.x, sensor.y)
+        x, y = pose.point(sensor.x, sensor.y)
         angle, far = pose.heading + sensor.direction, min(sensor.reach, 2 * model.radius)
         end = (x + far * math.cos(angle), y + far * math.sin(angle))
         shapes += [Line(((x, y), end), Ink.PUBLISHED, 0.9, (3.0, 1.6)), Disc(x, y, 1.3, None, Ink.PUBLISHED)]
     for part in model.body:
-        outline = tuple(_placed(pose, x, y) for x, y in part.outline())
+        outline = tuple(pose.point(x, y) for x, y in part.outline())
         shapes.append(Line(outline, Ink.BODY, 1.4, closed=True))
     return shapes
 
 
-def _extent(arena: Arena) -> tuple[float, float, float, float]:
+def extent_of(arena: Arena) -> tuple[float, float, float, float]:
     """Left, bottom, right and top of what is to be seen [m]."""
     grid = arena.grid
     points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
@@ -142,6 +142,13 @@ def _arena_in_words(arena: Arena, width: float, height: float) -> str:
         f"reachable cells of {length_text(grid.cell)}{', ' if there else ''}{', '.join(there)}. Trials begin at "
         f"({start.x:.4g}, {start.y:.4g}) m, heading {start.heading:.4g} rad."
     )
+
+
+def things_in(arena: Arena) -> list[Shape]:
+    """Obstacles, lights and the goal."""
+    shapes = [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
+    shapes += [shape for light in arena.lights for shape in light_shapes(light)]
+    return shapes + (goal_shapes(arena.goal) if arena.goal is not None else [])
 
 
 def obstacle_shapes(obstacle: Obstacle) -> list[Shape]:
@@ -241,20 +248,15 @@ def robot_picture(name: str, body: Body, sensors: RangeSensors) -> Picture:
     )
 
 
-def _placed(pose: Pose, forward: float, left: float) -> Point:
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    return (pose.x + forward * cosine - left * sine, pose.y + forward * sine + left * cosine)
-
-
 def _outline(body: Body, pose: Pose) -> list[Shape]:
-    corners = tuple(_placed(pose, forward, left) for forward, left in body.corners)
+    corners = tuple(pose.point(forward, left) for forward, left in body.corners)
     return [Line(corners, Ink.BODY, 1.4, closed=True)]
 
 
 def _rays(sensors: RangeSensors, pose: Pose) -> list[Shape]:
     shapes: list[Shape] = []
     for forward, left, direction in sensors.mounts:
-        x, y = _placed(pose, forward, left)
+        x, y = pose.point(forward, left)
         angle = pose.heading + direction
         end = (x + sensors.max_range * math.cos(angle), y + sensors.max_range * math.sin(angle))
         shapes.append(Line(((x, y), end), Ink.PUBLISHED, 1.0, (3.0, 1.6)))
@@ -263,10 +265,10 @@ def _rays(sensors: RangeSensors, pose: Pose) -> list[Shape]:
 
 
 def _start(pose: Pose, size: float = 1.0) -> list[Shape]:
-    tip = _placed(pose, 0.062 * size, 0.0)
+    tip = pose.point(0.062 * size, 0.0)
     shaft = Line(((pose.x, pose.y), tip), Ink.OURS, 1.4)
     back, aside = 0.045 * size, 0.012 * size
-    head = Line((_placed(pose, back, aside), tip, _placed(pose, back, -aside)), Ink.OURS, 1.4)
+    head = Line((pose.point(back, aside), tip, pose.point(back, -aside)), Ink.OURS, 1.4)
     return [shaft, head, Disc(pose.x, pose.y, 2.6, fill=Ink.OURS)]
 
 

@@ -109,12 +109,8 @@ def _is_within(walls: Sequence[Segment], x: float, y: float) -> bool:
 def _outlines(robot: Body | RobotModel, pose: Pose) -> Iterator[tuple[Point, ...]]:
     """The outlines of a robot at a pose, each convex [m]."""
     parts = [robot.corners] if isinstance(robot, Body) else [part.outline() for part in robot.body]
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
     for part in parts:
-        yield tuple(
-            (pose.x + forward * cosine - left * sine, pose.y + forward * sine + left * cosine)
-            for forward, left in part
-        )
+        yield tuple(pose.point(*corner) for corner in part)
 
 
 def _solids(arena: Arena) -> Iterator[tuple[str, tuple[Point, ...]]]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from realitygap.drawing import picture_of
+from realitygap.drawing import Ink, picture_of
 from realitygap.settings import Settings
 
 from ._numbers import Described, NotNegative, Number, Positive, Share
@@ -231,6 +231,27 @@ class BumpSensor(Settings):
     x: Number = Field(description="Ahead of the body's origin [m].")
     y: Number = Field(description="To the left [m].")
     reach: Positive = Field(description="How near the touch must be [m].")
+
+
+class SensorKind(NamedTuple):
+    """Properties that all sensors of a kind share.
+
+    Attributes:
+        ink: Color of their places in pictures.
+        is_signed: Whether they answer -1..1, not 0..1.
+    """
+
+    ink: str
+    is_signed: bool = False
+
+
+SENSORS = {
+    "range": SensorKind(Ink.PUBLISHED),
+    "light": SensorKind(Ink.PEN5),
+    "line": SensorKind(Ink.PEN3),
+    "bump": SensorKind(Ink.PEN4),
+}
+"""Kinds of sensors that are tables of their own in a robot file, in the order of their readings."""
 
 
 class Encoders(Settings):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
+from typing import Any
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
 from ._pictures import dimension_line, length_text
-from ._robot_model import LightSensor, RangeSensor, RobotModel
+from ._robot_model import SENSORS, LightSensor, RangeSensor, RobotModel
 
 WIDTH = 480.0  # of the picture when its texts have their sizes [pt]
 LETTERS = 104  # in a line of small text at that width
@@ -97,12 +99,9 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
         shorter = ", drawn shorter" if first.reach > FARTHEST * _size(model) else ""
         how = f"{kinds}, reach {length_text(first.reach)}{shorter}{cone}"
         found.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
-    if model.light:
-        found.append((_count(len(model.light), "light sensor"), Ink.TEXT, Ink.PEN5))
-    if model.line:
-        found.append((_count(len(model.line), "line sensor"), Ink.TEXT, Ink.PEN3))
-    if model.bump:
-        found.append((_count(len(model.bump), "bump sensor"), Ink.TEXT, Ink.PEN4))
+    for kind, sensors in _point_sensors(model):
+        if sensors:
+            found.append((_count(len(sensors), f"{kind} sensor"), Ink.TEXT, SENSORS[kind].ink))
     drive = model.drive
     if drive.mixing == "wheels":
         levels = f" in {drive.levels} levels" if drive.levels else ""
@@ -197,10 +196,16 @@ def _marks(model: RobotModel) -> list[Shape]:
     if model.looks.pen is not None:
         shapes.append(Disc(*model.looks.pen, 4.6, color=Ink.OURS, fill=SHELL))
         shapes.append(Disc(*model.looks.pen, 1.6, color=None, fill=Ink.OURS))
-    for sensors, ink in ((model.light, Ink.PEN5), (model.line, Ink.PEN3), (model.bump, Ink.PEN4)):
+    for kind, sensors in _point_sensors(model):
+        ink = SENSORS[kind].ink
         shapes += [Disc(sensor.x, sensor.y, 2.6, color=Ink.GROUND, fill=ink, width=0.6) for sensor in sensors]
     shapes += [Disc(s.x, s.y, 2.0, color=Ink.GROUND, fill=Ink.PUBLISHED, width=0.5) for s in model.range]
     return shapes
+
+
+def _point_sensors(model: RobotModel) -> list[tuple[str, Sequence[Any]]]:
+    """Sensors other than range sensors, by kind."""
+    return [(kind, getattr(model, kind)) for kind in SENSORS if kind != "range"]
 
 
 def _around(shapes: list[Shape]) -> tuple[float, float, float, float]:

@@ -16,6 +16,8 @@ from xml.etree import ElementTree
 
 from realitygap.settings import shown
 
+from ._part import why_no_part
+
 Point = tuple[float, float]
 
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -407,8 +409,6 @@ def _add_wall(values: dict[str, Any], shape: Shape) -> None:
 
 
 def _add_obstacle(values: dict[str, Any], shape: Shape) -> None:
-    from ._part import why_no_part
-
     points = _corners(shape)
     x, y = (sum(point[axis] for point in points) / len(points) for axis in (0, 1))
     corners = [(px - x, py - y) for px, py in points]

@@ -18,6 +18,7 @@ from realitygap.lab._form import (
     entered,
     form_sections,
     read_form,
+    toml_value,
     written_form,
 )
 from realitygap.lab._lab import Lab
@@ -285,8 +286,6 @@ def _input(field: Field, value: Any, put: Any) -> None:
 
 
 def _as_entered(field: Field, value: Any) -> str:
-    from realitygap.lab._form import toml_value
-
     return value if field.kind == "text" and isinstance(value, str) else toml_value(value)
 
 

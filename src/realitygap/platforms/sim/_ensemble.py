@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from realitygap.kernels.neat.network import Networks
 from realitygap.kernels.sim.lanes import make_sim_room
 from realitygap.kernels.sim.replay import Rehearsed, rehearse
 from realitygap.kernels.sim.shape import half_width
-from realitygap.trials import Draws, check_genomes
+from realitygap.trials import Draws, check_genomes, usable_processors
 from realitygap.world import Arena, Distribution
 
 from ._platform import SimPlatform
@@ -142,7 +141,7 @@ class SimEnsemble:
     ) -> None:
         self.platform = platform
         self.arena = arena
-        self.threads = _processors() if threads is None else whole_number("threads", threads, 1)
+        self.threads = usable_processors() if threads is None else whole_number("threads", threads, 1)
         self._ranges = {name: (float(low), float(high)) for name, (low, high) in (ranges or {}).items()}
         self._scenes: dict[tuple[object, ...], SimScene] = {}
         self._own = self._make_scene(("stall",), {})
@@ -504,8 +503,3 @@ def _gathered(parts: Sequence[tuple[NDArray[np.int64], Rehearsal]]) -> Rehearsal
     return Rehearsal(
         *(_in_order(((robots, getattr(part, name)) for robots, part in parts), m) for name in names)
     )
-
-
-def _processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -165,12 +165,8 @@ class SimRobot(ProgramRobot):
         values = {**self._scene.fixed, **self.drawn}
         x, y, heading = (values[f"arena.start.{name}"] for name in ("x", "y", "heading"))
         ahead, left, turned = self._room.lanes.senses.reckoned[:, 0].tolist()
-        sine, cosine = math.sin(heading), math.cos(heading)
-        return Pose(
-            x + ahead * cosine - left * sine,
-            y + ahead * sine + left * cosine,
-            (heading + turned * math.tau) % math.tau,
-        )
+        place = Pose(x, y, heading).point(ahead, left)
+        return Pose(*place, (heading + turned * math.tau) % math.tau)
 
     def _check_encoders(self) -> None:
         if self._scene.robot.encoder is None:

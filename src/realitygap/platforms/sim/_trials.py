@@ -14,7 +14,7 @@ from realitygap.kernels.sim.shape import SimShape
 from realitygap.kernels.sim.trial import run_sim_trials
 from realitygap.tasks import TraceArrays
 from realitygap.trials import REAL, Draws, TrialBatch, Tried
-from realitygap.world import Arena
+from realitygap.world import SENSORS, Arena
 
 from ..jyro._trials import SNAP
 from ._platform import SimPlatform
@@ -141,13 +141,7 @@ def sim_rules(scene: SimScene, bias_value: float) -> SimRules:
 
 def sensor_names(shape: SimShape) -> tuple[str, ...]:
     """Names of the readings in a trace, in order."""
-    counts = {
-        "range": shape.row_range.size,
-        "light": shape.row_light.size,
-        "line": shape.row_line.size,
-        "bump": shape.row_bump.size,
-    }
-    return tuple(f"{kind}.{k}" for kind, n in counts.items() for k in range(n))
+    return tuple(f"{kind}.{k}" for kind in SENSORS for k in range(getattr(shape, f"row_{kind}").size))
 
 
 def _as_arrays(trace: SimTrace) -> TraceArrays:

@@ -88,9 +88,7 @@ class SimWorldRobot(ProgramRobot):
 
     def point(self, ahead: float, left: float) -> Point:
         """Where a point of the robot is in the arena [m]."""
-        x, y, heading = self.pose
-        sine, cosine = math.sin(heading), math.cos(heading)
-        return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
+        return self.pose.point(ahead, left)
 
     @property
     def stalled(self) -> bool:

@@ -15,8 +15,6 @@ from realitygap.world import Arena
 from ._plan_file import plan_to_dict
 from ._pool import TwinPool
 
-MOST_NUMBER = 2**32 - 1
-
 
 class TwinTarget(ClosedOnExit):
     """A twin, whose file this process never opens.
@@ -66,7 +64,7 @@ class TwinTarget(ClosedOnExit):
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`; on Ctrl-C its processes end."""
-        check_plans(plans, observe, self, MOST_NUMBER)
+        check_plans(plans, observe, self)
         requests = [{"do": "carry_out", "plan": plan_to_dict(plan), "observe": observe} for plan in plans]
         trials: list[ObservedTrial] = []
         try:

@@ -106,9 +106,7 @@ class SceneRobot:
 
     def point(self, forward: float, left: float) -> Point:
         """Where a point of the robot is in the world [m]."""
-        here = self.pose
-        sine, cosine = math.sin(here.heading), math.cos(here.heading)
-        return here.x + forward * cosine - left * sine, here.y + forward * sine + left * cosine
+        return self.pose.point(forward, left)
 
     @property
     def odometry(self) -> Pose:

@@ -51,11 +51,6 @@ class Request:
     pause_s: float = 0.0
     may_stay_out: bool = False
 
-    @property
-    def opcode(self) -> int:
-        """The first byte, which decides who takes it."""
-        return self.data[0]
-
 
 class SensorBlock(NamedTuple):
     """All senses of a robot without its Fluke, as they came.

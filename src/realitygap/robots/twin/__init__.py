@@ -2,7 +2,6 @@
 
 from ._body import TwinBody
 from ._camera import TwinCamera
-from ._cells import cells_along
 from ._families import EVERY, FAMILIES, Family, FamilyRow, Range, family_rows, sample_twin
 from ._file import load_twin
 from ._ir import places_of
@@ -21,7 +20,6 @@ __all__ = [
     "TwinClock",
     "TwinModel",
     "TwinRobot",
-    "cells_along",
     "family_rows",
     "load_twin",
     "outline_of",

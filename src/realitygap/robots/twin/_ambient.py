@@ -37,13 +37,13 @@ class Ambient:
                 found[f"light.{k}"] = max(1.0 - sensors.half / (2.0 * light), 0.0) if light else 0.0
         if self._line is not None:
             for k, (ahead, left) in enumerate(self._line.mount):
-                brightness = self._arena.floor.brightness(*_placed(pose, ahead, left))
+                brightness = self._arena.floor.brightness(*pose.point(ahead, left))
                 found[f"line.{k}"] = float(brightness < self._line.threshold)
         return found
 
     def _arriving(self, sensors: TwinLight, mount: TwinMount, pose: Pose) -> float:
         """Return the light that arrives at a sensor; a lamp of strength 1 straight ahead at 1 m gives 1."""
-        x, y = _placed(pose, mount.x, mount.y)
+        x, y = pose.point(mount.x, mount.y)
         direction, total = pose.heading + mount.direction, sensors.room
         for lamp in self._arena.lights:
             to_x, to_y = lamp.x - x, lamp.y - y
@@ -58,9 +58,3 @@ def names_of(model: TwinModel) -> tuple[str, ...]:
     light = 0 if model.light is None else len(model.light.mount)
     line = 0 if model.line is None else len(model.line.mount)
     return (*(f"light.{k}" for k in range(light)), *(f"line.{k}" for k in range(line)))
-
-
-def _placed(pose: Pose, ahead: float, left: float) -> tuple[float, float]:
-    """Return where a point of the body is in the arena [m]."""
-    sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-    return pose.x + ahead * cosine - left * sine, pose.y + ahead * sine + left * cosine

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError, from_extra
 from realitygap.world import Arena, Pose
 
@@ -22,7 +22,7 @@ FIELD = math.radians(45)  # of view, up and down: MuJoCo's
 TILT = 58.0  # of the camera, down from level [deg]
 
 
-class TwinCamera:
+class TwinCamera(ClosedOnExit):
     """Looks down on an arena, and draws a twin in it.
 
     Args:
@@ -90,14 +90,6 @@ class TwinCamera:
             self._drawer.free()
             self._context.free()
             self._context = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _off_screen(width: int, height: int) -> Any:

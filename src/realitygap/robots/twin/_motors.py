@@ -158,9 +158,6 @@ class Servo:
         patch = self._odd.patch
         if patch is None:
             return 1.0
-        sine, cosine = math.sin(pose.heading), math.cos(pose.heading)
-        left = side * self._track / 2
-        x = pose.x + self._axle * cosine - left * sine
-        y = pose.y + self._axle * sine + left * cosine
+        x, y = pose.point(self._axle, side * self._track / 2)
         inside = (x - patch.x) ** 2 + (y - patch.y) ** 2 < patch.radius**2
         return 1 - patch.slows if inside else 1.0

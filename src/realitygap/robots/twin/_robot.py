@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from realitygap.errors import whole_number
 from realitygap.robots._contract import Command, Label, Observation, check_command
 from realitygap.robots._in_program import ProgramRobot
-from realitygap.world import Arena, Pose
+from realitygap.world import Arena, Pose, cells_along
 
 from ._ambient import Ambient, names_of
-from ._cells import cells_along
 from ._encoders import Encoders
 from ._ir import IrSensors
 from ._model import TwinModel

@@ -294,8 +294,8 @@ def _median_goal(
         sense,
         [_why(twin, after, value) for twin, after, value in missing],
         [
-            {"twin": twin["twin"], "why": _why_unknown(name, after)}
-            for twin, after, value in found
+            {"twin": row["twin"], "why": _why_unknown(name, after)}
+            for row, after, value in found
             if value is None
         ],
     )
@@ -355,14 +355,14 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
         least,
         sense,
         [
-            {"twin": twin["twin"], "family": twin["family"], "figure": difference}
-            for twin, difference in pairs
+            {"twin": row["twin"], "family": row["family"], "figure": difference}
+            for row, difference in pairs
             if difference < 0
         ],
         [
-            {"twin": twin["twin"], "why": "its transfer is not done"}
-            for twin in counted
-            if twin["twin"] not in [each["twin"] for each, _ in pairs]
+            {"twin": row["twin"], "why": "its transfer is not done"}
+            for row in counted
+            if row not in [other for other, _ in pairs]
         ],
     )
 
@@ -375,14 +375,14 @@ def _why_unknown(name: str, after: Row) -> str:
     return "its trials are too few to tell"
 
 
-def _why(twin: Row, after: Row, value: float) -> Row:
+def _why(row: Row, after: Row, value: float) -> Row:
     """What is known of a twin that misses a goal."""
     names = ("misspecified", "misspecification_p", "at_prior_end")
     return {
-        "twin": twin["twin"],
-        "family": twin["family"],
+        "twin": row["twin"],
+        "family": row["family"],
         "figure": value,
-        "rms_before": twin["rms"]["estimate"],
+        "rms_before": row["rms"]["estimate"],
         "rms_after": after["rms"]["estimate"],
         **{name: after[name] for name in names},
     }

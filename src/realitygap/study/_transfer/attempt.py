@@ -26,7 +26,7 @@ class Simulation:
 
     def __init__(self, runs: int, repeats: int) -> None:
         self.runs, self.repeats = runs, repeats
-        self._known: dict[tuple[str, int, int, str], list[Champion]] = {}
+        self._known: dict[tuple[str, int, int], list[Champion]] = {}
 
     def champions(
         self,
@@ -34,7 +34,6 @@ class Simulation:
         replicate: int,
         *,
         runs: int | None = None,
-        rank_on: Condition | None = None,
     ) -> list[Champion]:
         """The champions of a replicate's runs under a condition, the best in simulation first.
 
@@ -42,15 +41,12 @@ class Simulation:
             condition: As `evolve_champions` wants it.
             replicate: Of the transfer.
             runs: How many of the replicate's runs; all when not given.
-            rank_on: On what they are ranked; `condition` when not given.
         """
         n = self.runs if runs is None else runs
-        key = (condition.hash(), replicate, n, "" if rank_on is None else rank_on.hash())
+        key = (condition.hash(), replicate, n)
         if key not in self._known:
             first = replicate * self.runs
-            self._known[key] = evolve_champions(
-                condition, range(first, first + n), repeats=self.repeats, rank_on=rank_on
-            )
+            self._known[key] = evolve_champions(condition, range(first, first + n), repeats=self.repeats)
         return self._known[key]
 
 
@@ -94,11 +90,9 @@ class Attempt:
         """Champions evolved under a condition, the attempt's own when not given; the best in simulation first."""
         return self.simulation.champions(condition or self.condition, self.replicate)
 
-    def try_on_target(
-        self, genomes: Sequence[Genome], purpose: str = "controller"
-    ) -> tuple[list[float], list[tuple[int, ...]]]:
+    def try_on_target(self, genomes: Sequence[Genome]) -> tuple[list[float], list[tuple[int, ...]]]:
         """Try genomes on the target, once each; the score of each, and the cells that it visited, if they are known."""
-        plans = plans_of(self.condition, genomes, self.target.spent, purpose)
+        plans = plans_of(self.condition, genomes, self.target.spent)
         trials = self.target.carry_out(plans, self.target.looks_at)
         scores = score_observed(self.condition.task_of_trials, trials, self.target.arena)
         return scores.tolist(), [trial.cells for trial in trials]
@@ -108,7 +102,9 @@ class Attempt:
         return self.try_on_target([champion.genome for champion in champions])[0]
 
 
-def plans_of(condition: Condition, genomes: Sequence[Genome], first: int, purpose: str) -> list[TrialPlan]:
+def plans_of(
+    condition: Condition, genomes: Sequence[Genome], first: int, purpose: str = "controller"
+) -> list[TrialPlan]:
     """A trial for each genome, as long as those of the condition, numbered from `first` on."""
     steps, sees_end = condition.on.steps, condition.task_of_trials.needs_trace
     return [

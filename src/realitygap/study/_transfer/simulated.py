@@ -48,9 +48,7 @@ def refuse_unevolved(condition: Condition) -> None:
         )
 
 
-def evolve_champions(
-    condition: Condition, runs: range, *, repeats: int, rank_on: Condition | None = None
-) -> list[Champion]:
+def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list[Champion]:
     """The champions of some runs, the best in simulation first.
 
     An individual is worth its mean score over its repeats; novelty, where that selects, is of the first repeat. A
@@ -60,7 +58,6 @@ def evolve_champions(
         condition: Of the runs, on platform `sim` or `jyro`.
         runs: Numbers of the replicates.
         repeats: Trials of each individual, every one on noise of its own.
-        rank_on: The condition on whose platform and noise champions are ranked; `condition` when not given.
 
     Raises:
         StudyError: A condition as `refuse_unevolved` says.
@@ -84,7 +81,7 @@ def evolve_champions(
             first = [batch.behavior((row * n + k) * repeats) for k in range(n)]
             population.tell(scores[row] if archive is None else archive.update(first))
     champions = [found[1] for found in best if found is not None]
-    return rank_genomes(rank_on or condition, champions, runs.start)
+    return rank_genomes(condition, champions, runs.start)
 
 
 def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int = 0) -> list[Champion]:

@@ -1,0 +1,33 @@
+"""The templates of pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import resources
+from typing import Any
+
+
+def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., str]) -> str:
+    """A page from a template, its style sheet and its content.
+
+    Args:
+        name: of the template.
+        content: what the template shows; it has the style sheet as `css`, too.
+        filters: functions that the template uses.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("realitygap.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(filters)
+    return environment.get_template(name).render({**content, "css": template_text("report.css")})
+
+
+def template_text(name: str) -> str:
+    """The text of a file in the folder of templates."""
+    return resources.files("realitygap.report").joinpath(f"templates/{name}").read_text(encoding="utf-8")

@@ -7,12 +7,15 @@ from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers
 from ._handles import MOTION
+from ._held_out import HeldOut
 from ._motion import MotionFit, fit_motion
+from ._motion_log import MotionLogFit, fit_motion_log
 from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
 from ._predictive import Misfit, misfits
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
+from ._range_table import RangeTableFit, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 from ._step import of_one_length, step_of
@@ -29,14 +32,17 @@ __all__ = [
     "Effort",
     "Evidence",
     "Floats",
+    "HeldOut",
     "Independence",
     "Misfit",
     "MotionFit",
+    "MotionLogFit",
     "Moved",
     "Parameter",
     "PathFit",
     "Placement",
     "Posterior",
+    "RangeTableFit",
     "SensorFit",
     "Simulate",
     "Vectors",
@@ -49,7 +55,9 @@ __all__ = [
     "fit_contact",
     "fit_from_poses",
     "fit_motion",
+    "fit_motion_log",
     "fit_path",
+    "fit_range_table",
     "fit_sensor",
     "independence",
     "information_of",

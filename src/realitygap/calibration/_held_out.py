@@ -1,0 +1,37 @@
+"""The error of predictions of the part of a recording that no fit has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Choice = Literal["fitted", "nominal"]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of two sets of numbers on the same unseen part.
+
+    Attributes:
+        measure: The error, in words.
+        unit: Unit of the errors, such as m; empty for readings.
+        nominal: Error of the numbers that the fit started from.
+        fitted: Error of the fitted numbers.
+        n: Observations in the unseen part.
+        more: Further errors by name: nominal and fitted, in the same unit unless the name says otherwise.
+        floor: Error of predicting each reading by its neighbors in the table; None for motion.
+    """
+
+    measure: str
+    unit: str
+    nominal: float
+    fitted: float
+    n: int
+    more: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    floor: float | None = None
+
+    @property
+    def recommended(self) -> Choice:
+        """The numbers with the smaller error; nominal if both are equal."""
+        return "fitted" if self.fitted < self.nominal else "nominal"

@@ -1,0 +1,395 @@
+"""The fit of a drive to a log of wheel commands, with what a camera or encoders saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from realitygap.world import Fitted, RobotModel
+
+from ._held_out import Choice, HeldOut
+from ._log_model import Log, encoder_likelihood, seen_rows, track, wheel_steps
+from ._simulate import Floats, plain_numbers
+
+N_DRAWS = 200
+ENDS = (0.05, 0.95)
+LEAST_ROWS = 10
+IDENTIFIED = 0.35
+"""A parameter is identified if its standard deviation is below this, in scales of its prior: half of what the prior has
+at its peak."""
+
+LEAST_CURVATURE = 0.03
+"""Of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
+
+STEP = 1e-3
+"""Of finite differences, in standard deviations of the prior."""
+
+METHOD = (
+    "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the poses by an extended "
+    "Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder readings; intervals from "
+    "the curvature (Laplace)."
+)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A parameter of a log with its prior.
+
+    Attributes:
+        name: As in a calibration.
+        kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value counts.
+        spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails let
+            go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
+        unit: Of its values.
+        advice: What to record if it is not identified.
+    """
+
+    name: str
+    kind: Literal["plus", "ratio", "size"]
+    spread: float
+    unit: str
+    advice: str
+    is_normal: bool = False
+
+    def log_prior(self, standard: Floats) -> Floats:
+        """Return log densities at points of the standard scale, less a constant."""
+        return np.asarray(-0.5 * standard**2 if self.is_normal else -np.log1p(standard**2))
+
+    @property
+    def most(self) -> float:
+        """The 95 % quantile of the prior on the standard scale."""
+        return 1.645 if self.is_normal else 6.314
+
+    def of(self, own: float, standard: Floats) -> Floats:
+        """Return values at points of the standard scale."""
+        if self.kind == "ratio":
+            return np.asarray(own * np.exp(self.spread * standard))
+        values = own + self.spread * standard
+        return np.abs(values) if self.kind == "size" else values
+
+
+DRIVE = (
+    Spread("drive.gain", "ratio", 0.01, "", "Drive straight for longer."),
+    Spread("drive.asymmetry", "plus", 0.005, "", "Drive straight, ahead and back."),
+    Spread("drive.track", "ratio", 0.01, "m", "Turn in place, both ways, with poses."),
+    Spread("drive.axle", "plus", 0.002, "m", "Turn in place, both ways, with poses."),
+    Spread("drive.drift_per_m", "plus", 0.01, "rad/m", "Drive straight, ahead and back, with poses."),
+    Spread("drive.soft_dead_band", "size", 0.02, "", "Drive at slow commands."),
+    Spread("drive.lag", "size", 0.02, "s", "Start and stop suddenly, and often."),
+)
+"""Numbers of the drive; the spreads are chosen."""
+
+OWN_NOISE = (
+    Spread("drive.travel_noise_per_m", "ratio", 1.0, "m", "Record poses for longer.", is_normal=True),
+    Spread("drive.heading_noise_per_m", "ratio", 1.0, "rad", "Record poses for longer.", is_normal=True),
+)
+SEEN_NOISE = {"place": 0.003, "angle": 0.01, "wheel": 0.0005, "wheel_per_m": 0.003}
+"""What errors of a camera and of encoders are near [m, rad, m, m]; a factor of e is one standard deviation."""
+
+LEAST_NOISE = 0.002
+"""Noise of the drive that a fit begins from, if the robot's file has less."""
+
+
+@dataclass(frozen=True)
+class MotionLogFit:
+    """A drive fitted to a log.
+
+    Attributes:
+        fitted: Parameters with 90 % intervals.
+        numbers: The estimate by the robot's dotted names.
+        draws: (d,) draws of each number, jointly.
+        held_out: Errors on the part that the fit did not see; None if it saw everything.
+        recommended: The numbers to use.
+        method: The method, with its source.
+        notes: Further results in words.
+        evidence: Data for figures: times, and the predicted and seen path of the unseen part.
+    """
+
+    fitted: tuple[Fitted, ...]
+    numbers: dict[str, float]
+    draws: dict[str, tuple[float, ...]]
+    held_out: HeldOut | None
+    recommended: Choice
+    method: str = METHOD
+    notes: tuple[str, ...] = ()
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def recommended_numbers(self) -> dict[str, float]:
+        """The fitted numbers, or none if those of the robot's file predict better."""
+        return dict(self.numbers) if self.recommended == "fitted" else {}
+
+
+def fit_motion_log(
+    time_s: ArrayLike,
+    commands: ArrayLike,
+    robot: RobotModel,
+    *,
+    poses: ArrayLike | None = None,
+    encoders: ArrayLike | None = None,
+    hold_out: float = 0.5,
+    seed: int = 0,
+) -> MotionLogFit:
+    """Fit the drive of a robot to a log, and predict the part that the fit does not see.
+
+    The prior is narrow around the robot's own numbers and has long tails. So a short log changes them little, and a file
+    that is wrong does not hold the fit back.
+
+    Args:
+        time_s: (n,) ascending times [s].
+        commands: (n, 2) commands of the left and right wheel as shares of `drive.speed`. Row k holds from time k to
+            time k + 1. Values beyond -1..1 are faster than `drive.speed`.
+        robot: The robot with its nominal numbers.
+        poses: (n, 2) x, y [m] or (n, 3) x, y, heading [rad] of the body's origin; nan if not seen.
+        encoders: (n, 2) distance of the left and right wheel since the start [m]; nan if not seen.
+        hold_out: Share of the log's time, at its end, that the fit does not see; 0 to fit to everything.
+        seed: Seed of the draws.
+
+    Returns:
+        The fit, with the error of nominal and fitted numbers on the unseen part. With poses the error is the mean
+        distance between seen and predicted positions [m]; without, that of the wheels' speeds [m/s].
+
+    Raises:
+        ValueError: The arrays do not fit together, or show too little.
+
+    Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2; Gelman, Jakulin, Pittau & Su (2008), a
+        weakly informative default prior distribution.
+    """
+    log = _checked(time_s, commands, poses, encoders, hold_out)
+    split = _split(log, hold_out)
+    problem = _Problem.of(log.until(split), robot)
+    best, spread = problem.solve()
+    rng = np.random.default_rng(seed)
+    draws = best + rng.standard_normal((N_DRAWS, len(best))) @ np.linalg.cholesky(spread).T
+    values, drawn = problem.values(best[None]), problem.values(draws)
+    held_out, evidence = (None, {}) if split == len(log.time_s) else _predict(problem, log, split, best)
+    numbers = _robot_numbers(values)
+    return MotionLogFit(
+        tuple(problem.fitted(best, spread, drawn)),
+        {name: float(value[0]) for name, value in numbers.items()},
+        {name: tuple(value.tolist()) for name, value in _robot_numbers(drawn).items()},
+        held_out,
+        held_out.recommended if held_out else "fitted",
+        evidence=evidence,
+    )
+
+
+def _checked(
+    time_s: ArrayLike,
+    commands: ArrayLike,
+    poses: ArrayLike | None,
+    encoders: ArrayLike | None,
+    hold_out: float,
+) -> Log:
+    time = np.asarray(time_s, np.float64)
+    n = len(time) if time.ndim == 1 else 0
+    if n < LEAST_ROWS:
+        raise ValueError(f"time_s has shape {time.shape}, expected (n,) with at least {LEAST_ROWS} times.")
+    late = np.flatnonzero(~(np.diff(time) > 0))
+    if len(late):
+        k = int(late[0])
+        raise ValueError(
+            f"time_s is {time[k]:g} s in row {k} and {time[k + 1]:g} s in row {k + 1}, expected ascending times. Sort "
+            "the log, and leave out repeated rows."
+        )
+    asked = _rows("commands", commands, n, (2,))
+    if not np.isfinite(asked).all():
+        raise ValueError(
+            f"commands has no number in row {int(np.argwhere(~np.isfinite(asked))[0, 0])}, expected two."
+        )
+    if not np.any(asked):
+        raise ValueError("All commands are 0, expected a robot that drives.")
+    if not 0.0 <= hold_out <= 0.9:
+        raise ValueError(f"hold_out is {hold_out:g}, expected a share of the log from 0 to 0.9.")
+    seen = np.full((n, 3), np.nan)
+    if poses is not None:
+        given = _rows("poses", poses, n, (2, 3))
+        seen[:, : given.shape[1]] = given
+        seen[~np.isfinite(seen[:, :2]).all(axis=1)] = np.nan
+    wheels = np.full((n, 2), np.nan) if encoders is None else _rows("encoders", encoders, n, (2,))
+    log = Log(time, asked, seen, wheels)
+    if seen_rows(log).sum() < LEAST_ROWS:
+        raise ValueError(
+            f"Poses or encoders were seen at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
+        )
+    return log
+
+
+def _rows(name: str, values: ArrayLike, n: int, widths: Sequence[int]) -> Floats:
+    rows = np.asarray(values, np.float64)
+    if rows.ndim != 2 or len(rows) != n or rows.shape[1] not in widths:
+        expected = " or ".join(f"({n}, {width})" for width in widths)
+        raise ValueError(f"{name} has shape {rows.shape}, expected {expected}: one row for each of time_s.")
+    return rows
+
+
+def _split(log: Log, hold_out: float) -> int:
+    """Return the first row that the fit does not see."""
+    n = len(log.time_s)
+    if hold_out == 0.0:
+        return n
+    end = log.time_s[-1] - hold_out * (log.time_s[-1] - log.time_s[0])
+    split = int(np.searchsorted(log.time_s, end, side="right"))
+    for part, rows in (("seen", slice(None, split)), ("held-out", slice(split, None))):
+        found = int(seen_rows(log)[rows].sum())
+        if found < LEAST_ROWS:
+            raise ValueError(
+                f"The {part} part of the log has {found} rows with poses or encoders, expected at least {LEAST_ROWS}. "
+                "Choose another hold_out, or 0 to fit to everything."
+            )
+    return split
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A log, the free numbers, and their prior."""
+
+    log: Log
+    own: Mapping[str, float]
+    free: tuple[Spread, ...]
+
+    @classmethod
+    def of(cls, log: Log, robot: RobotModel) -> _Problem:
+        now = plain_numbers(robot)
+        left, right = now["drive.gain_left"], now["drive.gain_right"]
+        own = {name: value for name, value in now.items() if name.startswith("drive.")}
+        own |= {"drive.gain": (left + right) / 2, "drive.asymmetry": left - right}
+        own |= {s.name: max(own[s.name], LEAST_NOISE) for s in OWN_NOISE} | SEEN_NOISE
+        by_poses = ("drive.track", "drive.axle", "drive.drift_per_m")
+        free = tuple(s for s in DRIVE if log.sees_poses or s.name not in by_poses)
+        names: tuple[str, ...] = ()
+        if log.sees_poses:
+            free += OWN_NOISE
+            names += ("place", "angle") if log.sees_heading else ("place",)
+        if log.sees_wheels:
+            names += ("wheel", "wheel_per_m")
+        free += tuple(Spread(name, "ratio", 1.0, "m", "", is_normal=True) for name in names)
+        return cls(log, own, free)
+
+    def values(self, standard: Floats) -> dict[str, Floats]:
+        """Return (m,) of everything at (m, p) points on the standard scales of the parameters."""
+        m = len(standard)
+        values = {name: np.full(m, value) for name, value in self.own.items()}
+        for k, one in enumerate(self.free):
+            values[one.name] = one.of(self.own[one.name], standard[:, k])
+        values["drive.gain_left"] = values["drive.gain"] + values["drive.asymmetry"] / 2
+        values["drive.gain_right"] = values["drive.gain"] - values["drive.asymmetry"] / 2
+        return values
+
+    def log_posterior(self, standard: Floats) -> Floats:
+        """Return (m,) of (m, p) points."""
+        values = self.values(standard)
+        logs = np.sum([one.log_prior(standard[:, k]) for k, one in enumerate(self.free)], axis=0)
+        steps = wheel_steps(self.log, values)
+        if self.log.sees_poses:
+            logs = logs + track(self.log, steps, values, _noise(values)).log_likelihood
+        if self.log.sees_wheels:
+            logs = logs + encoder_likelihood(self.log, steps, _noise(values))
+        return np.asarray(logs)
+
+    def solve(self) -> tuple[Floats, Floats]:
+        """Return the point of greatest posterior, (p,), and the covariance there, (p, p)."""
+        from scipy.optimize import minimize
+
+        p = len(self.free)
+
+        def down(point: Floats) -> tuple[float, Floats]:
+            ends = np.concatenate([point[None], point + STEP * np.eye(p), point - STEP * np.eye(p)])
+            logs = self.log_posterior(ends)
+            return -float(logs[0]), -(logs[1 : p + 1] - logs[p + 1 :]) / (2 * STEP)
+
+        first = np.zeros(p)
+        first[[one.kind == "size" for one in self.free]] = 0.1
+        best = np.asarray(minimize(down, first, jac=True, method="BFGS", options={"gtol": 1e-3}).x)
+        wide = 0.05
+        slopes = np.array(
+            [(down(best + wide * row)[1] - down(best - wide * row)[1]) / (2 * wide) for row in np.eye(p)]
+        )
+        sizes, directions = np.linalg.eigh((slopes + slopes.T) / 2)
+        return best, (directions / np.maximum(sizes, LEAST_CURVATURE)) @ directions.T
+
+    def fitted(self, best: Floats, spread: Floats, drawn: Mapping[str, Floats]) -> list[Fitted]:
+        """Return the robot's parameters with intervals."""
+        rows = []
+        for k, one in enumerate(self.free):
+            if not one.name.startswith("drive."):
+                continue
+            ends = one.of(self.own[one.name], np.array([-one.most, one.most]))
+            low, high = np.quantile(drawn[one.name], ENDS)
+            identified = bool(np.sqrt(spread[k, k]) < IDENTIFIED)
+            rows.append(
+                Fitted(
+                    name=one.name,
+                    estimate=float(one.of(self.own[one.name], best[k : k + 1])[0]),
+                    low=float(low),
+                    high=float(high),
+                    prior_low=0.0 if one.kind == "size" else float(ends.min()),
+                    prior_high=float(ends.max()),
+                    identified=identified,
+                    unit=one.unit,
+                    advice="" if identified else one.advice,
+                )
+            )
+        return rows
+
+
+def _noise(values: Mapping[str, Floats]) -> dict[str, Floats]:
+    short = {
+        "travel_per_m": "drive.travel_noise_per_m",
+        "heading_per_m": "drive.heading_noise_per_m",
+        "heading_per_s": "drive.heading_noise_per_s",
+    }
+    return {name: values[short.get(name, name)] for name in (*short, *SEEN_NOISE)}
+
+
+def _robot_numbers(values: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return the numbers that a robot's file has."""
+    names = [one.name for one in (*DRIVE, *OWN_NOISE) if one.name not in ("drive.gain", "drive.asymmetry")]
+    return {name: values[name] for name in ("drive.gain_left", "drive.gain_right", *names)}
+
+
+def _predict(problem: _Problem, log: Log, split: int, best: Floats) -> tuple[HeldOut, dict[str, Any]]:
+    """Predict the unseen part with the robot's own and with the fitted numbers."""
+    values = problem.values(np.stack([best, best]))
+    for one in DRIVE:
+        values[one.name][0] = problem.own[one.name]
+    for side in ("left", "right"):
+        values[f"drive.gain_{side}"][0] = problem.own[f"drive.gain_{side}"]
+    steps = wheel_steps(log, values)
+    if log.sees_poses:
+        predicted = track(problem.log, steps, values, _noise(values)).poses
+        rows = split + np.flatnonzero(np.isfinite(log.poses[split:, 0]))
+        off = np.hypot(*np.moveaxis(predicted[:, rows, :2] - log.poses[rows, :2], -1, 0))
+        lasts = log.time_s[rows[-1]] - log.time_s[split - 1]
+        held_out = HeldOut(
+            f"mean distance between seen and predicted positions over the last {lasts:.1f} s",
+            "m",
+            float(off[0].mean()),
+            float(off[1].mean()),
+            n=len(rows),
+            more={"at the end": (float(off[0, -1]), float(off[1, -1]))},
+        )
+        path = {
+            name: np.round(predicted[k, rows, :2], 5).tolist() for k, name in enumerate(("nominal", "fitted"))
+        }
+        return held_out, {"held_out": {"seen": np.round(log.poses[rows, :2], 5).tolist(), **path}}
+    rows = np.flatnonzero(np.isfinite(log.encoders).all(axis=1))
+    rows = rows[rows >= split]
+    total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
+    speeds = np.diff(total[:, rows], axis=1) / np.diff(log.time_s[rows])[:, None]
+    seen = np.diff(log.encoders[rows], axis=0) / np.diff(log.time_s[rows])[:, None]
+    off = np.sqrt(((speeds - seen) ** 2).mean(axis=(1, 2)))
+    full = problem.own["drive.speed"]
+    held_out = HeldOut(
+        f"root mean square error of the wheels' speeds over the last {log.time_s[-1] - log.time_s[split]:.1f} s",
+        "m/s",
+        float(off[0]),
+        float(off[1]),
+        n=2 * len(seen),
+        more={"as a share of full speed (1)": (float(off[0] / full), float(off[1] / full))},
+    )
+    return held_out, {}

@@ -40,6 +40,7 @@ from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RangeSensor, RobotModel
 from ._robot_picture import model_picture
+from ._room import bounds_of, room_of, walls_within
 from ._settings import ArenaSettings
 from ._units import INCH
 
@@ -74,6 +75,7 @@ __all__ = [
     "Segment",
     "arena_names",
     "arena_picture",
+    "bounds_of",
     "check_drawn_starts",
     "check_start",
     "dimension_line",
@@ -95,6 +97,8 @@ __all__ = [
     "read_toml",
     "robot_names",
     "robot_picture",
+    "room_of",
     "rounded",
+    "walls_within",
     "why_no_part",
 ]

@@ -223,7 +223,7 @@ def test_a_trial_that_the_witness_could_not_tell_of_keeps_its_steps_and_is_drive
 
 def test_a_weak_battery_is_noticed(tmp_path):
     robot = FakeRobot()
-    robot.volts = 5.9
+    robot.cell_v = 5.9
     with pytest.raises(StudyError, match=r"5\.90 V under load, expected at least 6\.15 V"):
         drive(small_study(), tmp_path / "r", robot=robot)
     assert robot.motors == (0.0, 0.0)

@@ -46,7 +46,7 @@ class FakeRobot:
         self.motors = (0.0, 0.0)
         self.is_open = True
         self.is_linked = True
-        self.volts = 7.2
+        self.cell_v = 7.2
         self._fault = fault or (lambda what: None)
         self.place(paper_arena().start, 0)
 
@@ -84,8 +84,10 @@ class FakeRobot:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def battery(self) -> float:
-        return self.volts
+    least_battery_v = 6.15
+
+    def volts(self) -> float:
+        return self.cell_v
 
     # the witness
 

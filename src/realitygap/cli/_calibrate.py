@@ -28,7 +28,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="PLATFORM",
-            help="What is calibrated: scribbler:PORT, twin:FILE, sim or sim:FILE.",
+            help="What is calibrated: scribbler:PORT, thymio:PORT, enki, twin:FILE, sim or sim:FILE.",
         ),
     ] = None,
     out: Annotated[
@@ -61,7 +61,7 @@ def calibrate(
         typer.Option(
             metavar="ROBOT",
             help="On whose numbers the fit builds: a robot, its file, or an earlier calibration. "
-            "[default: scribbler-s2-fluke2]",
+            "[default: that of the platform, such as scribbler-s2-fluke2 or thymio]",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of trials and draws.")] = 0,
@@ -96,6 +96,8 @@ def calibrate(
     Example: realitygap calibrate path --robot scribbler:/dev/rfcomm0 -o path.toml
 
     Example: realitygap calibrate motion --robot scribbler:/dev/rfcomm0 --camera 0 -o motion.toml
+
+    Example: realitygap calibrate all --robot "thymio:emulator://playground?speed=8" --observe track -o fit.toml
 
     Example: realitygap calibrate all --robot twin:worn.toml --observe track --budget 20 -o worn-fit.toml
 
@@ -204,7 +206,7 @@ def _measured(
     quiet: bool,
 ) -> Calibration:
     """Carry out the trials, and fit."""
-    from realitygap.platforms import DEFAULT_ROBOT
+    from realitygap.platforms import class_of
     from realitygap.study import StoppedByPerson, calibrate, open_target
     from realitygap.world import load_arena, load_robot
 
@@ -212,7 +214,7 @@ def _measured(
     from ._sheet import sheet_observer
 
     kept = out.with_suffix(".trials.jsonl")
-    base = base or DEFAULT_ROBOT
+    base = base or class_of(robot).base_robot
     where, model = load_arena(arena), load_robot(base)
     is_led = _is_led(robot, witness)
     again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."

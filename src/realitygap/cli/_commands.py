@@ -55,8 +55,8 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
     "Use a robot": (
-        Command("robot", "Connect to a Scribbler and send it commands.", "_robot", "robot"),
-        Command("emulate", "Emulate a Scribbler on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
+        Command("robot", "Connect to a robot and send it commands.", "_robot", "robot"),
+        Command("emulate", "Emulate a robot on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
         Command("platforms", "List the platforms that can run trials.", "_platforms", "platforms"),
         Command("trials", "List, score, and annotate physical trials.", "_trials", "trials"),
     ),

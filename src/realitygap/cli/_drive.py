@@ -26,8 +26,8 @@ def drive(
         str,
         typer.Option(
             metavar="PORT",
-            help="Port of the robot: /dev/rfcomm0, COM3, socket://HOST:PORT, or an emulated robot in this program, "
-            "emulator://s2?speed=off.",
+            help="Port of the robot: /dev/rfcomm0, COM3, socket://HOST:PORT, thymio:/dev/ttyACM0, or an emulated robot "
+            "in this program, emulator://s2?speed=off or thymio:emulator://playground?speed=8.",
         ),
     ],
     replicates: Annotated[int | None, typer.Option(min=1, help="Number of runs of each condition.")] = None,

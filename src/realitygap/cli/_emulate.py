@@ -16,12 +16,14 @@ from realitygap.errors import RobotError
 if TYPE_CHECKING:
     from types import FrameType
 
-    from realitygap.emulator import Emulator, Server
+    from realitygap.emulator import Emulator, PlaygroundServer, Server
 
 
 def emulate(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="scribbler: a Parallax Scribbler.")],
-    model: Annotated[str, typer.Option(help="s1, or s2 for an S2 or S3.")] = "s2",
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="scribbler, or thymio: Aseba's playground.")],
+    model: Annotated[
+        str | None, typer.Option(help="s1, or s2 for an S2 or S3. [default: s2]", show_default=False)
+    ] = None,
     fluke: Annotated[
         str | None, typer.Option(help="none, 1 or 2: the board with the camera. [default: that of the model]")
     ] = None,
@@ -44,12 +46,14 @@ def emulate(
         typer.Option(
             min=0,
             max=1000,
-            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass.",
+            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass. "
+            "A playground: 0.1 to 8.",
         ),
     ] = 1.0,
     timing: Annotated[
-        str, typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time.")
-    ] = "on",
+        str | None,
+        typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time. [default: on]"),
+    ] = None,
     faults: Annotated[
         str,
         typer.Option(metavar="LIST", help="What goes wrong, as in drop=0.001,delay=0.05,hangup=60,sag=0.2."),
@@ -60,7 +64,11 @@ def emulate(
             metavar="PORT", min=0, max=65535, help="Serve pose, path and cells on this TCP port; 0 for any."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of sensor noise and faults.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Of sensor noise and faults. A playground has none. [default: 0]"),
+    ] = None,
+    window: Annotated[bool, typer.Option("--window", help="Show the playground in its window.")] = False,
     state: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Keep name, password, data and settings in this file.")
     ] = None,
@@ -79,10 +87,13 @@ def emulate(
         ),
     ] = False,
 ) -> None:
-    """Emulate a Scribbler on a pseudo-terminal or TCP port.
+    """Emulate a robot on a pseudo-terminal or TCP port.
 
     The name of the port comes first: a pseudo-terminal for `--port` of other commands and for other programs, or a
-    TCP port. In a terminal a live view follows: arena, robot, path, lights and the last command.
+    TCP port. In a terminal a live view of a Scribbler follows: arena, robot, path, lights and the last command.
+
+    A Thymio is the one of Aseba's playground, if it is installed (Debian: aseba dbus iproute2 faketime). It takes
+    --arena, --speed, --tcp, --witness and --window.
 
     Example: realitygap emulate scribbler --model s2 --fluke 2
 
@@ -92,10 +103,30 @@ def emulate(
 
     Example: realitygap emulate scribbler --model s1 --fluke 1 --exec "python2 program.py {port}"
 
+    Example: realitygap emulate thymio --speed 8 --witness 7002
+
     In Python: realitygap.emulator.serve_pty(realitygap.emulator.Emulator("s2", "2"))
     """
+    if robot == "thymio":
+        given: dict[str, object] = {"--model": model, "--fluke": fluke, "--twin": twin, "--link": link}
+        given |= {
+            "--timing": timing,
+            "--faults": faults or None,
+            "--seed": seed,
+            "--state": state,
+            "--exec": command,
+        }
+        wrong = [option for option, value in given.items() if value is not None]
+        if wrong:
+            raise RobotError(
+                f"{wrong[0]} goes with scribbler. Leave it out: a playground has no such setting."
+            )
+        _emulate_thymio(arena, speed, tcp, witness, window=window, quiet=quiet)
+        return
     if robot != "scribbler":
-        raise RobotError(f"Unknown robot {robot!r}. Known: scribbler.")
+        raise RobotError(f"Unknown robot {robot!r}. Known: scribbler, thymio.")
+    if window:
+        raise RobotError("--window goes with thymio: a Scribbler is shown in the terminal.")
     if speed == 0 and witness is None:
         raise RobotError(
             "With --speed 0 a witness lets time pass. Add --witness PORT, or give another speed."
@@ -106,15 +137,36 @@ def emulate(
         )
     from realitygap.emulator import make_emulator
 
-    options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
+    options = {"arena": arena, "seed": str(seed or 0), "timing": timing or "on", "faults": faults}
     if fluke is not None:
         options["fluke"] = fluke
     if twin is not None:
         options["twin"] = str(twin)
     if state is not None:
         options["state"] = str(state)
-    emulator = make_emulator(model, options)
+    emulator = make_emulator(model or "s2", options)
     _serve(emulator, link, tcp, speed=speed, witness=witness, command=command, quiet=quiet)
+
+
+def _emulate_thymio(
+    arena: str, speed: float, tcp: int | None, witness: int | None, *, window: bool, quiet: bool
+) -> None:
+    """Serve a playground until it ends, or a signal comes."""
+    from realitygap.emulator import LACKS, Playground, PlaygroundServer, open_scene
+
+    where = open_scene(arena).arena
+    with (
+        Playground(where, speed=speed, port=tcp or 0, window=window) as playground,
+        PlaygroundServer(playground, witness) as server,
+        _ended_by_signals(server),
+    ):
+        typer.echo(f"thymio:{playground.port}")
+        if server.witness_address:
+            typer.echo(f"witness {server.witness_address}")
+        sys.stdout.flush()
+        if not quiet:
+            typer.echo(LACKS, err=True)
+        server.run()
 
 
 def _serve(
@@ -174,7 +226,7 @@ def _exit_on_sigterm() -> Iterator[None]:
 
 
 @contextmanager
-def _ended_by_signals(server: Server) -> Iterator[None]:
+def _ended_by_signals(server: Server | PlaygroundServer) -> Iterator[None]:
     """Let Ctrl-C and SIGTERM end a server as if it had come to its end."""
 
     def stop(number: int, frame: FrameType | None) -> None:

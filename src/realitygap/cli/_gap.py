@@ -48,7 +48,8 @@ def gap(
     target: Annotated[
         str,
         typer.Argument(
-            metavar="TARGET", help="twin:FILE, scribbler:PORT, recorded:FILE, sim, sim:FILE or jyro."
+            metavar="TARGET",
+            help="twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
         ),
     ],
     controllers: Annotated[

@@ -81,7 +81,7 @@ def choose_operator(
             trials are not told of.
     """
     from realitygap.records import LEDGER_NAME, Ledger
-    from realitygap.robots.scribbler import is_in_this_program
+    from realitygap.robots import is_in_this_program
 
     if is_in_this_program(port) or witness is not None:
         from realitygap.emulator import connect_witness

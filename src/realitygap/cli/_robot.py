@@ -1,4 +1,4 @@
-"""`realitygap robot`: a Scribbler on its port, from the terminal."""
+"""`realitygap robot`: a robot on its port, from the terminal."""
 
 from __future__ import annotations
 
@@ -14,9 +14,8 @@ from realitygap.errors import RobotError
 
 robot = typer.Typer(
     name="robot",
-    help="Connect to a Scribbler and send it commands.\n\n"
-    'In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0")',
-    epilog="Example: realitygap robot info /dev/rfcomm0",
+    help='Connect to a robot and send it commands.\n\nIn Python: realitygap.robots.open_on("/dev/rfcomm0")',
+    epilog="Example: realitygap robot info /dev/rfcomm0\n\nExample: realitygap robot info thymio:/dev/ttyACM0",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -25,7 +24,8 @@ Port = Annotated[
     str,
     typer.Argument(
         metavar="PORT",
-        help="/dev/rfcomm0, /dev/ttyUSB0, COM3, socket://HOST:PORT or emulator://s2?fluke=2; thymio:PORT for a Thymio. "
+        help="Port of a Scribbler: /dev/rfcomm0, COM3, socket://HOST:PORT, emulator://s2?fluke=2. Port of a Thymio: "
+        "thymio:/dev/ttyACM0, thymio:socket://HOST:PORT, thymio:emulator://playground. "
         "`realitygap robot list` names those that are there.",
     ),
 ]
@@ -40,7 +40,7 @@ LONGEST_DRIVE_S = 3600.0
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
     """The functions of the robot's family and the robot on a port, stopped and let go of in the end."""
-    from realitygap.robots.scribbler import is_in_this_program
+    from realitygap.robots import is_in_this_program
 
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
@@ -71,7 +71,7 @@ def list_ports(as_json: Json = False) -> None:
 
     Example: realitygap robot list
 
-    In Python: realitygap.robots.scribbler.find_ports()
+    In Python: realitygap.robots.list_ports()
     """
     from realitygap.robots import list_ports as ports
 
@@ -154,7 +154,7 @@ def stop(port: Port) -> None:
 
 @robot.command("battery")
 def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
-    """Read the voltage of the battery; about 9 V when full, low below 6.15 V.
+    """Read the battery. A Scribbler has about 9 V when full, and is low below 6.15 V.
 
     Example: realitygap robot battery /dev/rfcomm0
 

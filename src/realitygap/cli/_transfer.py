@@ -19,7 +19,11 @@ def transfer(
     study: Annotated[str, typer.Argument(metavar="STUDY", help="A study's name or file; see --condition.")],
     to: Annotated[
         str,
-        typer.Option("--to", metavar="PLATFORM", help="The target: sim:FILE, twin:FILE, scribbler:PORT, ..."),
+        typer.Option(
+            "--to",
+            metavar="PLATFORM",
+            help="The target: sim:FILE, twin:FILE, scribbler:PORT, thymio:PORT, ...",
+        ),
     ],
     budget: Annotated[
         list[int] | None,

@@ -20,7 +20,9 @@ def try_genome(
     ],
     on: Annotated[
         str,
-        typer.Option("--on", metavar="PLATFORM", help="jyro, sim, sim:FILE, twin:FILE or scribbler:PORT."),
+        typer.Option(
+            "--on", metavar="PLATFORM", help="jyro, sim, sim:FILE, twin:FILE, scribbler:PORT or thymio:PORT."
+        ),
     ],
     trials: Annotated[int, typer.Option(min=1, max=9999, help="Number of trials.")] = 1,
     steps: Annotated[int, typer.Option(min=1, help="Commands in each.")] = 100,

@@ -17,7 +17,7 @@ from realitygap.errors import RobotError
 
 from ._emulator import Emulator
 from ._time import SECOND, nanoseconds
-from ._witness import DirectWitness, answer_witness
+from ._witness import DirectWitness, ServedWitness, answer_witness
 
 HOST = "127.0.0.1"
 PIECE = 1 << 16
@@ -261,7 +261,7 @@ class WitnessDoor:
         port: Its number; 0 for any that is free.
     """
 
-    def __init__(self, witness: DirectWitness, port: int = 0) -> None:
+    def __init__(self, witness: ServedWitness, port: int = 0) -> None:
         self._witness = witness
         self._listening = listen(port)
         self.address = f"{HOST}:{self._listening.getsockname()[1]}"
@@ -312,7 +312,7 @@ class WitnessDoor:
         self._clients.pop(client, None)
         if client is self._holder:
             self._holder = None
-            self._witness.waits = False
+            self._witness.release()
         client.close()
 
     def close(self) -> None:

@@ -61,6 +61,19 @@ class Witness(Protocol):
         ...
 
 
+class ServedWitness(Witness, Protocol):
+    """A witness that can be served to other programs."""
+
+    @property
+    def waits(self) -> bool:
+        """Whether the emulator's time passes only when somebody lets it."""
+        ...
+
+    def release(self) -> None:
+        """Stop holding the time, if it was held."""
+        ...
+
+
 class DirectWitness:
     """The witness of an emulator in the same process.
 
@@ -87,6 +100,10 @@ class DirectWitness:
         """
         self.waits = True
         return self._speed
+
+    def release(self) -> None:
+        """Stop holding the time."""
+        self.waits = False
 
     def advance(self, seconds: float) -> None:
         """Let the time of an emulator that waits pass.
@@ -170,8 +187,8 @@ def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
         return witness.place(Pose(*map(float, request["pose"])), int(request["seed"]))
     if what == "waits":
         return bool(getattr(witness, "waits", False))
-    if what == "hold" and isinstance(witness, DirectWitness):
-        return witness.hold()
+    if what == "hold":
+        return witness.hold() if isinstance(witness, DirectWitness) else None
     if what == "advance" and isinstance(witness, DirectWitness):
         return witness.advance(float(request["seconds"]))
     if what == "cells_at":
@@ -230,9 +247,10 @@ class RemoteWitness:
         """Whether the emulator's time passes only when somebody lets it."""
         return bool(self._ask("waits"))
 
-    def hold(self) -> float:
-        """As `DirectWitness.hold`; until this connection ends."""
-        return float(self._ask("hold"))
+    def hold(self) -> float | None:
+        """As `DirectWitness.hold`, until this connection ends; None if its time cannot be held, as a playground's."""
+        speed = self._ask("hold")
+        return None if speed is None else float(speed)
 
     def advance(self, seconds: float) -> None:
         """Let the time of an emulator that waits pass."""

@@ -1,5 +1,11 @@
 """What pyserial looks for when it is asked to open emulator://."""
 
-from ._port import EmulatedPort as Serial
+from urllib.parse import urlsplit
 
-__all__ = ["Serial"]
+from ._port import EmulatedPort
+from .thymio._port import HOST, PlaygroundPort
+
+
+def serial_class_for_url(url: str) -> tuple[str, type]:
+    """Return the class of the port that a URL names: a playground's, or a Scribbler's."""
+    return url, PlaygroundPort if urlsplit(url).netloc == HOST else EmulatedPort

@@ -11,6 +11,7 @@ from urllib.parse import parse_qsl
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
 from realitygap.platforms import names_a_port
+from realitygap.robots import split_port
 from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
 
@@ -77,7 +78,7 @@ def refuse_port(root: Path, port: str) -> None:
     Raises:
         StudyError: It is no device, socket or emulator, or an emulator with a file outside the folder.
     """
-    name = port.removeprefix("scribbler:")
+    _, name = split_port(port)
     scheme, colon, rest = name.partition("://")
     if not colon:
         is_below_dev = name.startswith("/") and name != "/dev" and _is_within(Path("/dev"), name)
@@ -93,7 +94,7 @@ def refuse_port(root: Path, port: str) -> None:
         return
     raise StudyError(
         f"{shown(port)} is no port that the lab opens. Expected a device such as /dev/rfcomm0 or COM3, "
-        "socket://HOST:PORT, or emulator://s2?fluke=2."
+        "socket://HOST:PORT, emulator://s2?fluke=2, or thymio: and one of these."
     )
 
 

@@ -7,9 +7,6 @@ from realitygap.platforms import platform_of
 from realitygap.robots import Robot
 from realitygap.runs import Condition
 
-EMULATED = "scribbler:emulator://s2?fluke=2"
-"""An emulated robot in this program, which a condition on a robot is shown on."""
-
 
 def open_robot(condition: Condition, spec: str = "") -> tuple[Robot, int]:
     """Open a robot at the start of a condition's arena; return it with the number of commands in a trial.
@@ -26,13 +23,14 @@ def open_robot(condition: Condition, spec: str = "") -> tuple[Robot, int]:
     """
     own, arena = condition.on, condition.placed_arena
     if own.is_physical and not spec:
-        spec = EMULATED
+        spec = own.emulated  # in this program
     if spec in ("", own.spec):
         return own.in_double().open_robot(arena, noise=condition.noise), own.steps
     platform = platform_of(spec)
     if platform.needs_person:
         raise StudyError(
-            f"{spec!r} cannot be shown live: somebody has to place this robot. Expected {EMULATED!r}."
+            f"{spec!r} cannot be shown live: somebody has to place this robot. Expected an emulated one, such as "
+            f"{platform.emulated!r}."
         )
     if platform.name == own.name:
         platform = platform.model_copy(update={"steps": own.steps})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import queue
 import threading
 import time
@@ -12,8 +13,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from realitygap.errors import RobotError
-from realitygap.robots.scribbler import Scribbler, is_in_this_program
-from realitygap.trials import preflight
+from realitygap.robots import is_in_this_program, open_on
+from realitygap.trials import own_witness, preflight
 from realitygap.world import Pose
 
 from ._channel import Channel, Message
@@ -29,6 +30,8 @@ WATCHDOG_S = 1.0
 """After so long a silence of the loop itself the driver stops the motors [s]."""
 BATTERY_S = 5.0
 """Between two looks at the battery [s]."""
+_MORE = ("light", "line")
+"""Sensors that are told of besides range sensors, if the robot has them."""
 
 
 def work(channel: Channel, order: Message) -> None:
@@ -41,12 +44,12 @@ def work(channel: Channel, order: Message) -> None:
     port = str(order["port"])
     if is_in_this_program(port):
         import_module("realitygap.emulator")  # which tells pyserial of such ports
-    with Scribbler(port, watchdog_s=WATCHDOG_S) as robot:
+    with open_on(port, watchdog_s=WATCHDOG_S)[1] as robot:
         _Hand(channel, robot, _witness(robot, order.get("witness") or None)).carry_on()
 
 
-def _witness(robot: Scribbler, address: str | None) -> Witness | None:
-    own: Witness | None = getattr(robot.link.port, "witness", None)
+def _witness(robot: Any, address: str | None) -> Witness | None:
+    own = own_witness(robot)
     if own is not None or address is None:
         return own
     from realitygap.emulator import connect_witness
@@ -57,7 +60,7 @@ def _witness(robot: Scribbler, address: str | None) -> Witness | None:
 class _Hand:
     """Drives as it is told, and stops when it is not."""
 
-    def __init__(self, channel: Channel, robot: Scribbler, witness: Witness | None) -> None:
+    def __init__(self, channel: Channel, robot: Any, witness: Witness | None) -> None:
         self._channel, self._robot, self._witness = channel, robot, witness
         self._wheels = (0.0, 0.0)
         self._told_s = 0.0
@@ -128,15 +131,16 @@ class _Hand:
             "raw": list(seen.raw),
             "readings": list(seen.readings),
             "stalled": seen.stalled,
-            "light": list(robot.light()),
-            "line": list(robot.line()),
+            **{name: list(getattr(robot, name)()) for name in _MORE if hasattr(robot, name)},
             "moves": self._moves,
         }
         if self._witness is not None:
             values["pose"] = list(self._witness.pose())
-        if robot.info.fluke != "none" and time.monotonic() - self._battery_s > BATTERY_S:
+        if hasattr(robot, "volts") and time.monotonic() - self._battery_s > BATTERY_S:
             self._battery_s = time.monotonic()
-            self._channel.say("battery", volts=round(float(robot.battery()), 2))
+            volts = float(robot.volts())
+            if not math.isnan(volts):
+                self._channel.say("battery", volts=round(volts, 2))
         self._channel.say("senses", **values)
 
     def _do(self, message: Message) -> None:
@@ -157,7 +161,9 @@ class _Hand:
             self._channel.say("refused", text=str(error))
 
 
-def _png(robot: Scribbler) -> str:
+def _png(robot: Any) -> str:
+    if not hasattr(robot, "picture"):
+        raise RobotError("This robot has no camera.")
     from PIL import Image
 
     data = io.BytesIO()

@@ -7,8 +7,9 @@ import sys
 from typing import Any
 
 from realitygap.errors import RobotError
+from realitygap.robots import is_in_this_program
 from realitygap.robots.scribbler import Scribbler as Driver
-from realitygap.robots.scribbler import find_ports, is_in_this_program
+from realitygap.robots.scribbler import find_ports
 
 from ._mistakes import MyroError
 from ._simulation import Simulation, is_simulation, parse_simulation

@@ -3,7 +3,14 @@
 from ._fleet import Array, Fleet, Outline, Points, limited_commands
 from ._platform import Opening, Platform
 from ._python import PYTHON, allow_code, load_platform
-from ._registry import GROUP, built_in_platforms, platform_class, platform_names, study_platforms
+from ._registry import (
+    GROUP,
+    built_in_platforms,
+    emulated_robots,
+    platform_class,
+    platform_names,
+    study_platforms,
+)
 from ._repeats import retry_genomes, score_genomes
 from ._simulated import SimTarget, SimulatedPlatform
 from ._spec import (
@@ -24,7 +31,7 @@ from .jyro._robot import JyroRobot
 from .jyro._trials import JyroTrials, jyro_rules, jyro_scene
 from .recorded._platform import RecordedPlatform
 from .recorded._target import RecordedTarget
-from .scribbler._platform import FULL_SCALE, ScribblerPlatform
+from .scribbler._platform import ScribblerPlatform
 from .sim._ensemble import Play, Rehearsal, SimEnsemble
 from .sim._platform import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform, as_numbers, as_sim
 from .sim._robot import SimRobot
@@ -32,6 +39,7 @@ from .sim._scene import SimScene, sim_scene
 from .sim._trials import SimTrials
 from .sim._world import SimWorld
 from .sim._world_robot import SimWorldRobot
+from .thymio._platform import ThymioPlatform
 from .twin._open import SimTwin, open_twin
 from .twin._platform import TwinPlatform
 from .twin._robots import TwinRobots
@@ -41,7 +49,6 @@ from .twin._trials import close_twins, release_twins
 __all__ = [
     "ARENA",
     "DEFAULT_ROBOT",
-    "FULL_SCALE",
     "GROUP",
     "NOISE",
     "PYTHON",
@@ -71,6 +78,7 @@ __all__ = [
     "SimWorld",
     "SimWorldRobot",
     "SimulatedPlatform",
+    "ThymioPlatform",
     "TwinPlatform",
     "TwinRobots",
     "TwinTarget",
@@ -82,6 +90,7 @@ __all__ = [
     "class_of",
     "close_twins",
     "described_platform",
+    "emulated_robots",
     "harness_path",
     "is_physical",
     "jyro_rules",

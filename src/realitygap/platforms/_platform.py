@@ -12,7 +12,7 @@ from realitygap.drawing import Picture
 from realitygap.errors import StudyError
 from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.settings import Settings
-from realitygap.trials import OnLost, PlatformTrials, PortObserver, RobotTarget, Target
+from realitygap.trials import OnLost, PlatformTrials, PortObserver, RobotTarget, Target, WitnessObserver
 from realitygap.world import JYRO_SCRIBBLER, Arena, Body, RangeSensors, RobotModel, check_start, robot_picture
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Opening:
         processes: Number of processes of a twin; None: one for each processor.
         witness: Address of the witness of an emulated robot in another program, HOST:PORT.
         observer: Who places a robot and reports the cells that it crossed; None: its witness.
-        step_s: Duration of a robot's command [s].
+        step_s: Duration of a robot's command [s]; None: that of its platform.
         on_lost: What follows a trial in which the link to a robot was lost.
     """
 
@@ -44,7 +44,7 @@ class Opening:
     processes: int | None = None
     witness: str | None = None
     observer: PortObserver | None = None
-    step_s: float = 0.5
+    step_s: float | None = None
     on_lost: OnLost = "retry"
 
 
@@ -72,6 +72,9 @@ class Platform(Settings):
         is_for_studies: Whether a condition of a study can be on it.
         channels: Names of the sensors that its robots have besides range sensors, such as `light.0`.
         takes_several: Whether several robots can be tried in one arena.
+        full_scale: Raw reading that counts as 1 where trials are kept, whatever a study divides readings by.
+        base_robot: Name of the robot file that calibrations of its robots build on.
+        emulated: How users name an emulated robot in this program, for a platform with robots on ports.
         version: Version of its code, if another package or a file adds it: results of another version are not extended.
     """
 
@@ -92,6 +95,9 @@ class Platform(Settings):
     is_for_studies: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = ()
     takes_several: ClassVar[bool] = False
+    full_scale: ClassVar[float] = 1.0
+    base_robot: ClassVar[str] = "scribbler-s2-fluke2"
+    emulated: ClassVar[str] = ""
     version: ClassVar[str] = ""
 
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")
@@ -260,6 +266,10 @@ class Platform(Settings):
         """
         raise StudyError(f"Platform {self.name!r} has no robot on a port.")
 
+    def in_arena(self, arena: Arena) -> Self:
+        """Return the platform with the arena that an emulated robot in this program begins with; itself by default."""
+        return self
+
     def connect(self) -> Robot:
         """Connect to a physical robot, which a person places.
 
@@ -287,17 +297,32 @@ class Platform(Settings):
 
         if not self.is_physical:
             return StepwiseTarget(self, arena, how.noise, name=how.name)
-        if how.observer is None:
-            raise StudyError(
-                f"Who places the robot of {how.name} and reports the cells that it crossed? Give an observer."
-            )
         return RobotTarget(
             self.connect,
             arena,
-            how.observer,
+            how.observer or self._witness(how),
             name=how.name,
-            step_s=how.step_s,
+            step_s=self.command_s if how.step_s is None else how.step_s,
             on_lost=how.on_lost,
+        )
+
+    def _witness(self, how: Opening) -> PortObserver:
+        """Return the witness of an emulated robot in this program, or at an address.
+
+        Raises:
+            StudyError: A person has to place the robot.
+        """
+        if not self.needs_person:
+            return WitnessObserver()
+        if how.witness is not None:
+            from realitygap.emulator import connect_witness
+
+            remote = connect_witness(how.witness)
+            remote.hold()  # before its robot is spoken to: somebody may have left it driving, faster than it answers
+            return WitnessObserver(remote)
+        raise StudyError(
+            f"Who places the robot of {how.name} and says what it drew? Name the witness of an emulator (HOST:PORT, "
+            "from realitygap emulate --witness PORT), or give an observer."
         )
 
     def prepare(

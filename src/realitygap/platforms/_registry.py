@@ -30,6 +30,7 @@ _BUILT_IN = {
     "sim": ".sim._platform:SimPlatform",
     "twin": ".twin._platform:TwinPlatform",
     "scribbler": ".scribbler._platform:ScribblerPlatform",
+    "thymio": ".thymio._platform:ThymioPlatform",
     "enki": ".enki._platform:EnkiPlatform",
     "recorded": ".recorded._platform:RecordedPlatform",
 }
@@ -43,6 +44,11 @@ def built_in_platforms() -> tuple[type[Platform], ...]:
 def study_platforms() -> tuple[str, ...]:
     """Return the names of the platforms that a condition of a study can be on."""
     return (*(model.name for model in built_in_platforms() if model.is_for_studies), *sorted(_plugins()))
+
+
+def emulated_robots() -> tuple[str, ...]:
+    """Return how users name an emulated robot in this program, for each platform that has one."""
+    return tuple(model.emulated for model in built_in_platforms() if model.emulated)
 
 
 def platform_names() -> tuple[str, ...]:

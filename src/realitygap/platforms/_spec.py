@@ -91,7 +91,7 @@ def open_target(
     processes: int | None = None,
     witness: str | None = None,
     observer: PortObserver | None = None,
-    step_s: float = 0.5,
+    step_s: float | None = None,
     on_lost: OnLost = "retry",
     noise: float = 0.0,
     key: int = 0,
@@ -101,12 +101,12 @@ def open_target(
 
     Args:
         spec: Its name: `jyro`, `sim`, `sim:FILE` with the file of a robot or a calibration, `twin:FILE`,
-            `scribbler:PORT`, `recorded:FILE` with earlier trials, or a platform of another package.
+            `scribbler:PORT`, `thymio:PORT`, `recorded:FILE` with earlier trials, or a platform of another package.
         arena: Where.
         processes: Number of processes of a twin; one for each processor when not given.
         witness: Address of the witness of an emulated robot in another program, HOST:PORT.
         observer: Who places a robot and reports what it drew, if no witness does.
-        step_s: Duration of a robot's command [s].
+        step_s: Duration of a robot's command [s]; that of its platform when not given.
         on_lost: What follows a trial in which the link to a robot was lost.
         noise: Level a of the paper, on top of a simulated robot's own noise.
         key: Of the random numbers of a simulator.

@@ -3,7 +3,7 @@
 from . import scribbler, thymio, twin
 from ._clock import Clock, SystemClock
 from ._contract import Command, Label, Observation, Robot, channels_of, check_command, select_channels
-from ._families import list_ports, open_on
+from ._families import is_in_this_program, list_ports, open_on, split_port
 from ._in_program import ProgramRobot
 from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
@@ -23,11 +23,13 @@ __all__ = [
     "channels_of",
     "check_command",
     "export_mcap",
+    "is_in_this_program",
     "list_ports",
     "open_on",
     "read_recording",
     "scribbler",
     "select_channels",
+    "split_port",
     "thymio",
     "twin",
 ]

@@ -23,8 +23,11 @@ class Terminal(Protocol):
         """Return the ports behind which its robots may be."""
         ...
 
-    def open_robot(self, port: str, record: Path | None) -> Any:
-        """Connect to a robot on a port, without the family's name before it."""
+    def open_robot(self, port: str, record: Path | None, watchdog_s: float | None) -> Any:
+        """Connect to a robot on a port, without the family's name before it.
+
+        Its motors stop if the program is silent for `watchdog_s` [s], or sooner.
+        """
         ...
 
     def info(self, robot: Any) -> Mapping[str, Any]:
@@ -46,6 +49,11 @@ def split_port(port: str) -> tuple[str, str]:
     return (name, rest) if colon and name in _FAMILIES else (BARE, port)
 
 
+def is_in_this_program(port: str) -> bool:
+    """Return whether a port is that of an emulator in this program, which pyserial knows once it was imported."""
+    return split_port(port)[1].startswith("emulator:")
+
+
 def terminal_of(family: str) -> Any:
     """Return the `Terminal` of a family."""
     return import_module(_FAMILIES[family], __package__)
@@ -61,8 +69,13 @@ def list_ports() -> list[PortGuess]:
     return [*own.values(), *(each for each in find_ports() if each.port not in own)]
 
 
-def open_on(port: str, record: Path | None = None) -> tuple[Any, Any]:
+def open_on(port: str, record: Path | None = None, watchdog_s: float | None = None) -> tuple[Any, Any]:
     """Connect to the robot on a port; return its family's `Terminal`, and the robot.
+
+    Args:
+        port: Name of the port; one without a family's name is that of a Scribbler.
+        record: A new file for all that is said.
+        watchdog_s: Silence of the program after which the motors stop [s]; None: as the family does by itself.
 
     Raises:
         RobotError: It cannot be reached.
@@ -71,4 +84,4 @@ def open_on(port: str, record: Path | None = None) -> tuple[Any, Any]:
     if not name:
         raise RobotError(f"{port} names no port, expected {family}:PORT.")
     terminal = terminal_of(family)
-    return terminal, terminal.open_robot(name, record)
+    return terminal, terminal.open_robot(name, record, watchdog_s)

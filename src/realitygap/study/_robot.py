@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 from realitygap.errors import StudyError
-from realitygap.robots.scribbler import is_in_this_program
+from realitygap.platforms import Platform, names_a_port, split_spec
+from realitygap.robots import Robot, is_in_this_program
 from realitygap.trials import Operator, WitnessObserver
+from realitygap.world import Arena
 
 from ._physical import OpenRobot
 
 
-def connect_robot(port: str) -> OpenRobot:
-    """Return what opens the robot at a port, with the settings of a condition's platform."""
-    return lambda platform: platform.at_port(port).connect()
+def connect_robot(port: str, arena: Arena | None = None) -> OpenRobot:
+    """Return what opens the robot at a port, with the settings of a condition's platform.
+
+    Args:
+        port: Name of the port, with or without the platform's name before it.
+        arena: Where a robot begins that is emulated in this program, unless its port says where.
+    """
+
+    def open_robot(platform: Platform) -> Robot:
+        name, rest = split_spec(port)
+        if names_a_port(port) and name != platform.name:
+            raise StudyError(f"{port} is a port of platform {name!r}, expected one of {platform.name!r}.")
+        robot = platform.at_port(rest if names_a_port(port) else port)
+        return (robot if arena is None else robot.in_arena(arena)).connect()
+
+    return open_robot
 
 
 def default_operator(port: str) -> Operator:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import OutgrownError, StudyError, whole_number
+from realitygap.platforms import built_in_platforms
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
 from realitygap.tasks import source_hash
@@ -160,12 +161,13 @@ def drive_study(
     study, path = _resolved(study, out, seed, replicates, allow_code)
     check_has_robot(study)
     operator = operator or default_operator(port)
+    arena = physical_conditions(study)[0].arena.arena()
     folder = _open_folder(path, study)
     with folder.locked():
         _adopt(folder, study)
         ledger_path = path / LEDGER_NAME
         with Ledger.open(ledger_path) if ledger_path.exists() else Ledger.create(ledger_path) as ledger:
-            physical = PhysicalStudy(study, ledger, operator, open_robot or connect_robot(port), port)
+            physical = PhysicalStudy(study, ledger, operator, open_robot or connect_robot(port, arena), port)
             waiting = physical.carry_out()
         return StudyResult(folder, 0, 0, 0.0, _physical_result(study, folder, physical.n_driven, waiting))
 
@@ -177,8 +179,9 @@ def check_has_robot(study: Study) -> None:
         StudyError: The study has no such condition.
     """
     if not study.n_physical:
+        robots = [repr(model.name) for model in built_in_platforms() if model.is_physical]
         raise StudyError(
-            f"No condition of study {study.about.name!r} is on a robot (platform 'scribbler'). "
+            f"No condition of study {study.about.name!r} is on a robot (platform {' or '.join(robots)}). "
             "`realitygap run` computes it."
         )
 

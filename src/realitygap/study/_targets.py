@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from realitygap.errors import RobotError, StudyError
-from realitygap.platforms import DEFAULT_ROBOT
+from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
 from realitygap.records import OBSERVATIONS, ObservationsHead, Observe, sees
 from realitygap.tasks import Task
 from realitygap.trials import Target
 from realitygap.world import Arena
 
 
-def observations_head(target: Target, observe: Observe, robot: str = DEFAULT_ROBOT) -> ObservationsHead:
-    """What a file of trials of a target begins with."""
+def observations_head(target: Target, observe: Observe, robot: str | None = None) -> ObservationsHead:
+    """What a file of trials of a target begins with; the robot is that of its platform when not given."""
+    name, _ = split_spec(target.name)
+    if robot is None:
+        robot = platform_class(name).base_robot if name in platform_names() else DEFAULT_ROBOT
     arena = target.arena.to_dict()
     return ObservationsHead(target.name, target.label, robot, arena, target.step_s, observe, target.identity)
 
@@ -78,7 +81,7 @@ SEEN_AS: dict[Observe, str] = {
 WOULD_SEE: dict[Observe, str] = {
     "readings": "Record the trials anew.",
     "cells": "A person who counts them, a camera (--camera) or a witness (--witness) would see them.",
-    "encoders": "A Scribbler 2 has encoders, and so has a simulated robot.",
+    "encoders": "A Scribbler 2 has encoders, and so have a real Thymio and a simulated robot.",
     "track": "A camera (--camera) or the witness of an emulated robot (--witness) would see them.",
 }
 

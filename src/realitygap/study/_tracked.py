@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import StudyError
-from realitygap.platforms import DEFAULT_ROBOT, FULL_SCALE
 from realitygap.records import (
     LEDGER_NAME,
     Ledger,
@@ -95,16 +94,18 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
         start=(arena.start.x, arena.start.y, arena.start.heading),
         step_s=float(np.median(np.diff(times))),
         commands=np.array([(step.move, step.turn) for step in steps], np.float64),
-        readings=np.minimum(np.array([step.raw for step in steps], np.float64) / FULL_SCALE, 1.0),
+        readings=np.minimum(
+            np.array([step.raw for step in steps], np.float64) / condition.on.full_scale, 1.0
+        ),
         stalled=np.array([step.stalled for step in steps], np.bool_),
         cells=trial.cells or (),
         genome=genome_of(condition, individuals[trial.individual]).to_json(),
         number=number,
         end=trial.end or "step limit",
     )
-    port = f"scribbler:{sittings[-1]['port']}" if sittings else "scribbler"
+    platform = condition.on.at_port(sittings[-1]["port"]) if sittings else condition.on
     head = ObservationsHead(
-        port, label or "REAL", DEFAULT_ROBOT, arena.to_dict(), condition.on.command_s, "track"
+        platform.spec, label or "REAL", platform.base_robot, arena.to_dict(), condition.on.command_s, "track"
     )
     return TrialToTrack(head, observed, times, arena)
 

@@ -15,9 +15,6 @@ from realitygap.robots import Clock, Command, Robot, SystemClock
 N_READS = 10
 """Observations by which the link and the sensors are judged."""
 
-LEAST_BATTERY_V = 6.15
-"""Below it the Fluke 1 blinks for new batteries (its firmware), and with weak cells Bluetooth drops out."""
-
 _LOAD = Command(0.0, 0.5)
 """A turn on the spot, by which the motors load the battery."""
 
@@ -70,13 +67,12 @@ def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Prefligh
             "is too slow"
         )
     facts["readings"] = ", ".join(f"{value:g}" for value in raws[-1])
-    problems += _insane(raws, robot.n_sensors, getattr(robot, "reading_max", None))
+    problems += _insane(raws, robot)
     volts = _battery_under_load(robot)
     facts["battery under load"] = "not told" if volts is None else f"{volts:.2f} V"
-    if volts is not None and volts < LEAST_BATTERY_V:
-        problems.append(
-            f"the battery has {volts:.2f} V under load, expected at least {LEAST_BATTERY_V} V: change it"
-        )
+    least = getattr(robot, "least_battery_v", 0.0)
+    if volts is not None and volts < least:
+        problems.append(f"the battery has {volts:.2f} V under load, expected at least {least} V: change it")
     return Preflight(facts, tuple(problems), identity)
 
 
@@ -98,8 +94,9 @@ def _other_robot(identity: Mapping[str, str], before: Mapping[str, str]) -> list
     return [f"this is another robot than before: {', '.join(differing)}"] if differing else []
 
 
-def _insane(raws: list[tuple[float, ...]], n_sensors: int, reading_max: float | None) -> list[str]:
+def _insane(raws: list[tuple[float, ...]], robot: Robot) -> list[str]:
     """What cannot be right about the readings of several moments."""
+    n_sensors, reading_max = robot.n_sensors, getattr(robot, "reading_max", None)
     if any(len(raw) != n_sensors for raw in raws):
         return [f"{len(raws[-1])} sensors answer, expected {n_sensors}"]
     values = [value for raw in raws for value in raw]
@@ -107,20 +104,21 @@ def _insane(raws: list[tuple[float, ...]], n_sensors: int, reading_max: float | 
         return ["a reading is no number from 0 on"]
     if reading_max is not None and all(value >= reading_max for value in values):
         return [
-            f"all readings are at their limit ({reading_max:g}) all the time: take the robot away from the wall, or "
-            "lower ir_power"
+            f"all readings are at their limit ({reading_max:g}) all the time: take the robot away from the wall"
+            f"{getattr(robot, 'blinded_advice', '')}"
         ]
     return []
 
 
 def _battery_under_load(robot: Robot) -> float | None:
     """Voltage while both motors run [V]; None where the robot cannot tell."""
-    battery = getattr(robot, "battery", None)
-    if battery is None:
+    volts = getattr(robot, "volts", None)
+    if volts is None:
         return None
     try:
         robot.drive(_LOAD)
-        return float(battery())
+        found = float(volts())
+        return None if math.isnan(found) else found
     except RobotError:
         return None
     finally:

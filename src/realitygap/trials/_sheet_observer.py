@@ -50,7 +50,7 @@ class SheetObserver(OwnSenses):
 
     def clock(self, robot: Robot) -> Clock:
         """The robot's own."""
-        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
         return clock
 
     def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:

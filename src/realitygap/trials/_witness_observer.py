@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from realitygap.errors import RobotError
 from realitygap.records import Observe, Score
 from realitygap.robots import Clock, Robot
-from realitygap.world import Arena, Pose
+from realitygap.world import Arena, Pose, paper_arena
 
 from ._own_senses import OwnSenses
 from ._target import TrialPlan
@@ -75,13 +75,15 @@ class WitnessObserver(OwnSenses):
             _refuse_other_arena(self.witness.arena(), arena)
 
     def ready(self) -> None:
-        """Put it in the middle of the paper's arena."""
-        self.witness.place(PREFLIGHT_POSE, 0)
+        """Put it in the middle of the paper's arena, or at the start of another one."""
+        arena = self.witness.arena()
+        self.witness.place(PREFLIGHT_POSE if arena.grid == paper_arena().grid else arena.start, 0)
 
     def clock(self, robot: Robot) -> Clock:
-        """The robot's own; that of an emulator in another program is held from now on."""
-        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a Scribbler
-        return clock if self._is_own else WitnessClock(self.witness, clock)
+        """The robot's own; that of an emulator in another program is held from now on, if it can be."""
+        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
+        speed = None if self._is_own else self.witness.hold()  # type: ignore[attr-defined]  # those that are served can
+        return clock if speed is None else WitnessClock(self.witness, clock, speed)
 
     def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
         """Put it there.
@@ -129,11 +131,11 @@ class WitnessClock:
     Args:
         witness: Who tells it, and holds it.
         real: By which is waited, so that it passes no faster than was asked for.
+        speed: How fast it was to pass: its seconds in one of real time; 0: as fast as it goes.
     """
 
-    def __init__(self, witness: Witness, real: Clock) -> None:
-        self._witness, self._real = witness, real
-        self._speed: float = witness.hold()  # type: ignore[attr-defined]  # those of emulators that are served can
+    def __init__(self, witness: Witness, real: Clock, speed: float) -> None:
+        self._witness, self._real, self._speed = witness, real, speed
 
     def now(self) -> float:
         """The emulator's time [s]."""

@@ -40,6 +40,7 @@ from ._placing import check_start, enclosing_walls, is_inside
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
+from ._room import bounds_of, room_of, walls_within
 from ._settings import ArenaSettings
 from ._units import INCH
 from ._visited import VisitedCells, cells_along
@@ -77,6 +78,7 @@ __all__ = [
     "VisitedCells",
     "arena_names",
     "arena_picture",
+    "bounds_of",
     "cells_along",
     "check_drawn_starts",
     "check_start",
@@ -98,7 +100,9 @@ __all__ = [
     "read_toml",
     "robot_names",
     "robot_picture",
+    "room_of",
     "rounded",
     "things_in",
+    "walls_within",
     "why_no_part",
 ]

@@ -10,8 +10,8 @@ import time
 
 import pytest
 
+from realitygap.emulator import Playground, why_not
 from realitygap.errors import RobotError, RobotStopped
-from realitygap.platforms.thymio._playground import Playground, why_not
 from realitygap.robots import Command
 from realitygap.robots.thymio import Thymio
 from realitygap.testing import check_robot

@@ -10,7 +10,7 @@ from starlette.requests import Request
 
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.platforms import DEFAULT_ROBOT
+from realitygap.platforms import class_of
 from realitygap.world import load_arena
 
 from ._frame import framed, hint, section, text_of, visitor_of, whole_of
@@ -96,9 +96,11 @@ class _Page:
         with ui.row().classes("lab-row"):
             name = ui.input("Name", value="my-robot")
             kind = ui.select(_KINDS, value="sensors", label="What")
-            platform = ui.input("Platform: scribbler:PORT, twin:FILE, sim or sim:FILE", value="sim")
+            platform = ui.input(
+                "Platform: scribbler:PORT, thymio:PORT, twin:FILE, sim or sim:FILE", value="sim"
+            )
             observe = ui.select(["cells", "encoders", "track"], value="cells", label="What is seen of it")
-            base = ui.input("Robot, or its file, on whose numbers the fit builds", value=DEFAULT_ROBOT)
+            base = ui.input("Robot, or its file, on whose numbers the fit builds (else that of the platform)")
             budget = ui.number("Trials in all (else what it takes)", min=1, precision=0)
             witness = ui.input("Witness of an emulator, HOST:PORT")
             for each in (name, kind, platform, observe, base, budget, witness):
@@ -111,7 +113,7 @@ class _Page:
                     "kind": kind.value,
                     "platform": text_of(platform),
                     "observe": observe.value,
-                    "base": text_of(base) or DEFAULT_ROBOT,
+                    "base": text_of(base) or class_of(text_of(platform)).base_robot,
                     "budget": whole_of(budget),
                     "witness": text_of(witness),
                 },

@@ -66,7 +66,7 @@ class _Page:
         with ui.row().classes("lab-row"):
             name = _text("Name", "gap")
             sim = _text("Simulator: sim, sim:FILE or jyro", "sim")
-            target = _text("Target: jyro, twin:FILE, scribbler:PORT ...", "jyro")
+            target = _text("Target: jyro, twin:FILE, scribbler:PORT, thymio:PORT ...", "jyro")
             controllers = _text("Controllers: random, or a study or folder", "random")
             n = ui.number("Controllers", value=10, min=2, max=1024, precision=0)
             trials = ui.number("Trials of each", value=10, min=1, max=4096, precision=0)

@@ -10,7 +10,9 @@ from starlette.requests import Request
 
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.robots.scribbler import PortGuess, find_ports
+from realitygap.platforms import emulated_robots
+from realitygap.robots import list_ports
+from realitygap.robots.scribbler import PortGuess
 
 from ._frame import framed, hint, section, text_of, visitor_of
 from ._grid import CellGrid
@@ -42,7 +44,7 @@ def add_robot(lab: Lab) -> None:
 
     @ui.page("/robot", response_timeout=30)
     async def robot(request: Request) -> None:
-        ports = await run.io_bound(find_ports)
+        ports = await run.io_bound(list_ports)
         with framed(lab, "Robot", "/robot"):
             _Page(lab, visitor_of(request), ports or []).show()
 
@@ -87,7 +89,7 @@ class _Page:
         if self._is_same_robot(before, now):
             self._facts.refresh()
         else:
-            self._ports = await run.io_bound(find_ports) or []
+            self._ports = await run.io_bound(list_ports) or []
             self._part.refresh()
 
     def _is_same_robot(self, before: Any, now: Any) -> bool:
@@ -122,14 +124,14 @@ class _Page:
             ui.input(
                 "Port",
                 value=likely[0] if likely else EMULATED,
-                autocomplete=[*(guess.port for guess in found), EMULATED],
+                autocomplete=[*(guess.port for guess in found), *emulated_robots()],
             )
             .props("outlined dense")
             .classes("lab-wide")
         )
         for guess in found:
             hint(f"{guess.port}: {guess.seems}")
-        hint(f"{EMULATED} is an emulated robot in this program.")
+        hint(f"Emulated robots in this program: {', '.join(emulated_robots())}.")
         witness = ui.input("Witness of an emulator in another program, HOST:PORT (else leave it empty)")
         witness.props("outlined dense").classes("lab-wide")
 
@@ -215,8 +217,10 @@ class _Page:
         for bar, reading in zip(self._bars, senses["readings"], strict=False):
             bar.value = round(reading, 3)
         seen = ", ".join(f"{value:.0f}" for value in senses["raw"])
-        light = ", ".join(map(str, senses["light"]))
-        self._said.text = f"Obstacles {seen}; light {light}; line {', '.join(map(str, senses['line']))}"
+        more = "".join(
+            f"; {name} {', '.join(map(str, senses[name]))}" for name in ("light", "line") if name in senses
+        )
+        self._said.text = f"Obstacles {seen}{more}"
         self._moves.text = ("Driving" if senses["moves"] else "Standing") + (
             ", blocked" if senses["stalled"] else ""
         )

@@ -13,8 +13,10 @@ from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
 from realitygap.lab._study_job import StudyJob
+from realitygap.platforms import emulated_robots
 from realitygap.report import measure_agreement
-from realitygap.robots.scribbler import PortGuess, find_ports
+from realitygap.robots import list_ports
+from realitygap.robots.scribbler import PortGuess
 
 from ._counting import Counting
 from ._driving import Driving
@@ -245,7 +247,9 @@ class _Page:
             "this program, and draws its line for you to count."
         )
         port = (
-            ui.input("Port", value=likely[0] if likely else EMULATED, autocomplete=[*ports, EMULATED])
+            ui.input(
+                "Port", value=likely[0] if likely else EMULATED, autocomplete=[*ports, *emulated_robots()]
+            )
             .props("outlined dense")
             .classes("lab-wide")
         )
@@ -303,7 +307,7 @@ class _Page:
             state = self._lab.studies.state(self._name)
         except RealityGapError:
             return None
-        return _Beginning(state.is_complete, tuple(find_ports()))
+        return _Beginning(state.is_complete, tuple(list_ports()))
 
     # what there is
 

@@ -13,10 +13,10 @@ from realitygap.errors import RealityGapError
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
-from realitygap.lab._live_robot import EMULATED
 from realitygap.lab._studies import StudyState
 from realitygap.lab._study_job import StudyJob
 from realitygap.lab._watcher import Watcher
+from realitygap.platforms import emulated_robots
 
 from ._driving import Driving
 from ._frame import framed, hint, section, text_of, whole_of
@@ -280,7 +280,7 @@ class _Page:
 
     def _platforms(self) -> list[str]:
         """On which a network may be seen live; files are those in the lab's folder."""
-        return ["sim", "jyro", EMULATED, *(f"twin:{name}" for name in self._opened.files)]
+        return ["sim", "jyro", *emulated_robots(), *(f"twin:{name}" for name in self._opened.files)]
 
     def _show_live(self) -> None:
         job = self._lab.lives.get(self._name)

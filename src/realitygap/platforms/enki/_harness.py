@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import subprocess
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from realitygap.errors import RobotError
-from realitygap.world import Arena, Obstacle, Pose
+from realitygap.world import Arena, Obstacle, Pose, room_of, walls_within
 
 from ._build import built_harness
 
@@ -139,7 +139,7 @@ def check_arena(arena: Arena) -> None:
         raise ValueError(
             f"in arena {arena.name!r} {', '.join(arena.vary)} are drawn, expected plain numbers on platform 'enki'"
         )
-    if _has_floor(arena) and _room(arena) is None:
+    if _has_floor(arena) and room_of(arena) is None:
         raise ValueError(
             f"arena {arena.name!r} has something on its floor and no rectangle of walls around it, expected one on "
             "platform 'enki'"
@@ -153,14 +153,10 @@ def arena_lines(arena: Arena) -> Iterator[str]:
         ValueError: As in `check_arena`.
     """
     check_arena(arena)
-    room, (left, low) = _room(arena), _corner(arena)
+    room, (left, low) = room_of(arena), _corner(arena)
     yield "world" if room is None else _world(arena, room)
-    outer = set() if room is None else set(_edges(room))
-    for wall in arena.walls:
-        x1, y1, x2, y2 = wall
+    for x1, y1, x2, y2 in walls_within(arena, room):
         length = math.hypot(x2 - x1, y2 - y1)
-        if _undirected(wall) in outer or not length:
-            continue
         x, y, angle = (x1 + x2) / 2 - left, (y1 + y2) / 2 - low, math.atan2(y2 - y1, x2 - x1)
         yield f"box {x * CM!r} {y * CM!r} {length * CM!r} {WALL_CM} {angle!r}"
     for obstacle in arena.obstacles:
@@ -198,27 +194,5 @@ def _has_floor(arena: Arena) -> bool:
 
 def _corner(arena: Arena) -> tuple[float, float]:
     """The point of the arena that is Enki's origin [m]."""
-    room = _room(arena)
+    room = room_of(arena)
     return (0.0, 0.0) if room is None else room[:2]
-
-
-def _room(arena: Arena) -> tuple[float, float, float, float] | None:
-    """The rectangle of walls around everything: left, low, right, high [m]; None if there is none."""
-    if not arena.walls:
-        return None
-    walls = np.array(arena.walls).reshape(-1, 2)
-    (left, low), (right, high) = walls.min(0).tolist(), walls.max(0).tolist()
-    room = left, low, right, high
-    is_closed = set(_edges(room)) <= {_undirected(wall) for wall in arena.walls}
-    return room if is_closed and right > left and high > low else None
-
-
-def _edges(room: tuple[float, float, float, float]) -> Iterator[tuple[tuple[float, float], ...]]:
-    left, low, right, high = room
-    corners = [(left, low), (right, low), (right, high), (left, high)]
-    for k, corner in enumerate(corners):
-        yield _undirected((*corner, *corners[(k + 1) % 4]))
-
-
-def _undirected(wall: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    return tuple(sorted(((wall[0], wall[1]), (wall[2], wall[3]))))

@@ -27,6 +27,7 @@ class EnkiPlatform(Platform):
     name: ClassVar[str] = "enki"
     summary: ClassVar[str] = "a Thymio II in Enki: another simulator, in a separate program"
     channels: ClassVar[tuple[str, ...]] = ("line.0", "line.1", "encoder.0", "encoder.1")
+    base_robot: ClassVar[str] = "thymio"
     version: ClassVar[str] = "Enki, harness 1"
 
     step_s: float = Field(0.1, gt=0, le=10, description="Duration of a command [s].")
@@ -53,7 +54,7 @@ class EnkiPlatform(Platform):
 
     @cached_property
     def _thymio(self) -> RobotModel:
-        return load_robot("thymio")
+        return load_robot(self.base_robot)
 
     @property
     def body(self) -> Body:

@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from realitygap.errors import StudyError
-from realitygap.robots import Robot
-from realitygap.robots.scribbler import is_in_this_program
-from realitygap.trials import PortObserver, RobotTarget, Target, WitnessObserver
+from realitygap.robots import Robot, is_in_this_program
 from realitygap.world import Arena
 
-from .._platform import Opening, Platform
+from .._platform import Platform
 
 if TYPE_CHECKING:
     from realitygap.robots.scribbler import Scribbler
@@ -43,6 +40,8 @@ class ScribblerPlatform(Platform):
         *("light.0", "light.1", "light.2", "line.0", "line.1"),
         *("encoder.0", "encoder.1"),  # of an S2 or S3
     )
+    full_scale: ClassVar[float] = FULL_SCALE
+    emulated: ClassVar[str] = "scribbler:emulator://s2?fluke=2"
 
     port: str = Field(
         "",
@@ -109,27 +108,6 @@ class ScribblerPlatform(Platform):
         if witness is not None:
             witness.place(arena.start, 0)
         return robot
-
-    def open(self, arena: Arena, how: Opening) -> Target:
-        """Open the robot for trials one by one, with its observer or its witness."""
-        observer = how.observer or self._witness(how.witness)
-        return RobotTarget(
-            self.connect, arena, observer, name=how.name, step_s=how.step_s, on_lost=how.on_lost
-        )
-
-    def _witness(self, address: str | None) -> PortObserver:
-        if not self.needs_person:
-            return WitnessObserver()
-        if address is not None:
-            from realitygap.emulator import connect_witness
-
-            remote = connect_witness(address)
-            remote.hold()  # before its robot is spoken to: somebody may have left it driving, faster than it answers
-            return WitnessObserver(remote)
-        raise StudyError(
-            f"Who places the robot at {self.port} and says what it drew? Name the witness of an emulator (HOST:PORT, "
-            "from realitygap emulate --witness PORT), or give an observer."
-        )
 
     def connect(self) -> Scribbler:
         """Connect to the robot at the port, with these settings.

@@ -1,1 +1,1 @@
-"""Aseba's playground in place of a Thymio II, for tests."""
+"""The platform `thymio`."""

@@ -8,7 +8,7 @@ have a file each; `_robot` puts them together and meets the contract.
 from ._codec import Blob, MotorStats, SensorBlock
 from ._device import RobotInfo
 from ._link import Exchange, Faults
-from ._ports import PortGuess, find_ports, is_in_this_program, label_of
+from ._ports import PortGuess, find_ports, label_of
 from ._robot import Scribbler
 
 __all__ = [
@@ -21,6 +21,5 @@ __all__ = [
     "Scribbler",
     "SensorBlock",
     "find_ports",
-    "is_in_this_program",
     "label_of",
 ]

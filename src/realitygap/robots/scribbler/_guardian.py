@@ -41,12 +41,13 @@ class Guardian:
     Args:
         descriptor: Descriptor of the open port.
         on_death: Called from a thread if the guardian ends before `end` is called.
+        stop: Bytes that stop the motors of a robot that does not answer to them; a Scribbler's if not given.
 
     Raises:
         RobotError: It cannot be started.
     """
 
-    def __init__(self, descriptor: int, on_death: Callable[[], None]) -> None:
+    def __init__(self, descriptor: int, on_death: Callable[[], None], stop: bytes = b"") -> None:
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._is_moving = False
@@ -56,7 +57,7 @@ class Guardian:
         self._on_death = on_death
         try:
             self._process: subprocess.Popen[bytes] = subprocess.Popen(
-                [sys.executable, "-I", "-S", str(PROGRAM), str(descriptor), str(os.getpid())],
+                [sys.executable, "-I", "-S", str(PROGRAM), str(descriptor), str(os.getpid()), stop.hex()],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,

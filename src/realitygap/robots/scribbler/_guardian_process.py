@@ -1,11 +1,12 @@
 """A process that stops a robot's motors when the program that drives it is killed or frozen.
 
-It is run as `python -I -S FILE PORT PROGRAM`: the descriptor of the open port, which it inherits, and the process
-number of the program. Standard input is a pipe from the program, standard output one to it; each message is one byte.
+It is run as `python -I -S FILE PORT PROGRAM [STOP]`: the descriptor of the open port, which it inherits, the process
+number of the program, and in hexadecimal the bytes that stop a robot other than a Scribbler. Standard input is a pipe
+from the program, standard output one to it; each message is one byte.
 
-A run of bytes `SET_MOTORS_OFF` is the packet "motors off" wherever a packet begins, as the robot ignores the bytes that
-follow its opcode. So the motors stop at once even if the program wrote only a part of its last packet: the first bytes
-complete that packet, the next nine are a packet of their own.
+For a Scribbler, a run of bytes `SET_MOTORS_OFF` is the packet "motors off" wherever a packet begins, as the robot
+ignores the bytes that follow its opcode. So the motors stop at once even if the program wrote only a part of its last
+packet: the first bytes complete that packet, the next nine are a packet of their own.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ MOST_HEARD = 4096
 def main() -> None:
     """Watch until the program closes the port, or is gone."""
     port, program = int(sys.argv[1]), int(sys.argv[2])
+    stop = bytes.fromhex(sys.argv[3]) if len(sys.argv) > 3 else b""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # what ends the program must not end its guardian first
     _tell(READY)
@@ -58,19 +60,25 @@ def main() -> None:
             break
         elif is_moving and time.monotonic() - heard_s > SILENT_S:
             _tell(STOPPING)
-            stop_motors(port)
+            stop_motors(port, stop)
             _tell(STOPPED)
             is_moving = False
     if is_moving:  # otherwise the rest of a packet must not be filled up with what it was not meant to have
-        stop_motors(port)
+        stop_motors(port, stop)
 
 
-def stop_motors(port: int) -> bool:
+def stop_motors(port: int, stop: bytes = b"") -> bool:
     """Send "motors off" until the robot has answered twice: the first answer may be to a packet that was begun before.
 
+    Args:
+        port: Descriptor of the port.
+        stop: Bytes to send three times to a robot that does not answer to them; empty for a Scribbler.
+
     Returns:
-        Whether it did.
+        Whether it did, or whether all was sent.
     """
+    if stop:
+        return _send_often(port, stop)
     heard = b""
     give_up_s = time.monotonic() + GIVE_UP_S
     try:
@@ -88,6 +96,17 @@ def stop_motors(port: int) -> bool:
     except OSError:  # the port hung up
         pass
     return False
+
+
+def _send_often(port: int, stop: bytes) -> bool:
+    """Send bytes three times: the first may complete a message that was begun before."""
+    try:
+        for _ in range(3):
+            _send(port, stop, time.monotonic() + ROUND_S)
+            time.sleep(ROUND_S)
+    except OSError:  # the port hung up
+        return False
+    return True
 
 
 def n_stops(heard: bytes) -> int:

@@ -38,11 +38,6 @@ def port_name(name: str) -> str:
     return name.removeprefix("scribbler:")
 
 
-def is_in_this_program(name: str) -> bool:
-    """Whether a port is that of an emulator in this program, which pyserial knows once it was imported."""
-    return port_name(name).startswith("emulator:")
-
-
 def label_of(name: str) -> Label:
     """What figures say of a robot on this port: EMULATED where it cannot be one of flesh and wire."""
     name = port_name(name)

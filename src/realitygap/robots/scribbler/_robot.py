@@ -29,6 +29,8 @@ from ._watchdog import Watchdog, WatchedClock
 
 T = TypeVar("T")
 
+COUNT_M = 0.00025
+"""Distance of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
 FAR = 99
 """What an S2's distance reads where nothing is seen."""
 
@@ -60,6 +62,10 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     Raises:
         RobotError: The port cannot be opened, or no Scribbler answers.
     """
+
+    least_battery_v = 6.15
+    """Below it the Fluke 1 blinks for new batteries (its firmware), and with weak cells Bluetooth drops out."""
+    blinded_advice = ", or lower ir_power"
 
     def __init__(
         self,
@@ -127,6 +133,21 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     def clock(self) -> Clock:
         """The time that this robot lives in; whoever waits by it is watched, too."""
         return self.link.clock if self._watchdog is None else WatchedClock(self.link.clock, self._watchdog)
+
+    @property
+    def has_encoders(self) -> bool:
+        """Whether it is an S2 or S3, which count how far their wheels turn."""
+        return self.info.model == "s2"
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the end that is ahead is the Fluke's, so that its wheels are counted from behind."""
+        return self.info.fluke != "none" and self.forwardness == "fluke"
+
+    def wheels(self) -> tuple[float, float]:
+        """Distance of the left and right wheel since it was switched on, seen by the end without the Fluke [m]."""
+        left, right = self.encoders()
+        return left * COUNT_M, right * COUNT_M
 
     # the contract
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 from . import _codec as codec
@@ -67,6 +68,10 @@ class Senses(Device):
         """The battery [V]; about 9 when full, low below 6.15."""
         self.need_fluke("battery")
         return self._get(codec.BATTERY, codec.volts)
+
+    def volts(self) -> float:
+        """The battery by its Fluke [V]; nan without one."""
+        return math.nan if self.info.fluke == "none" else self.battery()
 
     def distance(self) -> tuple[int, int]:
         """Distance left, right by an S2 (0: touching, to 99: nothing seen)."""

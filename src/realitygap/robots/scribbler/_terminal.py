@@ -11,9 +11,9 @@ from ._robot import Scribbler
 __all__ = ["battery", "find_ports", "info", "open_robot", "sense"]
 
 
-def open_robot(port: str, record: Path | None) -> Scribbler:
+def open_robot(port: str, record: Path | None, watchdog_s: float | None) -> Scribbler:
     """Connect to a Scribbler."""
-    return Scribbler(port, record=record)
+    return Scribbler(port, record=record, watchdog_s=watchdog_s)
 
 
 def info(robot: Scribbler) -> dict[str, Any]:

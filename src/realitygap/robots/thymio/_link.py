@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -11,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.robots.scribbler._guardian import Guardian, descriptor_of
+from realitygap.robots.scribbler._guardian_process import SILENT_S
 
 from . import _messages as messages
 from ._messages import Decoder, Kind, Message
@@ -30,6 +33,10 @@ MOST_READ = 47
 """Largest number of words that the firmware sends in one answer."""
 MOST_PROGRAM_WORDS = 200
 """Words of a program in one message; a message has room for 256."""
+Span = tuple[int, int]
+"""Offset and number of words."""
+Tell = Callable[[str, bytes, bytes], None]
+"""Called with what happened, the bytes sent, and the bytes that came."""
 
 
 def open_port(name: str) -> Any:
@@ -46,6 +53,11 @@ def open_port(name: str) -> Any:
         with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
             port.exclusive = True
         port.open()
+        connection = getattr(port, "_socket", None)
+        if isinstance(
+            connection, socket.socket
+        ):  # otherwise a short message waits for the one before to be confirmed
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     except (OSError, ValueError, AttributeError) as error:
         raise RobotError(f"{name} cannot be opened: {error}. {_advice(name, error)}") from error
     return port
@@ -103,6 +115,8 @@ class Link:
         self.name = name
         self.lock = threading.RLock()
         self.is_open = True
+        self.tell: Tell | None = None
+        self._guardian: Guardian | None = None
         self._decoder = Decoder()
 
     def find(self) -> Description:
@@ -124,7 +138,8 @@ class Link:
             if not self._listen(add, ANSWER_S):
                 raise RobotTimeout(
                     f"No Thymio answers on {self.name}. Is the robot on, and paired with the dongle? "
-                    "Is this the port of a Thymio? `realitygap robot list` names the ports."
+                    "Is this the port of a Thymio, and does no other program use it? `realitygap robot list` names "
+                    "the ports."
                 )
             self._listen(lambda message: add(message) and False, OTHERS_S)
             if len(present) > 1:
@@ -182,8 +197,8 @@ class Link:
             self._send(messages.control(Kind.RESET, robot.node))
             self._send(messages.control(Kind.RUN, robot.node))
 
-    def read(self, robot: Description, offset: int, count: int) -> tuple[int, ...]:
-        """Return `count` words of the robot's variables.
+    def read(self, robot: Description, *spans: Span) -> list[tuple[int, ...]]:
+        """Return words of the robot's variables, of all spans in one round trip.
 
         Raises:
             RobotError: It does not answer, or the link is lost.
@@ -191,30 +206,35 @@ class Link:
         with self.lock:
             for attempt in range(ONCE_MORE):
                 try:
-                    return self._read(robot, offset, count)
+                    return self._read(robot, spans)
                 except (ProtocolError, RobotTimeout):
                     if attempt == ONCE_MORE - 1:
                         raise
             raise AssertionError
 
-    def _read(self, robot: Description, offset: int, count: int) -> tuple[int, ...]:
+    def _read(self, robot: Description, spans: Sequence[Span]) -> list[tuple[int, ...]]:
         values: dict[int, int] = {}
+        wanted = {offset + k for offset, count in spans for k in range(count)}
 
         def add(message: Message) -> bool:
             if message.kind == Kind.VARIABLES and message.source == robot.node:
                 start, part = messages.variables(message.payload)
-                if offset <= start and start + len(part) <= offset + count:
+                if start in wanted and start + len(part) - 1 in wanted:
                     values.update(enumerate(part, start))
-            return len(values) == count
+            return wanted <= values.keys()
 
-        for start in range(0, count, MOST_READ):
-            self._send(messages.get_variables(robot.node, offset + start, min(MOST_READ, count - start)))
+        questions = [
+            messages.get_variables(robot.node, start, min(MOST_READ, offset + count - start))
+            for offset, count in spans
+            for start in range(offset, offset + count, MOST_READ)
+        ]
+        self._send(b"".join(questions))
         if not self._listen(add, ANSWER_S):
             raise RobotTimeout(
                 f"The Thymio on {self.name} does not answer. Is it on and near? If it was driving, its program stops "
                 "it when the last command ends."
             )
-        return tuple(values[offset + k] for k in range(count))
+        return [tuple(values[offset + k] for k in range(count)) for offset, count in spans]
 
     def write(self, robot: Description, offset: int, values: Sequence[int]) -> None:
         """Set words of the robot's variables."""
@@ -231,10 +251,57 @@ class Link:
         with self.lock:
             self._send(messages.control(Kind.RESET, robot.node))
 
+    def send(self, data: bytes) -> None:
+        """Send messages that nobody answers."""
+        with self.lock:
+            self._send(data)
+
+    def guard(self, stop: bytes) -> None:
+        """Have another process stop the motors if this one is killed or frozen, if the port can be inherited.
+
+        Args:
+            stop: Messages that stop the motors.
+
+        Raises:
+            RobotError: It cannot be started.
+        """
+        descriptor = descriptor_of(self.port)
+        if descriptor is not None:
+            self._stop, self._guardian = stop, Guardian(descriptor, self._replace_guardian, stop)
+
+    def _replace_guardian(self) -> None:
+        """Stop the motors, as nobody would now if this program were killed, and start another guardian."""
+        with self.lock:
+            if self.is_open and self._guardian is not None:
+                self._guardian.end()
+                self._guardian = None
+                with contextlib.suppress(RobotError):
+                    self._send(self._stop)
+                    self.guard(self._stop)
+
+    def expect_motion(self) -> None:
+        """Tell the guardian that the motors will run.
+
+        Raises:
+            RobotError: It does not answer, or it stopped the motors since the last call.
+        """
+        if self._guardian is not None:
+            if self._guardian.has_stopped_motors():
+                raise RobotError(f"This program was silent for {SILENT_S:g} s, so the motors were stopped.")
+            self._guardian.expect_motion()
+
+    def expect_rest(self) -> None:
+        """Tell the guardian that the motors are off."""
+        if self._guardian is not None:
+            self._guardian.expect_rest()
+
     def close(self) -> None:
         """Close the port; safe to call twice. This does not stop the motors."""
         with self.lock:
             self.is_open = False
+            if self._guardian is not None:
+                self._guardian.end()
+                self._guardian = None
             with contextlib.suppress(OSError, ValueError, AttributeError, TypeError):
                 self.port.close()
 
@@ -243,6 +310,8 @@ class Link:
             self.port.write(data)
         except (OSError, ValueError, AttributeError, TypeError) as error:
             raise RobotError(self._lost(error)) from error
+        if self.tell is not None:
+            self.tell("send", data, b"")
 
     def _listen(self, take: Callable[[Message], bool], seconds: float, *, for_each: bool = False) -> bool:
         """Give messages to `take` until it returns True; return whether it did in time.
@@ -263,10 +332,12 @@ class Link:
                 self._decoder.clear()
                 return False
             try:
-                data = self.port.read(max(getattr(self.port, "in_waiting", 1), 1))
+                data = self.port.read(max(getattr(self.port, "in_waiting", 1), self._decoder.missing))
             except (OSError, ValueError, AttributeError, TypeError) as error:
                 raise RobotError(self._lost(error)) from error
             self._decoder.feed(data)
+            if self.tell is not None and data:
+                self.tell("receive", b"", data)
 
     def _lost(self, error: Exception) -> str:
         return (

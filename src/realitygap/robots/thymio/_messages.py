@@ -88,6 +88,15 @@ class Decoder:
         """Drop the bytes of an unfinished message."""
         self._held.clear()
 
+    @property
+    def missing(self) -> int:
+        """Number of bytes to the end of the present header or message, at least 1."""
+        held = len(self._held)
+        if held < _HEADER.size:
+            return _HEADER.size - held
+        length: int = _HEADER.unpack_from(self._held)[0]
+        return max(_HEADER.size + min(length, MOST_PAYLOAD) - held, 1)
+
     def next(self) -> Message | None:
         """Return the next whole message, or None if more bytes are needed.
 

@@ -15,6 +15,8 @@ on board in ticks of 20 ms. In Aseba's notation:
       halted = 1  motor.left.target = 0  motor.right.target = 0
     onevent tap
       taps = taps + 1
+    onevent motor                  # 100 times a second: sums of 16 bits, which begin again at -32768
+      left_sum = left_sum + motor.left.speed  right_sum = right_sum + motor.right.speed
 
 Source of the words: aseba-community/aseba, `aseba/common/consts.h` and `aseba/vm/vm.c`.
 """
@@ -29,12 +31,15 @@ DRIVE = 0
 """User event that sets both motors, for a life in ticks."""
 TICK_S = 0.02
 """Duration of a tick of the program's clock [s]."""
-OWN = ("life", "halted", "taps", "clock")
+OWN = ("life", "halted", "taps", "left_sum", "right_sum", "clock")
 """Variables of the program, one word each, in the order of the robot's memory."""
 INIT_EVENT = 0xFFFF
 FIRST_LOCAL_EVENT = 0xFFFE
-NEEDED_EVENTS = ("timer0", "button.center", "tap")
-NEEDED_VARIABLES = ("event.args", "timer.period", "motor.left.target", "motor.right.target")
+NEEDED_EVENTS = ("timer0", "button.center", "tap", "motor")
+NEEDED_VARIABLES = (
+    *("event.args", "timer.period", "motor.left.target", "motor.right.target"),
+    *("motor.left.speed", "motor.right.speed"),
+)
 _ADD, _SUBTRACT, _EQUAL, _GREATER = 0x2, 0x3, 0xA, 0xC
 _STOP = 0x0000
 
@@ -64,11 +69,14 @@ def safety_program(offsets: Mapping[str, int], events: Sequence[str], first_free
     missing += [name for name in NEEDED_EVENTS if name not in events]
     if missing:
         raise RobotError(f"The robot lacks {', '.join(missing)}: is it a Thymio II with its own firmware?")
-    life, halted, taps, clock = (first_free + k for k in range(len(OWN)))
+    life, halted, taps, left_sum, right_sum, clock = (first_free + k for k in range(len(OWN)))
     left, right, args = offsets["motor.left.target"], offsets["motor.right.target"], offsets["event.args"]
     halt = _put(0, left) + _put(0, right)
     take = _copy(args, left) + _copy(args + 1, right) + _copy(args + 2, life)
     count_down = _change(life, _SUBTRACT) + _only_if(life, _EQUAL, halt)
+    sums = _increase(left_sum, offsets["motor.left.speed"]) + _increase(
+        right_sum, offsets["motor.right.speed"]
+    )
     zeros = [word for k in range(len(OWN)) for word in _put(0, first_free + k)]
 
     def local(name: str) -> int:
@@ -81,6 +89,7 @@ def safety_program(offsets: Mapping[str, int], events: Sequence[str], first_free
             (local("timer0"), _change(clock, _ADD) + _only_if(life, _GREATER, count_down)),
             (local("button.center"), _put(1, halted) + halt),
             (local("tap"), _change(taps, _ADD)),
+            (local("motor"), sums),
         ]
     )
 
@@ -108,6 +117,11 @@ def _copy(source: int, target: int) -> list[int]:
 def _change(offset: int, operation: int) -> list[int]:
     """The words that add 1 to a variable, or subtract 1 from it."""
     return [_load(offset), _push(1), 0x8000 | operation, _store(offset)]
+
+
+def _increase(offset: int, by: int) -> list[int]:
+    """The words that add a variable to another."""
+    return [_load(offset), _load(by), 0x8000 | _ADD, _store(offset)]
 
 
 def _only_if(offset: int, comparison: int, body: Sequence[int]) -> list[int]:

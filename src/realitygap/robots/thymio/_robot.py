@@ -5,36 +5,47 @@ from __future__ import annotations
 import contextlib
 import time
 import weakref
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from realitygap.errors import RobotError, RobotStopped
-from realitygap.robots._clock import HEAR_S
+from realitygap.errors import RecordError, RobotError, RobotStopped
 from realitygap.robots._contract import Command, Label, Observation, check_command
+from realitygap.robots._recording import Recorder
 from realitygap.robots.scribbler._exits import EXITS
 from realitygap.world import Pose
 
+from ._clock import BoardClock
 from ._link import Description, Link, open_port
+from ._messages import set_variables, user_event
 from ._ports import label_of, port_name
 from ._program import DRIVE, OWN, TICK_S
+from ._stall import StallRule
 
 FULL_SCALE = 4505.0
 """Reading of an infrared sensor that touches white paper; source: Enki, `Thymio2.cpp`."""
-GROUND_SCALE = 1023.0
-"""Largest reading of a ground sensor."""
+GROUND_WHITE, GROUND_BLACK = 938.0, 76.0
+"""Readings of a ground sensor on white and on black; source: means of 3,000 readings each in Enki 1.6.99."""
+UNIT_M_S = 0.00033
+"""Speed of a wheel for a target of 1 [m/s]; source: frfa1/robotics, `thymio/README.md`, a real robot."""
+MOTOR_S = 0.01
+"""Time between two `motor` events [s]; source: Aseba, `thymio-api`."""
 LIFE_MARGIN_S = 0.2
-"""Time for which a command outlives its step, so that the next one finds the motors running [s]."""
+"""Time for which a command outlives its step, so that the next one finds the motors running [real s]."""
 RENEW_S = 0.2
 """Time after which a long command is sent again [s]."""
-CLOCK_STANDS_S = 2.0
-"""Time after which a clock on board that does not advance counts as stopped [s]."""
+START_S = 2.0
+"""Time in which the program on board has to run [s]."""
+WATCH_S = 0.1
+"""Time for which its clock is compared with ours at the beginning [s]."""
 STOP_TRIES = 5
 MOST_LIFE = 3000
 _PROX, _GROUND = "prox.horizontal", "prox.ground.delta"
 _TARGETS = ("motor.left.target", "motor.right.target")
 _SPEEDS = ("motor.left.speed", "motor.right.speed")
+_ENCODERS = ("encoder.0", "encoder.1")
 
 
 @dataclass(frozen=True)
@@ -56,36 +67,17 @@ class ThymioInfo:
     label: Label
 
 
-class BoardClock:
-    """Time by the ticks that the program on board counts; a simulation may run faster than real time."""
+@dataclass(frozen=True)
+class _Seen:
+    """One reading of everything that a step needs.
 
-    def __init__(self, robot: Thymio) -> None:
-        self._robot = weakref.proxy(robot)
-        self._ticks = 0
-        self._last: int | None = None
+    Attributes:
+        values: The robot's variables.
+        own: Those of the program on board.
+    """
 
-    def now(self) -> float:
-        """The time since the robot was opened [s]."""
-        found = self._robot.own()[OWN.index("clock")] & 0xFFFF
-        self._ticks += 0 if self._last is None else (found - self._last) & 0xFFFF
-        self._last = found
-        return self._ticks * TICK_S
-
-    def sleep(self, seconds: float) -> None:
-        """Let so much time pass [s].
-
-        Raises:
-            RobotError: The robot does not answer, or its clock stands still.
-        """
-        now = self.now()
-        until, moved_s = now + seconds, time.monotonic()
-        while now < until:
-            time.sleep(min((until - now) / 16, HEAR_S / 2))
-            before, now = now, self.now()
-            if now > before:
-                moved_s = time.monotonic()
-            elif time.monotonic() - moved_s > CLOCK_STANDS_S:
-                raise RobotError("The clock on board of the Thymio stands still: its program does not run.")
+    values: dict[str, tuple[int, ...]]
+    own: dict[str, int]
 
 
 class Thymio:
@@ -97,24 +89,31 @@ class Thymio:
     | turn | -1 | 1 | 1: one wheel ahead, the other back, at `full_speed`, to the left |
 
     Its seven readings are those of the infrared sensors: five in front from left to right, two behind, left and right.
-    Each is a share of `reading_max`. `line.0` and `line.1` are the left and the right ground sensor: 0 is a white
-    floor, 1 is a black one. `stalled` is always False: no rule for it has been tried on a robot.
+    Each is a share of `reading_max`. `line.0` and `line.1` are the left and the right ground sensor: 0 is a floor of
+    `ground_white`, 1 one of `ground_black`.
+
+    A robot that is REAL also has `encoder.0` and `encoder.1`, the mean measured speed of each wheel since the last
+    observation as a part of `full_speed`, and the distance of its wheels. It counts as stalled by `StallRule`. Nobody
+    has tried these on a robot. In a playground the measured speed is the target, so there are none of them.
 
     A program on board stops the motors at the end of each command's life. `close`, the end of a `with` block, an
-    exception, Ctrl-C and SIGTERM stop them immediately.
+    exception, Ctrl-C and SIGTERM stop them immediately. If this program is killed, a guardian process stops them.
 
     Args:
         port: Name of its port, with or without `thymio:` before it; or an open port of pyserial.
         step_s: Duration of a command of `drive` [s].
         full_speed: Target of the wheels for a command of 1, at most 1000.
         reading_max: Infrared reading that is as near as can be told.
+        ground_white, ground_black: Readings of the ground sensors on a white and on a black floor.
+        record: A new file for all that is said, message by message.
 
     Raises:
         RobotError: The port cannot be opened, no Thymio answers, or several do.
     """
 
-    channels = ("line.0", "line.1")
     n_sensors = 7
+    platform: Any = None
+    """The platform that opened it, for figures."""
 
     def __init__(
         self,
@@ -123,18 +122,30 @@ class Thymio:
         step_s: float = 0.1,
         full_speed: int = 300,
         reading_max: float = FULL_SCALE,
+        ground_white: float = GROUND_WHITE,
+        ground_black: float = GROUND_BLACK,
+        record: Path | str | None = None,
     ) -> None:
-        if not (step_s >= 0 and 0 < full_speed <= 1000 and reading_max > 0):
+        if not (step_s >= 0 and 0 < full_speed <= 1000 and reading_max > 0 and ground_white > ground_black):
             raise ValueError(
-                f"step_s is {step_s}, full_speed {full_speed} and reading_max {reading_max}, expected 0 or more, "
-                "1 to 1000, and more than 0."
+                f"step_s is {step_s}, full_speed {full_speed}, reading_max {reading_max}, ground_white {ground_white} "
+                f"and ground_black {ground_black}, expected 0 or more, 1 to 1000, more than 0, and white above black."
             )
         name = port_name(port) if isinstance(port, str) else str(getattr(port, "name", None) or "a port")
         self.link = Link(open_port(name) if isinstance(port, str) else port, name)
         self.step_s = step_s
         self.full_speed = full_speed
         self.reading_max = reading_max
+        self.ground_white, self.ground_black = ground_white, ground_black
         self._selected: tuple[str, ...] = ()
+        self._stall = StallRule()
+        self._sums: tuple[int, int] | None = None
+        self._way = [0, 0]  # sums of measured speeds since the robot was opened
+        self._observed = (0.0, 0, 0)  # time and sums at the last observation
+        self.has_encoders = False
+        proxy = weakref.proxy(self)
+        self.clock = BoardClock(lambda: proxy._read())
+        self._recorder = None if record is None else self._record_into(record)
         EXITS.hold()
         try:
             self.description = self.link.find()
@@ -144,15 +155,53 @@ class Thymio:
             self.link.load(self.description)
             self._wait_for_program()
             firmware = self._read_one("_fwversion")
-        except BaseException:
-            self.link.close()
-            EXITS.release()
+            self.link.guard(_stop_messages(self.description))
+        except BaseException as error:
+            self._give_up(name, error)
             raise
         self._released = weakref.finalize(self, _let_go, self.link, self.description)
         label = label_of(name, self.description.variables)
+        self.has_encoders = label == "REAL"
+        self.channels = ("line.0", "line.1", *(_ENCODERS if self.has_encoders else ()))
         self.label: Label = label
         self.info = ThymioInfo(self.description.name, self.description.node, firmware, name, label)
-        self.clock = BoardClock(self)
+        if self._recorder is not None:
+            set_up = {each: getattr(self, each) for each in ("label", "step_s", "n_sensors", "reading_max")}
+            self._recorder.begin(
+                {"port": name, "robot": asdict(self.info), **set_up, "full_speed": full_speed}
+            )
+
+    @property
+    def port(self) -> Any:
+        """The open port; that of a playground has a `witness`."""
+        return self.link.port
+
+    @property
+    def name(self) -> str:
+        """The robot's name and number, by which it is recognized."""
+        return f"{self.info.name} {self.info.node}"
+
+    def _record_into(self, path: Path | str) -> Recorder:
+        try:
+            recorder = Recorder(path, self.clock)
+        except RecordError:
+            self.link.close()
+            raise
+
+        clock = self.clock
+
+        def tell(name: str, sent: bytes, came: bytes) -> None:
+            recorder.wire(clock.now(), 0.0, name, sent, came, "ok")
+
+        self.link.tell = tell
+        return recorder
+
+    def _give_up(self, name: str, error: BaseException) -> None:
+        self.link.close()
+        EXITS.release()
+        if self._recorder is not None:
+            self._recorder.begin({"port": name, "error": str(error)})
+            self._recorder.close()
 
     def _at(self, name: str) -> int:
         return self.description.variables[name][0]
@@ -166,10 +215,12 @@ class Thymio:
                 )
 
     def _wait_for_program(self) -> None:
-        """Return when the program's clock advances."""
-        first, until = self.own(), time.monotonic() + CLOCK_STANDS_S
-        while time.monotonic() < until:
-            if (now := self.own())[-1] != first[-1] and now[0] == now[1] == 0:
+        """Return when the program runs, and its clock has been compared with ours."""
+        first, began = self._read(), time.monotonic()
+        while (waited := time.monotonic() - began) < START_S:
+            seen = self._read()
+            is_at_rest = seen.own["life"] == seen.own["halted"] == 0
+            if seen.own["clock"] != first.own["clock"] and is_at_rest and waited > WATCH_S:
                 return
         raise RobotError(
             "The safety program does not run on the Thymio. Nothing was driven. Switch it off and on."
@@ -179,32 +230,44 @@ class Thymio:
         """Return the first word of a variable; None if the robot does not describe it."""
         if name not in self.description.variables:
             return None
-        return self.link.read(self.description, self._at(name), 1)[0]
+        return self.link.read(self.description, (self._at(name), 1))[0][0]
 
-    def own(self) -> tuple[int, ...]:
-        """Return the variables of the program on board: life, halted, taps, clock."""
-        return self.link.read(self.description, self.description.first_free, len(OWN))
-
-    def _sensed(self) -> dict[str, tuple[int, ...]]:
-        """Return the variables of a step, read in one question."""
+    def _read(self) -> _Seen:
+        """Read everything that a step needs, in one round trip."""
         names = (_PROX, _GROUND, *_SPEEDS, *_TARGETS)
         places = {name: self.description.variables[name] for name in names}
         start = min(offset for offset, _ in places.values())
         end = max(offset + size for offset, size in places.values())
-        values = self.link.read(self.description, start, end - start)
-        return {name: values[at - start : at - start + size] for name, (at, size) in places.items()}
+        spans = (start, end - start), (self.description.first_free, len(OWN))
+        values, words = self.link.read(self.description, *spans)
+        own = dict(zip(OWN, words, strict=True))
+        self.clock.note(own["clock"] & 0xFFFF)
+        self._own = own
+        sums = own["left_sum"], own["right_sum"]
+        for k, (now, before) in enumerate(zip(sums, self._sums or sums, strict=True)):
+            self._way[k] += (now - before + 0x8000) % 0x10000 - 0x8000
+        self._sums = sums
+        return _Seen(
+            {name: values[at - start : at - start + size] for name, (at, size) in places.items()}, own
+        )
 
     def sensors(self) -> dict[str, tuple[int, ...]]:
         """Return the raw readings: seven of prox.horizontal, two of prox.ground, speeds and targets of the wheels."""
-        return self._sensed()
+        return self._read().values
 
     def speeds(self) -> tuple[int, int]:
         """Return the speeds of the left and the right wheel, in the robot's units; in a playground, their targets."""
-        seen = self._sensed()
+        seen = self._read().values
         return seen[_SPEEDS[0]][0], seen[_SPEEDS[1]][0]
 
+    def wheels(self) -> tuple[float, float]:
+        """Return the distance of each wheel since the robot was opened [m], by measured speeds; not in a playground."""
+        self._read()
+        left, right = (way * MOTOR_S * UNIT_M_S for way in self._way)
+        return left, right
+
     def battery(self) -> int:
-        """Return the raw reading of the battery.
+        """Return the raw reading of the battery, whose unit is not documented.
 
         Raises:
             RobotError: The robot does not describe one, as in a playground.
@@ -222,17 +285,45 @@ class Thymio:
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: motors stopped, and armed again if its center button was pressed."""
-        self.stop()
-        self.link.write(self.description, self.description.first_free + OWN.index("halted"), (0,))
+        if self._recorder is not None:
+            self._recorder.call("reset")
+        with self._noted("reset"):
+            _stop(self.link, self.description)
+            halted = self.description.first_free + OWN.index("halted")
+            self.link.write(self.description, halted, (0,))
+        self._stall = StallRule()
 
     def observe(self) -> Observation:
-        """Read the infrared sensors and the selected ground sensors."""
-        seen = self._sensed()
-        raw = tuple(map(float, seen[_PROX]))
+        """Read the infrared sensors, and the selected other ones."""
+        with self._noted("observe"):
+            seen = self._read()
+        raw = tuple(map(float, seen.values[_PROX]))
         readings = tuple(min(max(value / self.reading_max, 0.0), 1.0) for value in raw)
-        lines = (min(max(1.0 - value / GROUND_SCALE, 0.0), 1.0) for value in seen[_GROUND])
-        channels = dict(zip(self.channels, lines, strict=True))
-        return Observation(readings, False, raw, {name: channels[name] for name in self._selected})
+        span = self.ground_white - self.ground_black
+        lines = (min(max((self.ground_white - value) / span, 0.0), 1.0) for value in seen.values[_GROUND])
+        channels = dict(zip(self.channels, (*lines, *self._encoders()), strict=True))
+        stalled = self._is_stalled(seen)
+        chosen = {name: channels[name] for name in self._selected}
+        if self._recorder is not None:
+            more = {"channels": chosen} if chosen else {}
+            self._recorder.call("observe", readings=readings, stalled=stalled, raw=raw, **more)
+        return Observation(readings, stalled, raw, chosen)
+
+    def _encoders(self) -> tuple[float, ...]:
+        """Mean speed of each wheel since the last observation, as a part of `full_speed`."""
+        if not self.has_encoders:
+            return ()
+        (before_s, *before), now_s = self._observed, self.clock.now()
+        self._observed = (now_s, self._way[0], self._way[1])
+        events = max((now_s - before_s) / MOTOR_S, 1.0)
+        parts = ((now - then) / events / self.full_speed for now, then in zip(self._way, before, strict=True))
+        return tuple(min(max(part, -1.0), 1.0) for part in parts)
+
+    def _is_stalled(self, seen: _Seen) -> bool:
+        if not self.has_encoders:
+            return False
+        targets, speeds = ([seen.values[name][0] for name in names] for names in (_TARGETS, _SPEEDS))
+        return self._stall.is_stalled(self.clock.now(), targets, speeds)
 
     def drive(self, command: Command) -> None:
         """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
@@ -244,25 +335,67 @@ class Thymio:
             RobotStopped: The center button was pressed.
         """
         move, turn = check_command(command)
-        wheels = [round(self.full_speed * min(max(part, -1.0), 1.0)) for part in (move - turn, move + turn)]
+        if self._recorder is not None:
+            self._recorder.call("drive", move=move, turn=turn)
+        with self._noted("drive"):
+            self._drive(move, turn)
+
+    def _drive(self, move: float, turn: float) -> None:
+        self.link.expect_motion()
         until = self.clock.now() + self.step_s
         while True:
-            remaining = until - self.clock.now()
-            if self.own()[OWN.index("halted")]:
+            if self.clock.unread_s >= RENEW_S:
+                self._read()
+            if self._own["halted"]:
                 raise RobotStopped("The center button of the Thymio was pressed: its motors are stopped.")
+            remaining = until - self.clock.now()
             piece = max(min(remaining, RENEW_S), 0.0)
-            life = min(round((piece + LIFE_MARGIN_S) / TICK_S), MOST_LIFE)
-            self.link.emit(DRIVE, (*wheels, life))
+            self._send_wheels(move, turn, piece)
             if remaining <= 0:
                 return
             self.clock.sleep(piece)
             if remaining <= RENEW_S:
                 return
 
+    def _send_wheels(self, move: float, turn: float, seconds: float) -> None:
+        """Send a command with a life of so much time [s], and a margin."""
+        wheels = [round(self.full_speed * min(max(part, -1.0), 1.0)) for part in (move - turn, move + turn)]
+        margin = LIFE_MARGIN_S * max(self.clock.rate, 1.0)  # where its time is faster, ours is scarcer
+        self.link.emit(DRIVE, (*wheels, min(round((seconds + margin) / TICK_S), MOST_LIFE)))
+
+    def motors(self, left: float, right: float) -> None:
+        """Turn the wheels, each -1 (full back) to 1 (full ahead), until the next command, or for 0.4 s.
+
+        Raises:
+            RobotError: The link is lost.
+        """
+        move, turn = check_command(Command((left + right) / 2, (right - left) / 2))
+        self.link.expect_motion()
+        self._send_wheels(move, turn, RENEW_S)
+
+    def line(self) -> tuple[int, ...]:
+        """Return the raw readings of the ground sensors, left and right."""
+        return self._read().values[_GROUND]
+
     def stop(self) -> None:
         """Stop the motors and read back that their targets are 0; safe to call twice."""
-        if self.link.is_open:
+        if not self.link.is_open:
+            return
+        try:
+            if self._recorder is not None:
+                self._recorder.call("stop")
+        finally:  # also if the recording fails
             _stop(self.link, self.description)
+
+    @contextlib.contextmanager
+    def _noted(self, name: str) -> Iterator[None]:
+        """Record what goes wrong."""
+        try:
+            yield
+        except RobotError as error:
+            if self._recorder is not None:
+                self._recorder.fault(name, error)
+            raise
 
     def close(self) -> None:
         """Stop the motors and let go of the robot; safe to call twice.
@@ -273,11 +406,14 @@ class Thymio:
         if not self.link.is_open:
             return
         try:
-            self.stop()
+            _stop(self.link, self.description)
             self.link.reset(self.description)
         finally:
             self.link.close()
             self._released()
+            if self._recorder is not None:
+                self._recorder.call("close")
+                self._recorder.close()
 
     def __enter__(self) -> Self:
         return self
@@ -293,14 +429,19 @@ class Thymio:
             error.add_note(str(failure))
 
 
+def _stop_messages(robot: Description) -> bytes:
+    """The messages that end the life of the last command and set both targets to 0."""
+    off = [set_variables(robot.node, robot.variables[name][0], (0,)) for name in _TARGETS]
+    return user_event(DRIVE, (0, 0, 1)) + b"".join(off)
+
+
 def _stop(link: Link, robot: Description) -> None:
-    """End the life of the last command, set both targets to 0, and read them back."""
+    """Stop the motors, and read back that their targets are 0."""
+    targets = [(robot.variables[name][0], 1) for name in _TARGETS]
     for _ in range(STOP_TRIES):
-        link.emit(DRIVE, (0, 0, 1))
-        targets = [robot.variables[name][0] for name in _TARGETS]
-        for offset in targets:
-            link.write(robot, offset, (0,))
-        if all(link.read(robot, offset, 1) == (0,) for offset in targets):
+        link.send(_stop_messages(robot))
+        if link.read(robot, *targets) == [(0,), (0,)]:
+            link.expect_rest()
             return
     raise RobotError(f"The motors of the Thymio on {link.name} do not stop: switch the robot off.")
 

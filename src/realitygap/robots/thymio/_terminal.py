@@ -5,23 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RobotError
-
 from ._ports import find_ports
 from ._robot import Thymio
 
 __all__ = ["battery", "find_ports", "info", "open_robot", "sense"]
 
 
-def open_robot(port: str, record: Path | None) -> Thymio:
-    """Connect to a Thymio.
+def open_robot(port: str, record: Path | None, watchdog_s: float | None) -> Thymio:
+    """Connect to a Thymio, whose program on board stops it when no command comes.
 
     Raises:
-        RobotError: It cannot be reached, or a recording is asked for.
+        RobotError: It cannot be reached.
     """
-    if record is not None:
-        raise RobotError("Sessions with a Thymio cannot be recorded: leave --record out.")
-    return Thymio(port)
+    return Thymio(port, record=record)
 
 
 def info(robot: Thymio) -> dict[str, Any]:

@@ -104,7 +104,9 @@ class ClosingTwin:
             "n_cells": target.arena.grid.n_cells,
             "label": target.label,
             "cells": [cells[k : k + n] for k in range(0, len(cells), n)],
-            "stalled": [float(np.mean([t.stalled for t in trials[k : k + n]])) for k in range(0, len(trials), n)],
+            "stalled": [
+                float(np.mean([t.stalled for t in trials[k : k + n]])) for k in range(0, len(trials), n)
+            ],
         }
 
     def _on_twin(self) -> GapSide:

@@ -1,0 +1,1 @@
+"""Aseba's playground as an emulated Thymio II, with a witness."""

@@ -1,0 +1,107 @@
+"""A playground in a process of this program, behind the interface of a serial port of pyserial.
+
+`serial.serial_for_url("emulator://playground?speed=8&arena=paper")` starts one and connects to its robot. Closing the
+port ends it.
+"""
+
+from __future__ import annotations
+
+import weakref
+from urllib.parse import parse_qsl, urlsplit
+
+from serial.urlhandler.protocol_socket import Serial as SocketPort
+
+from realitygap.errors import DescriptionError, RobotError, did_you_mean
+from realitygap.world import Arena, load_arena
+
+from ._playground import Playground
+
+HOST = "playground"
+POLL_S = 0.02
+"""Longest wait for bytes in one piece [s]."""
+KEYS = ("speed", "arena", "window")
+
+
+class PlaygroundPort(SocketPort):  # type: ignore[misc]  # pyserial has no types
+    """A port with the Thymio of a playground at its other end.
+
+    Attributes:
+        witness: The playground; None before the port is opened.
+        arena: Where its robot drives if the port's name does not say; the paper's if None.
+    """
+
+    witness: Playground | None = None
+    arena: Arena | None = None
+
+    def open(self) -> None:
+        """Start the playground and connect to its robot.
+
+        Raises:
+            RobotError: It cannot be started.
+        """
+        url: str = self.name
+        arena, speed, window = options_of(url)
+        self.witness = Playground(arena or self.arena, speed=speed, window=window)
+        self._ends = weakref.finalize(self, self.witness.close)
+        self.portstr = self.witness.port
+        try:
+            super().open()
+        finally:
+            self.portstr = url
+
+    def fileno(self) -> int:
+        """Raise an error: nobody needs the descriptor, as the robot ends with this program."""
+        raise OSError("The playground ends with this program.")
+
+    def close(self) -> None:
+        """End the playground; safe to call twice."""
+        if self.witness is not None:
+            self._ends()
+        self.is_open = False
+        if self._socket is not None:
+            self._socket.close()
+
+
+def open_playground(url: str, arena: Arena | None = None) -> PlaygroundPort:
+    """Start a playground and connect to its robot.
+
+    Args:
+        url: Its name, with or without `thymio:` before it.
+        arena: Where its robot drives if the name does not say; the paper's if None.
+
+    Raises:
+        RobotError: It cannot be started.
+    """
+    url = url.removeprefix("thymio:")
+    options_of(url)
+    port = PlaygroundPort(None, timeout=POLL_S)
+    port.port, port.arena = url, arena
+    port.open()
+    return port
+
+
+def options_of(url: str) -> tuple[Arena | None, float, bool]:
+    """Return the arena if it is named, the speed and whether to show a window, of emulator://playground?speed=8&arena=avoid.
+
+    Raises:
+        RobotError: An option is unknown, or has a value that is none.
+    """
+    parts = urlsplit(url)
+    options = dict(parse_qsl(parts.query, keep_blank_values=True))
+    if parts.netloc != HOST:
+        raise RobotError(
+            f"{url}: an emulated Thymio is emulator://{HOST}, got {parts.netloc or 'nothing'!r}."
+        )
+    for key in options:
+        if key not in KEYS:
+            raise RobotError(f"{url}: unknown option {key!r}. {did_you_mean(key, KEYS)}")
+    try:
+        speed = float(options.get("speed", "1"))
+    except ValueError:
+        raise RobotError(f"{url}: speed={options['speed']}, expected a number such as 8.") from None
+    if (window := options.get("window", "off")) not in ("on", "off"):
+        raise RobotError(f"{url}: window={window}, expected on or off.")
+    try:
+        return load_arena(options["arena"]) if "arena" in options else None, speed, window == "on"
+    except DescriptionError as error:
+        raise RobotError(str(error)) from None

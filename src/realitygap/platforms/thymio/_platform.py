@@ -1,0 +1,157 @@
+"""The platform `thymio`: a Thymio II, driven over its own protocol."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from pydantic import Field, PrivateAttr
+
+from realitygap.robots import Robot, is_in_this_program
+from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
+
+from .._platform import Opening, Platform
+
+if TYPE_CHECKING:
+    from realitygap.robots.thymio import Thymio
+    from realitygap.trials import Target
+
+
+class ThymioPlatform(Platform):
+    """A Thymio II on a cable, on a dongle, or in Aseba's playground; the port comes from the command line.
+
+    The robot moves on while a command's time runs, and until the next command, or for 0.2 s. A reading is the raw value
+    of an infrared sensor, divided by `reading_max` and limited to 1; larger is nearer. Nobody has tried it on a robot.
+
+    A playground in this program, `thymio:emulator://playground?speed=8`, begins with the arena of the trials, if its
+    port names none (`arena=`).
+    """
+
+    name: ClassVar[str] = "thymio"
+    summary: ClassVar[str] = "a Thymio II: driven over its own protocol"
+    rest: ClassVar[str] = "PORT"
+    rest_setting: ClassVar[str] = "port"
+    needs_rest: ClassVar[bool] = True
+    is_physical: ClassVar[bool] = True
+    channels: ClassVar[tuple[str, ...]] = (
+        *("line.0", "line.1"),
+        *("encoder.0", "encoder.1"),  # of a robot, not in a playground
+    )
+    full_scale: ClassVar[float] = 4505.0
+    base_robot: ClassVar[str] = "thymio"
+    emulated: ClassVar[str] = "thymio:emulator://playground"
+
+    port: str = Field(
+        "",
+        exclude=True,
+        description="Port of the robot, which the command line names.",
+        json_schema_extra={"hidden": True},
+        repr=False,
+    )
+    step_s: float = Field(
+        0.1,
+        gt=0,
+        le=60,
+        description="Duration of a command [s]; the robot's sensors are read ten times a second.",
+    )
+    full_speed: int = Field(
+        300,
+        ge=1,
+        le=1000,
+        description="Target of a wheel at full command; some robots go no faster than 300 to 400.",
+    )
+    reading_max: float = Field(
+        4505.0, gt=0, le=32_767, description="Infrared reading that counts as 1, as near as can be told."
+    )
+    ground_white: float = Field(
+        938.0, ge=0, le=1023, description="Reading of a ground sensor on a white floor."
+    )
+    ground_black: float = Field(
+        76.0, ge=0, le=1023, description="Reading of a ground sensor on a black floor."
+    )
+    _arena: Arena | None = PrivateAttr(None)
+
+    @property
+    def label(self) -> str:
+        """The label of its figures while nothing was driven; then REAL or EMULATED, as the driver finds."""
+        return "not driven"
+
+    @property
+    def title(self) -> str:
+        """Title of its picture."""
+        return self.name
+
+    @property
+    def command_s(self) -> float:
+        """Duration of a command [s]."""
+        return self.step_s
+
+    @cached_property
+    def _model(self) -> RobotModel:
+        return load_robot(self.base_robot)
+
+    @property
+    def body(self) -> Body:
+        """The outline of the Thymio in figures."""
+        return Body(tuple(self._model.body[0].corners))
+
+    @property
+    def sensors(self) -> RangeSensors:
+        """The mounts of its infrared sensors in figures."""
+        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in self._model.range)
+        return RangeSensors(mounts, self._model.range[0].reach)
+
+    @property
+    def outline_words(self) -> str:
+        """The origin of the outline in figures, for their captions."""
+        return "Enki’s"
+
+    def at_port(self, port: str) -> Self:
+        """Return the platform with the port of its robot."""
+        return self.model_copy(update={"port": port})
+
+    def in_arena(self, arena: Arena) -> Self:
+        """Return the platform with the arena with which a playground in this program begins."""
+        found = self.model_copy()
+        found._arena = arena
+        return found
+
+    @property
+    def needs_person(self) -> bool:
+        """Whether a person has to place the robot: not if it is emulated in this program."""
+        return not is_in_this_program(self.port)
+
+    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
+        """Connect to the robot; an emulated one in this program is placed at the start."""
+        robot = self.in_arena(arena).connect()
+        witness = getattr(robot.port, "witness", None)
+        if witness is not None:
+            witness.place(arena.start, 0)
+        return robot
+
+    def open(self, arena: Arena, how: Opening) -> Target:
+        """Open the robot for trials one by one, with its observer or its witness."""
+        return super(ThymioPlatform, self.in_arena(arena)).open(arena, how)
+
+    def connect(self) -> Thymio:
+        """Connect to the robot at the port, with these settings.
+
+        Raises:
+            RobotError: It cannot be reached.
+        """
+        from realitygap.robots.thymio import Thymio
+
+        port: Any = self.port
+        if not self.needs_person:
+            port = import_module("realitygap.emulator").open_playground(self.port, self._arena)
+        robot = Thymio(
+            port,
+            step_s=self.step_s,
+            full_speed=self.full_speed,
+            reading_max=self.reading_max,
+            ground_white=self.ground_white,
+            ground_black=self.ground_black,
+        )
+        robot.platform = self
+        return robot

@@ -1,0 +1,41 @@
+"""Whether the wheels of a Thymio are blocked, by their measured speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+LEAST_TARGET = 50
+"""Targets below it count as standing: measured speeds are noisy [units]."""
+SHARE = 0.3
+"""Share of its target below which a wheel counts as held."""
+STALL_S = 0.3
+"""Time for which a wheel has to be held [s]."""
+
+
+class StallRule:
+    """A robot is stalled if a wheel has turned slower than 0.3 of its target for 0.3 s.
+
+    The numbers are chosen. The rule was not tried on a robot. A playground reports targets as speeds, so it never
+    applies there.
+    """
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def is_stalled(self, now: float, targets: Sequence[int], speeds: Sequence[int]) -> bool:
+        """Return whether the robot is stalled.
+
+        Args:
+            now: The robot's time [s].
+            targets: Of both wheels [units].
+            speeds: Measured [units].
+        """
+        is_held = any(
+            abs(target) >= LEAST_TARGET and speed * (1 if target > 0 else -1) < SHARE * abs(target)
+            for target, speed in zip(targets, speeds, strict=True)
+        )
+        if not is_held:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        return self._since is not None and now - self._since >= STALL_S

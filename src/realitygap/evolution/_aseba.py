@@ -251,6 +251,7 @@ def _declare(code: _Code, fixed: FixedNetwork, sensed: Sequence[str], step_s: fl
     )
     # the table of events and addresses: the start, the button, and the timer
     code.n_words += 6
+    code.declare("done", 1, [0])
     code.declare("nodes", fixed.n_nodes)
     if fixed.is_recurrent:
         code.declare("before", fixed.n_nodes)
@@ -269,7 +270,6 @@ def _declare(code: _Code, fixed: FixedNetwork, sensed: Sequence[str], step_s: fl
     code.declare("command", 2)
     code.declare("wheels", 2)
     code.declare("running", 1, [0])
-    code.declare("done", 1, [0])
     code.add(f"timer.period[0] = {round(step_s * 1000)}", 1 + _pushed(round(step_s * 1000)))
     code.add("motor.left.target = 0", 2)
     code.add("motor.right.target = 0", 2)

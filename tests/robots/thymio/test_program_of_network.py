@@ -16,7 +16,7 @@ from ...evolution.test_export import IDS, KINDS, evolved
 from . import aseba
 
 compiled = pytest.mark.skipif(bool(aseba.why_not()), reason=aseba.why_not() or "-")
-NODES = aseba.FIRST_FREE
+NODES = aseba.FIRST_FREE + 1
 SETS = [
     ("range.2", "line.1", "time"),
     ("obstacle", "last_move", "last_turn"),

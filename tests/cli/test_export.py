@@ -149,7 +149,7 @@ def test_a_missing_extra_is_one_message_and_leaves_no_file(results, tmp_path, mo
     ("words", "message"),
     [
         (["DIR", "-o", "a.jsn"], "Did you mean 'json'?"),
-        (["DIR", "-o", "a"], "ends in nothing, expected json, onnx, graphml or c"),
+        (["DIR", "-o", "a"], "ends in nothing, expected json, onnx, graphml, c or aseba"),
         (["DIR", "-o", "a.json", "--format", "xml"], "Unknown format 'xml'"),
         (["DIR"], "Name a file with -o"),
         (["DIR", "--condition", "novelty-5O", "-o", "a.json"], "Did you mean 'novelty-50'?"),

@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from realitygap.evolution import to_c
+from realitygap.evolution import Network, to_c
 
 from .test_export import IDS, KINDS, answers, evolved
 
@@ -84,6 +84,69 @@ def test_names_become_constants_and_facts_a_comment():
     assert not any(line.startswith("#error") for line in text.splitlines())
 
 
+def hand_made(**changes):
+    """A network of three inputs that has an output without edges, an edge between outputs and an unused input."""
+    values = evolved({}, bias=False)[0].network().to_dict()
+    nodes = [
+        {"node": 5, "bias": 0.25, "sources": [0, 2], "weights": [3.5, -1e-3]},
+        {"node": 3, "bias": -0.5, "sources": [2, 5], "weights": [40.0, -0.0]},
+        {"node": 4, "bias": 0.75, "sources": [], "weights": []},
+    ]
+    return Network.from_dict(values | {"nodes": nodes, "activation_slope": 1.0} | changes)
+
+
+CORNERS = [
+    {"activation": activation, "recurrent": recurrent, **more}
+    for activation in ("tanh", "sigmoid", "identity")
+    for recurrent in (False, True)
+    for more in (
+        {"activation_slope": 4.9},
+        {
+            "constant": True,
+            "n_inputs": 4,
+            "bias_value": -2.5,
+            "nodes": [
+                {"node": 6, "bias": 0.0, "sources": [3, 0], "weights": [1.5, -0.5]},
+                {"node": 4, "bias": 0.1, "sources": [3, 6], "weights": [-1.0, 1e8]},
+                {"node": 5, "bias": 0.0, "sources": [3], "weights": [1.0]},
+            ],
+        },
+        {"nodes": [{"node": node, "bias": 0.5, "sources": [], "weights": []} for node in (3, 4)]},
+    )
+]
+CORNERS += [
+    {"activation": activation, "recurrent": True, "nodes": [
+        {"node": 5, "bias": 0.0, "sources": [0, 4, 5], "weights": [1.0, 2.0, -3.0]},
+        {"node": 3, "bias": 0.0, "sources": [4, 5], "weights": [1.0, 0.5]},
+        {"node": 4, "bias": 0.0, "sources": [1, 3], "weights": [1.0, -1.5]},
+    ]}
+    for activation in ("tanh", "sigmoid", "identity")
+]  # fmt: skip
+
+
+@compiled
+def test_hand_made_corners_answer_as_in_python(tmp_path):
+    networks = [hand_made(**changes) for changes in CORNERS]
+    wanted = np.array([answers(each) for each in networks])
+    assert run_in_c(networks, tmp_path) == pytest.approx(wanted, rel=1e-12, abs=1e-12)
+
+
+@compiled
+def test_names_that_c_does_not_take_compile_without_a_warning(tmp_path):
+    """Equal names once gave equal constants, and a name with the end of a line broke the comment."""
+    network = hand_made()
+    wild = [["x_2", "x", "x"], ["\u00e9", "\u00df", "a*/b"], ["a\nb", "c\\", "??/"], ["", " ", "1"]]
+    headers = [to_c(network, inputs, ["left", "right"], name=f"x{k}") for k, inputs in enumerate(wild)]
+    assert all(text.isascii() for text in headers)
+    checks = " + ".join(f"(X{k}_INPUTS != 3)" for k in range(len(wild)))
+    for compiler, standard, kind in (("cc", "c99", "c"), ("c++", "c++11", "cpp")):
+        source = tmp_path / f"names.{kind}"
+        source.write_text("\n".join([*headers, f"int main(void) {{ return {checks}; }}\n"]))
+        flags = [f"-std={standard}", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+        subprocess.run([compiler, *flags, source, "-o", tmp_path / "names", "-lm"], check=True)
+        subprocess.run([tmp_path / "names"], check=True)
+
+
 def test_wrong_arguments_are_refused():
     network = evolved({})[0].network()
     with pytest.raises(TypeError, match="expected a Network"):
@@ -91,6 +154,9 @@ def test_wrong_arguments_are_refused():
     for options, said in (
         ({"precision": "half"}, "expected 'double' or 'single'"),
         ({"name": "a b"}, "a name that C takes"),
+        ({"name": "double"}, "name is 'double', expected a name that C takes"),
+        ({"name": "class"}, "a name that C takes"),
+        ({"name": "tanh"}, "a name that C takes"),
         ({"input_names": ["x"]}, "input_names has 1 names, expected 3"),
         ({"output_names": ["x"]}, "output_names has 1 names, expected 2"),
     ):

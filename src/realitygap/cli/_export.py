@@ -31,7 +31,8 @@ def export(
     format: Annotated[
         str | None,
         typer.Option(
-            metavar="FORMAT", help="Of an individual: json, onnx, graphml or c. [default: by FILE's ending]"
+            metavar="FORMAT",
+            help="Of an individual: json, onnx, graphml, c or aseba. [default: by FILE's ending]",
         ),
     ] = None,
     condition: Annotated[
@@ -43,22 +44,24 @@ def export(
     generation: Annotated[int | None, typer.Option(help="Of an individual. [default: the last]")] = None,
     individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
 ) -> None:
-    """Export a network as JSON, ONNX, C, or a graph.
+    """Export a network as JSON, ONNX, C, Aseba, or a graph.
 
     It also exports the species, the innovations, or the lineage of a run.
 
     A folder alone gives one individual, which realitygap show network draws with the same options. json is the genome,
-    which realitygap.Genome.load reads. c is the network as a header of C99, for robots that carry it. onnx is the
-    network for any ONNX runtime, and graphml is the genome as a graph: both need the extra, pip install
-    'realitygap[export]'. Species, innovations and lineage are tables in Parquet: each species of each generation, when
-    each innovation arose, and each individual with its parents. A file that is there gives way once the new one is
-    complete.
+    which realitygap.Genome.load reads. c is the network as a header of C99, for robots that carry it. aseba is the
+    network as a program for a Thymio II, which Aseba Studio opens. onnx is the network for any ONNX runtime, and
+    graphml is the genome as a graph: both need the extra, pip install 'realitygap[export]'. Species, innovations and
+    lineage are tables in Parquet: each species of each generation, when each innovation arose, and each individual with
+    its parents. A file that is there gives way once the new one is complete.
 
     Example: realitygap export results/paper --condition novelty-50 --replicate 3 -o champion.json
 
     Example: realitygap export results/paper --generation 4 --individual 2 --format onnx -o network.onnx
 
     Example: realitygap export results/paper -o network.h
+
+    Example: realitygap export results/paper -o network.aesl
 
     Example: realitygap export lineage results/paper --condition novelty-50 -o lineage.parquet
 

@@ -2,6 +2,7 @@
 
 from ._archive import NoveltyArchive
 from ._archive_members import Member, archive_members
+from ._aseba import to_aseba
 from ._c import to_c
 from ._distances import (
     DISTANCES,
@@ -79,6 +80,7 @@ __all__ = [
     "paper_interface",
     "random_key",
     "sorted_cells_distance",
+    "to_aseba",
     "to_c",
     "to_networkx",
     "to_onnx",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
@@ -15,6 +16,19 @@ from realitygap.kernels.neat.network import IDENTITY_LIMIT
 from ._genome import Network
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+_WORDS = """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t class compl const
+    const_cast constexpr continue decltype default delete do double dynamic_cast else enum explicit export extern false
+    float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
+    protected public register reinterpret_cast restrict return short signed sizeof static static_assert static_cast
+    struct switch template this thread_local throw true try typedef typeid typename union unsigned using virtual void
+    volatile wchar_t while xor xor_eq main
+"""
+_RESERVED = frozenset(_WORDS.split()) | frozenset(
+    f"{name}{kind}" for name in (*dir(math), "y0", "y1", "yn", "j0", "j1", "jn") for kind in ("", "f", "l")
+)
+"""Words of C and C++, and functions of math.h."""
 
 _ACTIVATIONS = {
     "tanh": "return tanh{f}({slope} * x);",
@@ -105,7 +119,7 @@ def to_c(
         raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
     if precision not in ("double", "single"):
         raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
-    if not _IDENTIFIER.fullmatch(name):
+    if not _IDENTIFIER.fullmatch(name) or name in _RESERVED:
         raise ValueError(f"name is {name!r}, expected a name that C takes, such as 'network'.")
     if network.n_inputs == 0:
         raise ValueError(
@@ -128,8 +142,8 @@ def to_c(
         **common,
         version=__version__,
         origin="".join(f"// {key}: {json.dumps(value)}.\n" for key, value in (origin or {}).items()),
-        inputs=", ".join(inputs) or "none",
-        outputs=", ".join(outputs),
+        inputs=_in_comment(inputs),
+        outputs=_in_comment(outputs),
         real="float" if single else "double",
         input_names=", ".join(_constants(guard, "IN", inputs)),
         output_names=", ".join(_constants(guard, "OUT", outputs)),
@@ -146,12 +160,19 @@ def _names(what: str, given: Sequence[str] | None, n: int) -> list[str]:
     return [f"{k}" for k in range(n)] if given is None else list(given)
 
 
+def _in_comment(names: Sequence[str]) -> str:
+    """Return names in ASCII, on one line."""
+    return ", ".join(json.dumps(name)[1:-1] for name in names)
+
+
 def _constants(guard: str, kind: str, names: Sequence[str]) -> list[str]:
     """A constant for each input or output, numbered where two would be equal."""
     found: list[str] = []
     for k, name in enumerate(names):
         word = f"{guard}_{kind}_" + re.sub(r"[^A-Z0-9]", "_", name.upper())
-        found.append(word if word not in found else f"{word}_{k}")
+        while word in found:
+            word += f"_{k}"
+        found.append(word)
     return found
 
 
@@ -168,7 +189,7 @@ def _body(values: Mapping[str, Any], common: Mapping[str, Any], *, single: bool)
     if values["constant"]:
         lines.append(f"    now[{constant}] = {_number(values['bias_value'], single)};")
     seen = "before" if values["recurrent"] else "now"
-    if values["recurrent"]:
+    if values["recurrent"] and any(node["sources"] for node in values["nodes"]):
         lines.append(_BEFORE.format(**common))
     for node in values["nodes"]:
         lines.append(f"    x = {_number(node['bias'], single)};")

@@ -1,0 +1,94 @@
+"""Networks that drive a Thymio of Aseba's playground without a computer, and the same networks at the host."""
+
+import time
+
+import numpy as np
+import pytest
+
+from realitygap.evolution import ControllerInterface, Network, to_aseba
+from realitygap.evolution._fixed_point import ONE, fixed_point
+from realitygap.platforms.thymio._playground import Playground, why_not
+from realitygap.robots.thymio import _messages as messages
+from realitygap.robots.thymio._link import Link, open_port
+from realitygap.robots.thymio._messages import Kind
+from realitygap.world import Pose
+
+from ...evolution.test_export import KINDS, evolved
+from . import aseba
+
+REASON = why_not() or aseba.why_not()
+pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(REASON), reason=REASON or "-")]
+INTERFACE = ControllerInterface(("range.1", "range.2", "range.3"), ("left", "right"))
+N_STEPS = 60
+STEP_S = 0.1
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("aseba")
+
+
+@pytest.mark.parametrize("changes", [KINDS[0], KINDS[1], KINDS[3]], ids=["sigmoid", "tanh", "recurrent tanh"])
+def test_the_robot_computes_each_step_as_the_network_does(changes, folder):
+    network = evolved(changes, bias=False)[1].network()
+    fixed = fixed_point(network)
+    with Playground(start=Pose(0.5, 0.3, 0.1)) as playground:
+        port = open_port(playground.port)
+        link = Link(port, playground.port)
+        try:
+            robot = link.find()
+            text = aseba.source_of(to_aseba(network, INTERFACE))
+            sizes = {name: size for name, (_, size) in robot.variables.items()}
+            room = (robot.room, robot.first_free + 512, 32)
+            words = aseba.run(text, [], folder, sizes, robot.events, room).words
+            for start in range(0, len(words), 200):
+                port.write(messages.set_bytecode(robot.node, start, words[start : start + 200]))
+            port.write(messages.control(Kind.RESET, robot.node))
+            port.write(messages.control(Kind.RUN, robot.node))
+            time.sleep(0.3)
+            stands = playground.pose
+            assert not any(link.read(robot, robot.first_free, 1 + fixed.n_nodes))
+            playground.press(2)
+            seen = watched(link, robot, fixed)
+            assert playground.pose != stands
+            playground.press(2, False)
+            playground.press(2)
+            time.sleep(0.1)
+            assert link.read(robot, robot.offsets["motor.left.target"], 2) == (0, 0)
+            stands = playground.pose
+            time.sleep(0.3)
+            assert playground.pose == stands
+        finally:
+            link.close()
+    compare(network, fixed, seen)
+
+
+def watched(link, robot, fixed):
+    """The number of steps, the nodes, and with a recurrent network the nodes before, after each step that is seen."""
+    n_read = 1 + fixed.n_nodes * (1 + fixed.is_recurrent)
+    seen, until = {}, time.monotonic() + N_STEPS * STEP_S
+    while time.monotonic() < until:
+        done, *values = link.read(robot, robot.first_free, n_read)
+        if done:
+            assert seen.setdefault(done, values) == values
+    assert len(seen) > N_STEPS / 2
+    return seen
+
+
+def compare(network, fixed, seen):
+    n, size = fixed.n_inputs, fixed.n_nodes
+    twin, differences = Network.from_dict(network.to_dict()), []
+    for k, (done, values) in enumerate(seen.items(), 1):
+        nodes = values[:size]
+        before = values[size:] if fixed.is_recurrent else [0] * size
+        assert fixed.step(nodes[:n], before) == nodes
+        if fixed.is_recurrent and done != k:
+            continue  # a step was not seen, and the network at the host has another memory from here on
+        outputs = twin.activate([value / ONE for value in nodes[:n]])
+        found = np.array(fixed.command(nodes)) / ONE
+        differences.append(np.abs(found - np.clip(outputs, -1, 1)).max())
+    print(f"{len(differences)} steps, largest difference {max(differences):.2g}")
+    assert len(differences) > N_STEPS / 4
+    # what a recurrent network remembers adds up
+    assert np.median(differences) < 0.001
+    assert fixed.is_recurrent or max(differences) < 0.005

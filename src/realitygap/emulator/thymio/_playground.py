@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.robots.twin import cells_along
-from realitygap.world import Arena, Pose, paper_arena
+from realitygap.world import Arena, Pose, cells_along, paper_arena
 
 from ._bus import Bus
 from ._scene import CM, corner_of, scene_of

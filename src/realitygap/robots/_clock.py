@@ -36,7 +36,7 @@ class SystemClock:
 
 
 class VirtualClock:
-    """A clock of a robot in this program: time passes while it drives and while somebody waits.
+    """A clock of a robot in this program: time passes while the robot drives, and in `sleep`.
 
     Args:
         wait: Lets time pass, such as by driving on; the clock alone goes on if not given.

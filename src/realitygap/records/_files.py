@@ -38,7 +38,7 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
 
 @contextlib.contextmanager
 def written_beside(path: Path, parts: Iterable[bytes]) -> Iterator[Path]:
-    """Write a file beside another one and sync it; it is deleted at the end if it was not renamed.
+    """Write a file next to another one and sync it; it is deleted at the end if it was not renamed.
 
     Args:
         path: the file whose place the new one may take.

@@ -7,7 +7,7 @@ import errno
 import os
 import secrets
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from realitygap.errors import RecordError
@@ -29,18 +29,29 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
     Raises:
         RecordError: the file is there and shall not be replaced, or the system refused; nothing stays.
     """
-    # processes on several machines may have the same number
+    with writing(path), written_beside(path, [data]) as temporary:
+        if not replace and path.exists():
+            raise RecordError(f"{path} is published already; what is published is never overwritten.")
+        temporary.replace(path)
+        sync_folder(path.parent)
+
+
+@contextlib.contextmanager
+def written_beside(path: Path, parts: Iterable[bytes]) -> Iterator[Path]:
+    """Write a file next to another one and sync it; it is deleted at the end if it was not renamed.
+
+    Args:
+        path: the file whose place the new one may take.
+        parts: all bytes.
+    """
+    # nobody can guess the name and put a link there, and processes on several machines choose others
     temporary = path.with_name(f".{path.name}.{secrets.randbits(63)}.tmp")
     try:
-        with writing(path):
-            with temporary.open("xb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            if not replace and path.exists():
-                raise RecordError(f"{path} is published already; what is published is never overwritten.")
-            temporary.replace(path)
-            sync_folder(path.parent)
+        with temporary.open("xb") as file:
+            file.writelines(parts)
+            file.flush()
+            os.fsync(file.fileno())
+        yield temporary
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
 from collections.abc import Iterable
 from pathlib import Path
 
 from realitygap.errors import RecordError
 from realitygap.records._description import DESCRIPTION_NAME
+from realitygap.records._files import written_beside
 from realitygap.records._inside import refuse_links
 from realitygap.records._listing import LEDGER_NAME, TRIALS_NAME
 from realitygap.records._lock import LOCK_NAME
@@ -75,17 +73,8 @@ def write_whole(path: Path, data: bytes | Iterable[bytes], *, within: Path | Non
 def _replace(place: Path, parts: Iterable[bytes]) -> None:
     if place.is_dir():
         raise IsADirectoryError(0, "it is a folder")
-    # nobody can guess the name and put a link there
-    beside = place.with_name(f".{place.name}.{secrets.randbits(63)}.tmp")
-    try:
-        with beside.open("xb") as file:
-            file.writelines(parts)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(place)
-    finally:
-        with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
+    with written_beside(place, parts) as temporary:
+        temporary.replace(place)
 
 
 def _holds_results(folder: Path) -> bool:

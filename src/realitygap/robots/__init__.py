@@ -1,7 +1,7 @@
 """Platforms, whatever can try a controller, and the contract of a robot."""
 
 from . import scribbler, thymio, twin
-from ._clock import Clock, SystemClock
+from ._clock import Clock, SystemClock, VirtualClock
 from ._contract import Command, Label, Observation, Robot, channels_of, check_command, select_channels
 from ._families import is_in_this_program, list_ports, open_on, split_port
 from ._in_program import ProgramRobot
@@ -20,6 +20,7 @@ __all__ = [
     "Recording",
     "Robot",
     "SystemClock",
+    "VirtualClock",
     "channels_of",
     "check_command",
     "export_mcap",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 HEAR_S = 0.1
@@ -32,6 +33,29 @@ class SystemClock:
     def sleep(self, seconds: float) -> None:
         """Wait [s]."""
         sleep(seconds)
+
+
+class VirtualClock:
+    """A clock of a robot in this program: time passes while the robot drives, and in `sleep`.
+
+    Args:
+        wait: Lets time pass, such as by driving on; the clock alone goes on if not given.
+    """
+
+    def __init__(self, wait: Callable[[float], None] | None = None) -> None:
+        self._wait = wait
+        self.seconds = 0.0
+
+    def now(self) -> float:
+        """Return the time since it was made [s]."""
+        return self.seconds
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        if self._wait is None:
+            self.seconds += seconds
+        else:
+            self._wait(seconds)
 
 
 def sleep(seconds: float) -> None:

@@ -9,26 +9,12 @@ from typing import Any
 from realitygap.errors import RecordError, RobotError
 from realitygap.world import Pose
 
+from ._clock import VirtualClock
 from ._contract import Command, Label, Observation, check_command
 from ._in_program import ProgramRobot
 from ._recording import Recording, read_recording
 
 NAME = "recording:"
-
-
-class RecordedClock:
-    """Time that passes as it did."""
-
-    def __init__(self) -> None:
-        self._now = 0.0
-
-    def now(self) -> float:
-        """The time since the recording began [s]."""
-        return self._now
-
-    def sleep(self, seconds: float) -> None:
-        """Let time pass [s]; nobody has to wait for it."""
-        self._now += seconds
 
 
 class RecordedRobot(ProgramRobot):
@@ -56,7 +42,7 @@ class RecordedRobot(ProgramRobot):
         self.label: Label = header["label"]
         self.step_s = float(header["step_s"])
         self.n_sensors = int(header["n_sensors"])
-        self.clock = RecordedClock()
+        self.clock = VirtualClock()
         self._closed = f"{recording.path} is closed: open the recording anew."
         self._lines = [line for line in recording.lines if line["kind"] != "wire" and line["name"] != "stop"]
         values = [line.get("values", {}) for line in self._lines if line["name"] == "observe"]

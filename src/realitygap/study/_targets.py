@@ -1,13 +1,18 @@
-"""What can be observed of a target, and what follows trials that were lost."""
+"""Trials on a target: what can be observed, those that are missing, and those that were lost."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Sequence
+from typing import TypeVar
+
 from realitygap.errors import RobotError, StudyError
 from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsHead, Observe, sees
+from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, ObservedTrial, sees
 from realitygap.tasks import Task
-from realitygap.trials import Target
+from realitygap.trials import Target, TellTrial, TrialPlan, is_taken_back, is_whole
 from realitygap.world import Arena
+
+Key = TypeVar("Key", bound=Hashable)
 
 
 def observations_head(target: Target, observe: Observe, robot: str | None = None) -> ObservationsHead:
@@ -95,3 +100,46 @@ def refuse_lost(n: int, name: str, kept: str = "") -> None:
     if n:
         lost = f"{n} trials on {name} were" if n > 1 else f"A trial on {name} was"
         raise RobotError(f"{lost} lost, and cannot be done without.{kept} Carry out what is missing.")
+
+
+def carry_out_missing(
+    target: Target,
+    plans: Sequence[TrialPlan],
+    observe: Observe,
+    kept: dict[Key, ObservedTrial],
+    keys: Sequence[Key],
+    *,
+    file: ObservationsFile | None = None,
+    tell: TellTrial | None = None,
+) -> list[ObservedTrial]:
+    """Return the trials in the order of their plans: those that are kept, and the others, which are run now.
+
+    Args:
+        target: Runs the trials that are missing.
+        plans: All trials.
+        observe: How much is seen of them.
+        kept: Whole trials by key; those that are run are added.
+        keys: Of the trial of each plan.
+        file: Gets each trial as it comes, also one that was cut off.
+        tell: Called with the place and the trial, for each whole one that is run.
+
+    Raises:
+        RobotError: A trial was lost.
+    """
+    missing = [k for k, key in enumerate(keys) if key not in kept]
+
+    def keep(k: int, trial: ObservedTrial) -> None:
+        if file is not None:
+            file.append(trial)
+        if is_whole(trial):
+            kept[keys[missing[k]]] = trial
+            if tell is not None:
+                tell(missing[k], trial)
+        elif is_taken_back(trial):
+            kept.pop(keys[missing[k]], None)
+
+    if missing:
+        target.carry_out([plans[k] for k in missing], observe, keep)
+    where = "" if file is None else f" The others are kept in {file.path}."
+    refuse_lost(sum(key not in kept for key in keys), target.name, where)
+    return [kept[key] for key in keys]

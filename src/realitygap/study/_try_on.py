@@ -9,7 +9,7 @@ from realitygap.evolution import Genome
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TrialPlan, is_whole
 
-from ._targets import observations_head, refuse_lost, refuse_more_than_is_seen
+from ._targets import carry_out_missing, observations_head, refuse_more_than_is_seen
 
 
 def try_on(
@@ -41,9 +41,5 @@ def try_on(
     done = {} if file is None else {trial.number: trial for trial in file.trials if is_whole(trial)}
     if any(trial.genome != genome.to_json() for trial in done.values()):
         raise RecordError(f"{out} has trials of another controller. Name another file.")
-    missing = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials) if k not in done]
-    keep = None if file is None else lambda _, trial: file.append(trial)
-    found = target.carry_out(missing, observe, keep)
-    refuse_lost(sum(not is_whole(trial) for trial in found), target.name)
-    done |= {trial.number: trial for trial in found}
-    return [done[k] for k in range(trials)]
+    plans = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials)]
+    return carry_out_missing(target, plans, observe, done, range(trials), file=file)

@@ -13,7 +13,7 @@ from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Operator, Target, TrialPlan, is_taken_back, is_whole, taken_back
 
-from ._targets import refuse_lost
+from ._targets import carry_out_missing
 
 Tell = Callable[[int, ObservedTrial], None]
 
@@ -25,7 +25,7 @@ class StoppedByPerson(Exception):  # noqa: N818 - nothing is wrong
     """Somebody wants to go on another time; what was recorded is kept."""
 
 
-class _Around(ClosedOnExit):
+class WrappedTarget(ClosedOnExit):
     """A target that passes everything on."""
 
     def __init__(self, target: Target) -> None:
@@ -46,7 +46,7 @@ class _Around(ClosedOnExit):
         self.target.close()
 
 
-class CountingTarget(_Around):
+class CountingTarget(WrappedTarget):
     """Says after each trial how many of how many are there.
 
     Args:
@@ -74,7 +74,7 @@ class CountingTarget(_Around):
         return self.target.carry_out(plans, observe, one_more)
 
 
-class RuledTarget(_Around):
+class RuledTarget(WrappedTarget):
     """The ends of paths are read with a ruler where less than a camera is to be observed."""
 
     def carry_out(
@@ -103,7 +103,7 @@ class RuledTarget(_Around):
         return trials
 
 
-class OperatedTarget(_Around):
+class OperatedTarget(WrappedTarget):
     """A person puts the robot at each start, and measures what no camera sees."""
 
     def __init__(self, target: Target, operator: Operator) -> None:
@@ -140,7 +140,7 @@ class OperatedTarget(_Around):
         return [trials[k] for k in range(len(plans))]
 
 
-class ResumableTarget(_Around):
+class ResumableTarget(WrappedTarget):
     """Trials are kept as they end, and those that a file has already are not carried out again.
 
     Of trials of one plan the last one counts.
@@ -151,37 +151,21 @@ class ResumableTarget(_Around):
         self._file = file
         self.trials: dict[tuple[object, ...], ObservedTrial] = {}
         for trial in file.trials:
-            self._note(_what(trial), trial)
-        self.n_found = 0
-
-    def _note(self, what: tuple[object, ...], trial: ObservedTrial) -> None:
-        if is_whole(trial):
-            self.trials[what] = trial
-        elif is_taken_back(trial):
-            self.trials.pop(what, None)
+            if is_whole(trial):
+                self.trials[_what(trial)] = trial
+            elif is_taken_back(trial):
+                self.trials.pop(_what(trial), None)
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[ObservedTrial]:
         """As `Target.carry_out`."""
         wanted = [_what_of(plan, self.arena.start) for plan in plans]
-        missing = [k for k, what in enumerate(wanted) if what not in self.trials]
-        self.n_found += len(plans) - len(missing)
         if tell is not None:
-            for k in set(range(len(plans))) - set(missing):
-                tell(k, self.trials[wanted[k]])
-
-        def keep(k: int, trial: ObservedTrial) -> None:
-            self._file.append(trial)
-            self._note(wanted[missing[k]], trial)
-            if is_whole(trial) and tell is not None:
-                tell(missing[k], trial)
-
-        if missing:
-            self.target.carry_out([plans[k] for k in missing], observe, keep)
-        n_lost = sum(what not in self.trials for what in wanted)
-        refuse_lost(n_lost, self.name, f" The others are kept in {self._file.path}.")
-        return [self.trials[what] for what in wanted]
+            for k, what in enumerate(wanted):
+                if what in self.trials:
+                    tell(k, self.trials[what])
+        return carry_out_missing(self.target, plans, observe, self.trials, wanted, file=self._file, tell=tell)
 
 
 def _what(trial: ObservedTrial) -> tuple[object, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from realitygap.robots import Command, Label, Observation, ProgramRobot, check_command
+from realitygap.robots import Command, Label, Observation, ProgramRobot, VirtualClock, check_command
 from realitygap.world import Arena, Pose
 
 from ._harness import Harness
@@ -25,21 +25,6 @@ CHANNELS = ("line.0", "line.1", "encoder.0", "encoder.1")
 def _seed_of(number: int) -> int:
     """A seed of 31 bits: those of successive numbers would begin with related random numbers in Enki."""
     return int.from_bytes(hashlib.blake2b(str(number).encode(), digest_size=4).digest(), "little") >> 1
-
-
-class EnkiClock:
-    """The time in the simulation: it passes with commands only."""
-
-    def __init__(self) -> None:
-        self.seconds = 0.0
-
-    def now(self) -> float:
-        """The time since the robot was opened [s]."""
-        return self.seconds
-
-    def sleep(self, seconds: float) -> None:
-        """Let so much time pass, in which the robot stands [s]."""
-        self.seconds += seconds
 
 
 class EnkiRobot(ProgramRobot):
@@ -64,7 +49,7 @@ class EnkiRobot(ProgramRobot):
         self._n_steps = max(1, round(step_s / ENKI_STEP_S))
         self._selected: tuple[str, ...] = ()
         self.number = 0  # of the trial that the next `reset` begins
-        self.clock = EnkiClock()
+        self.clock = VirtualClock()
         self._harness = Harness(arena)
         self.reset()
 

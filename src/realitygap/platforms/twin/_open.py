@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import whole_number
-from realitygap.robots import Command, Label
-from realitygap.robots.twin import TwinClock, TwinModel, TwinRobot
+from realitygap.robots import Command, Label, VirtualClock
+from realitygap.robots.twin import TwinModel, TwinRobot
 from realitygap.trials import NoiseKey
 from realitygap.world import Arena, Pose
 
@@ -34,7 +34,7 @@ class SimTwin(SimRobot):
     def __init__(self, model: TwinModel, arena: Arena, *, number: int = 0) -> None:
         self.model = model
         self._number = whole_number("number", number, 0, 2**32 - 1)
-        self.clock = TwinClock()
+        self.clock = VirtualClock()
         super().__init__(SimPlatform(step_s=model.step_s), arena, noise_key=self._key_of(number))
         self._points = [self.pose]
 

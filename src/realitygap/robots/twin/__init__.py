@@ -7,7 +7,7 @@ from ._file import load_twin
 from ._ir import places_of
 from ._model import TwinModel
 from ._picture import outline_of, twin_picture
-from ._robot import TwinClock, TwinRobot
+from ._robot import TwinRobot
 
 __all__ = [
     "EVERY",
@@ -17,7 +17,6 @@ __all__ = [
     "Range",
     "TwinBody",
     "TwinCamera",
-    "TwinClock",
     "TwinModel",
     "TwinRobot",
     "family_rows",

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import whole_number
+from realitygap.robots._clock import VirtualClock
 from realitygap.robots._contract import Command, Label, Observation, check_command
 from realitygap.robots._in_program import ProgramRobot
 from realitygap.world import Arena, Pose, cells_along
@@ -27,25 +28,6 @@ from ._stall import Idler
 FULL_SCALE = 6400.0  # of a Fluke's obstacle reading
 TICK_STEPS = round(TICK_S / STEP_S)
 CRUISE_STEPS = 2 * TICK_STEPS  # while nothing changes but slowly
-
-
-class TwinClock:
-    """The time of a twin: it passes while commands are carried out, and while somebody waits."""
-
-    def __init__(self, wait: Callable[[float], None] | None = None) -> None:
-        self._wait = wait
-        self.seconds = 0.0
-
-    def now(self) -> float:
-        """Seconds since the twin was made."""
-        return self.seconds
-
-    def sleep(self, seconds: float) -> None:
-        """Let so much time pass; the robot goes on with what it was told."""
-        if self._wait is None:
-            self.seconds += seconds
-        else:
-            self._wait(seconds)
 
 
 class TwinRobot(ProgramRobot):
@@ -90,7 +72,7 @@ class TwinRobot(ProgramRobot):
         self.step_s = model.step_s
         self.n_sensors = len(model.ir.mount)
         self.channels = (*names_of(model), "encoder.0", "encoder.1")
-        self.clock = TwinClock(self.wait)
+        self.clock = VirtualClock(self.wait)
         self._physics = Physics(model, arena)
         self.reset()
 

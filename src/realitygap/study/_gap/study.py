@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,7 +31,7 @@ from realitygap.trials import Target, TrialPlan, is_whole
 from realitygap.world import Arena, Pose
 
 from .._controllers import Controller, have_same_score, task_of
-from .._targets import check_task, observations_head, refuse_lost, refuse_too_little
+from .._targets import carry_out_missing, check_task, observations_head, refuse_too_little
 
 Tell = Callable[[str, int, int], None]
 """Called with what is being done, the trials done, and the trials in all."""
@@ -147,7 +149,11 @@ def study_gap(
     for platform in (source, target):
         refuse_inputs(controllers, platform)
     refuse_inputs(reevolved, target)
-    on_target = _carry_out_kept(target, [*plans, *more], observe, results, tell)
+    with contextlib.ExitStack() as stack:
+        file = None
+        if results is not None:
+            file = stack.enter_context(ObservationsFile(results, observations_head(target, observe)))
+        on_target = _carry_out(target, [*plans, *more], observe, tell, file)
     source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
@@ -222,44 +228,23 @@ def _as_much(observe: Observe, platform: Target) -> Observe:
 
 
 def _carry_out(
-    platform: Target, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None
-) -> list[ObservedTrial]:
-    def told(k: int, _: ObservedTrial) -> None:
-        if tell is not None:
-            tell(platform.name, k + 1, len(plans))
-
-    trials = platform.carry_out(plans, observe, told)
-    refuse_lost(sum(not is_whole(trial) for trial in trials), platform.name)
-    return trials
-
-
-def _carry_out_kept(
-    target: Target,
+    platform: Target,
     plans: Sequence[TrialPlan],
     observe: Observe,
-    results: str | Path | None,
     tell: Tell | None,
+    file: ObservationsFile | None = None,
 ) -> list[ObservedTrial]:
-    """Trials of the target in the order of their plans: those in the file, and the others, kept as they come."""
-    if results is None:
-        return _carry_out(target, plans, observe, tell)
-    with ObservationsFile(results, observations_head(target, observe)) as file:
-        kept = {(trial.number, trial.genome): trial for trial in file.trials if is_whole(trial)}
-        keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
-        missing = [k for k, key in enumerate(keys) if key not in kept]
+    """Trials in the order of their plans: those in the file, and the others, kept as they come."""
+    found = () if file is None else file.trials
+    kept = {(trial.number, trial.genome): trial for trial in found if is_whole(trial)}
+    keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
+    done = itertools.count(sum(key in kept for key in keys) + 1)
 
-        def keep(k: int, trial: ObservedTrial) -> None:
-            file.append(trial)
-            if not is_whole(trial):
-                return
-            kept[keys[missing[k]]] = trial
-            if tell is not None:
-                tell(target.name, len(plans) - len(missing) + k + 1, len(plans))
+    def told(k: int, _: ObservedTrial) -> None:
+        if tell is not None:
+            tell(platform.name, next(done), len(plans))
 
-        if missing:
-            target.carry_out([plans[k] for k in missing], observe, keep)
-    refuse_lost(sum(key not in kept for key in keys), target.name, f" The others are kept in {results}.")
-    return [kept[key] for key in keys]
+    return carry_out_missing(platform, plans, observe, kept, keys, file=file, tell=told)
 
 
 def _by_controller(trials: Sequence[ObservedTrial], n: int) -> list[ObservedTrial]:

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
 from realitygap.errors import RecordError
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
 from realitygap.trials import Target, TellTrial, TrialPlan, is_whole
 
-from .._targets import observations_head, refuse_lost
+from .._targets import carry_out_missing, observations_head
+from .._wrapped_targets import WrappedTarget
 
 
-class KeptTarget(ClosedOnExit):
+class KeptTarget(WrappedTarget):
     """A target with a file beside it, and a number of trials that it allows.
 
     A trial is known by its number: who asks for the same trials in the same order, after whatever interruption, gets
@@ -33,14 +33,10 @@ class KeptTarget(ClosedOnExit):
     def __init__(
         self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
     ) -> None:
-        self.name, self.label, self.arena = target.name, target.label, target.arena
-        self.identity = target.identity
-        self.step_s, self.n_sensors, self.observes = target.step_s, target.n_sensors, target.observes
-        self.is_paced, self.inputs = target.is_paced, target.inputs
+        super().__init__(target)
         self.budget = budget
         self.spent = 0
         self.looks_at: Observe = observe
-        self._target = target
         self._first_number = first_number
         self._file = ObservationsFile(path, observations_head(target, observe), within=path.parent)
         self._kept = {trial.number: trial for trial in self._file.trials if is_whole(trial)}
@@ -61,21 +57,11 @@ class KeptTarget(ClosedOnExit):
             )
         self.spent += len(plans)
         numbered = [replace(plan, number=self._first_number + plan.number) for plan in plans]
-        missing = [k for k, plan in enumerate(numbered) if plan.number not in self._kept]
-        for k in set(range(len(plans))) - set(missing):  # before anything more is spent
-            self._checked(numbered[k], observe)
-
-        def keep(k: int, trial: ObservedTrial) -> None:
-            self._file.append(trial)
-            if is_whole(trial):
-                self._kept[trial.number] = trial
-                if tell is not None:
-                    tell(missing[k], trial)
-
-        if missing:
-            self._target.carry_out([numbered[k] for k in missing], observe, keep)
-        n_lost = sum(plan.number not in self._kept for plan in numbered)
-        refuse_lost(n_lost, self.name, f" The others are kept in {self._file.path}.")
+        for plan in numbered:
+            if plan.number in self._kept:  # before anything more is spent
+                self._checked(plan, observe)
+        keys = [plan.number for plan in numbered]
+        carry_out_missing(self.target, numbered, observe, self._kept, keys, file=self._file, tell=tell)
         return [self._checked(plan, observe) for plan in numbered]
 
     def _checked(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:

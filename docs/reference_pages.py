@@ -350,11 +350,16 @@ def command_page(name: str, command: Any) -> str:
     called = " ".join(["realitygap", name, *(each.metavar for each in arguments), "[OPTIONS]"])
     paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
-    rows = [(f"`{each.metavar}`", each.help) for each in arguments]
-    rows += [(option_text(each), each.help) for each in options]
-    parts.append(
-        "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])
-    )
+    groups = {"": [(f"`{each.metavar}`", each.help) for each in arguments]}
+    for each in options:
+        groups.setdefault(each.rich_help_panel or "", []).append((option_text(each), each.help))
+    for title, rows in groups.items():
+        parts += [f"{title}:"] if title else []
+        parts.append(
+            "\n".join(
+                ["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)]
+            )
+        )
     for head, kind, lines in (("Example:", "sh", examples), ("In Python:", "py", twins)):
         parts += [head, "\n".join([f"```{kind}", *lines, "```"])]
     return "\n\n".join(parts) + "\n"

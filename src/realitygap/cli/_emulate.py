@@ -20,39 +20,47 @@ if TYPE_CHECKING:
 
 
 def emulate(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="scribbler: a Parallax Scribbler.")],
-    model: Annotated[str, typer.Option(help="s1, or s2 for an S2 or S3.")] = "s2",
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Robot to emulate: scribbler, a Parallax Scribbler.")
+    ],
+    model: Annotated[str, typer.Option(help="Model: s1, or s2 for an S2 or S3.")] = "s2",
     fluke: Annotated[
-        str | None, typer.Option(help="none, 1 or 2: the board with the camera. [default: that of the model]")
+        str | None, typer.Option(help="Board with the camera: none, 1 or 2. [default: that of the model]")
     ] = None,
     arena: Annotated[
-        str, typer.Option(metavar="NAME", help="Where it stands: an arena by name, or a TOML or SVG file.")
+        str, typer.Option(metavar="NAME", help="Arena by name, or a TOML or SVG file.")
     ] = "paper",
     twin: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A twin to drive behind it, from `realitygap twin sample`."),
+        typer.Option(metavar="FILE", help="Twin that moves as the robot, from `realitygap twin sample`."),
     ] = None,
     link: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Also make a link to the pseudo-terminal here.")
+        Path | None, typer.Option(metavar="PATH", help="Symbolic link to make to the pseudo-terminal.")
     ] = None,
     tcp: Annotated[
         int | None,
-        typer.Option(metavar="PORT", min=0, max=65535, help="A TCP port of this machine instead; 0 for any."),
+        typer.Option(
+            metavar="PORT",
+            min=0,
+            max=65535,
+            help="TCP port of this machine, instead of a pseudo-terminal; 0 for any.",
+        ),
     ] = None,
     speed: Annotated[
         float,
         typer.Option(
             min=0,
             max=1000,
-            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass.",
+            help="Seconds of the robot per real second. 0: the witness sets the time, as fast as possible.",
         ),
     ] = 1.0,
     timing: Annotated[
-        str, typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time.")
+        str,
+        typer.Option(metavar="on|off", help="Time that bytes, tones and sensors take: on, or off for none."),
     ] = "on",
     faults: Annotated[
         str,
-        typer.Option(metavar="LIST", help="What goes wrong, as in drop=0.001,delay=0.05,hangup=60,sag=0.2."),
+        typer.Option(metavar="LIST", help="Faults, such as drop=0.001,delay=0.05,hangup=60,sag=0.2."),
     ] = "",
     witness: Annotated[
         int | None,
@@ -60,9 +68,9 @@ def emulate(
             metavar="PORT", min=0, max=65535, help="Serve pose, path and cells on this TCP port; 0 for any."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of sensor noise and faults.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and faults.")] = 0,
     state: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep name, password, data and settings in this file.")
+        Path | None, typer.Option(metavar="FILE", help="File that keeps name, password, data and settings.")
     ] = None,
     command: Annotated[
         str | None,
@@ -74,15 +82,14 @@ def emulate(
     ] = None,
     quiet: Annotated[
         bool,
-        typer.Option(
-            "--quiet", help="Print the port, the witness's address where there is one, and nothing else."
-        ),
+        typer.Option("--quiet", help="Print only the port, and the witness's address if there is one."),
     ] = False,
 ) -> None:
     """Emulate a Scribbler on a pseudo-terminal or TCP port.
 
-    The name of the port comes first: a pseudo-terminal for `--port` of other commands and for other programs, or a
-    TCP port. In a terminal a live view follows: arena, robot, path, lights and the last command.
+    The first line is the name of the port: a pseudo-terminal, for `--port` of other commands and for other programs, or
+    a TCP port. In a terminal, a live view follows. It shows the arena, the robot, its path and lights, and the last
+    command.
 
     Example: realitygap emulate scribbler --model s2 --fluke 2
 

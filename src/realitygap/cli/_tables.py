@@ -79,7 +79,7 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
 
 
 def calibration_table(calibration: Calibration) -> Table:
-    """What was fitted: one row a parameter, with its interval and whether it is identified."""
+    """Return a table of fitted parameters, one per row, with interval and whether it is identified."""
     table = Table(
         title=Text(
             f"Calibration of {calibration.kind}, {calibration.target} ({calibration.label}), {calibration.trials} "

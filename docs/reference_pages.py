@@ -86,6 +86,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
     pages["parts/distances.md"] = distances()
+    pages["parts/commands.md"] = commands_table()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
     pages |= description_parts() | task_parts()
@@ -337,6 +338,16 @@ def commands() -> dict[str, Any]:
 def command_pages() -> dict[str, str]:
     """A page for each command: what it does, how it is called, its options, and last its Python twin."""
     return {name: command_page(name, command) for name, command in commands().items()}
+
+
+def commands_table() -> str:
+    """A table of commands: a link to the page of each, its purpose, and its Python twin."""
+    lines = ["| command | purpose | in Python |", "|---|---|---|"]
+    for name, command in commands().items():
+        page = f"[`{name}`](../generated/commands/{name.replace(' ', '-')}.md)"
+        twin = re.search(r"In Python: (.*)", command.help)[1]
+        lines.append(f"| {page} | {escape(command.help.split(chr(10))[0])} | `{twin}` |")
+    return "\n".join(lines) + "\n"
 
 
 def command_page(name: str, command: Any) -> str:

@@ -86,6 +86,7 @@ def write_all(folder: Path, more: Mapping[str, str] | None = None) -> None:
     pages["parts/choices.md"] = choices()
     pages["parts/largest-choices.md"] = largest_choices()
     pages["parts/distances.md"] = distances()
+    pages["parts/commands.md"] = commands_table()
     pages["parts/myro.md"] = myro_functions()
     pages["parts/jyro-features.md"] = jyro_features()
     pages |= description_parts() | task_parts()
@@ -339,6 +340,16 @@ def command_pages() -> dict[str, str]:
     return {name: command_page(name, command) for name, command in commands().items()}
 
 
+def commands_table() -> str:
+    """A table of commands: a link to the page of each, its purpose, and its Python twin."""
+    lines = ["| command | purpose | in Python |", "|---|---|---|"]
+    for name, command in commands().items():
+        page = f"[`{name}`](../generated/commands/{name.replace(' ', '-')}.md)"
+        twin = re.search(r"In Python: (.*)", command.help)[1]
+        lines.append(f"| {page} | {escape(command.help.split(chr(10))[0])} | `{twin}` |")
+    return "\n".join(lines) + "\n"
+
+
 def command_page(name: str, command: Any) -> str:
     """One command's page."""
     said = [" ".join(each.split()) for each in (command.help or "").strip().split("\n\n")]
@@ -350,11 +361,16 @@ def command_page(name: str, command: Any) -> str:
     called = " ".join(["realitygap", name, *(each.metavar for each in arguments), "[OPTIONS]"])
     paragraphs = "\n\n".join(escape(each) for each in about)
     parts = [f"# `realitygap {name}`", paragraphs, f"```text\n{called}\n```"]
-    rows = [(f"`{each.metavar}`", each.help) for each in arguments]
-    rows += [(option_text(each), each.help) for each in options]
-    parts.append(
-        "\n".join(["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)])
-    )
+    groups = {"": [(f"`{each.metavar}`", each.help) for each in arguments]}
+    for each in options:
+        groups.setdefault(each.rich_help_panel or "", []).append((option_text(each), each.help))
+    for title, rows in groups.items():
+        parts += [f"{title}:"] if title else []
+        parts.append(
+            "\n".join(
+                ["| | |", "|---|---|", *(f"| {left} | {escape(right or '')} |" for left, right in rows)]
+            )
+        )
     for head, kind, lines in (("Example:", "sh", examples), ("In Python:", "py", twins)):
         parts += [head, "\n".join([f"```{kind}", *lines, "```"])]
     return "\n\n".join(parts) + "\n"

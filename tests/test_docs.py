@@ -112,6 +112,10 @@ def test_every_command_has_a_page_with_every_option_an_example_and_its_python_tw
     for group in app.registered_groups:
         names += [f"{group.name} {command.name}" for command in group.typer_instance.registered_commands]
     assert sorted(pages) == sorted(names)
+    table = reference_pages.commands_table()
+    assert [row.count(f"[`{name}`]") for name, row in zip(pages, table.splitlines()[2:], strict=True)] == [
+        1
+    ] * len(pages)
     for name, command in reference_pages.commands().items():
         page = pages[name]
         for parameter in command.params:

@@ -62,6 +62,27 @@ def test_list_of_commands_cuts_no_line_at_any_width():
             assert f"{command.name} {command.summary}" in words
 
 
+def test_help_of_every_command_is_whole_at_any_width():
+    members = [
+        ([name, *rest], command)
+        for name, group in APP.commands.items()
+        for rest, command in [
+            ([], group),
+            *(([key], member) for key, member in getattr(group, "commands", {}).items()),
+        ]
+    ]
+    for name, command in members:
+        for columns in (60, 80, 200):
+            done = CliRunner().invoke(app, [*name, "--help"], terminal_width=columns - 2)
+            words = "".join(done.stdout.split())
+            assert max(map(len, done.stdout.splitlines())) <= columns, (name, columns)
+            for text in (command.help, *(parameter.help for parameter in command.params)):
+                assert "".join((text or "").split()) in words, (name, columns, text)
+            for parameter in command.params:
+                title = getattr(parameter, "rich_help_panel", None)
+                assert title is None or f"\n{title}:\n" in done.stdout, (name, title)
+
+
 def test_root_prints_the_same_list_with_and_without_typer():
     done = started("--help", env={**os.environ, "COLUMNS": "80"})
     assert (done.returncode, done.stdout) == (0, _commands.root_help(80))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Make the application of all commands when somebody asks for it: this imports every one of them."""
+    """Make the application of all commands at the first access, which imports every command."""
     if name == "app":
         from ._app import make_app
 

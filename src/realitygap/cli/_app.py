@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from realitygap._version import __version__
 from realitygap.kernels.compile.progress import report_compiling
@@ -22,6 +22,23 @@ class _RootGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         formatter.write(root_help(formatter.width + 2))
+
+
+class _GroupedCommand(TyperCommand):
+    """A command whose help lists the options of each mode together: those with the same `rich_help_panel`."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        groups: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}
+        for parameter in self.get_params(ctx):
+            title = getattr(parameter, "rich_help_panel", None) or (
+                "Arguments" if parameter.param_type_name == "argument" else "Options"
+            )
+            if (record := parameter.get_help_record(ctx)) is not None:
+                groups.setdefault(title, []).append(record)
+        for title, records in groups.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
 
 
 def make_app(commands: Sequence[Command]) -> typer.Typer:
@@ -41,7 +58,7 @@ def make_app(commands: Sequence[Command]) -> typer.Typer:
         if isinstance(item, typer.Typer):
             app.add_typer(item, name=command.name)
         else:
-            app.command(command.name)(item)
+            app.command(command.name, cls=_GroupedCommand)(item)
     return app
 
 

@@ -17,19 +17,20 @@ MANY_RUNS = 1000
 
 def audit_results(
     table: Annotated[
-        Path, typer.Argument(metavar="FILE.csv", help="With the columns condition, run and value.")
+        Path, typer.Argument(metavar="FILE.csv", help="Table with the columns condition, run and value.")
     ],
     denominator: Annotated[
         int | None,
-        typer.Option(min=1, metavar="N", help="Values must be k/N: say which are not. The paper's: 72."),
+        typer.Option(min=1, metavar="N", help="Report the values that are not k/N. The paper has N = 72."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the audit as JSON.")] = False,
 ) -> None:
     """Report what a small table of results can show.
 
-    For each two conditions: how likely a run of one is above a run of the other (A12), the p of a permutation
-    test (exact up to ten runs against ten, drawn beyond), the smallest p that so many runs can give, and what
-    they would find. Runs are taken as independent. Tables of thousands of runs take minutes.
+    For each pair of conditions, the audit prints the probability that a run of one is above a run of the other (A12),
+    and the p of a permutation test. The test is exact up to ten runs against ten, and samples permutations for more
+    runs. The audit also prints the smallest p that this number of runs can give, and the differences that they would
+    detect. It assumes that runs are independent. Tables of thousands of runs take minutes.
 
     Example: realitygap audit-results examples/table-2.csv --denominator 72
 

@@ -19,31 +19,41 @@ WIDEST = 110
 def audit_distance(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="paper, ordered, jaccard, hamming, final, edit or alignment."),
+        typer.Argument(
+            metavar="NAME", help="Distance: paper, ordered, jaccard, hamming, final, edit or alignment."
+        ),
     ],
     folder: Annotated[
         Path | None,
-        typer.Argument(metavar="DIR", help="A folder of results, whose trials are compared as well."),
+        typer.Argument(metavar="DIR", help="Folder of results whose trials to compare as well."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Draw it: ends in .svg, .pdf or .png.")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Figure to write (.svg, .pdf or .png).")
     ] = None,
     sort: Annotated[
         Literal["x-then-y", "y-then-x"],
-        typer.Option(metavar="ORDER", help="How the paper's distance sorts cells: x-then-y or y-then-x."),
+        typer.Option(
+            metavar="ORDER", help="Order of the cells in the paper's distance: x-then-y or y-then-x."
+        ),
     ] = "x-then-y",
     straight: Annotated[
         float,
-        typer.Option(min=0.0, max=1.0, metavar="P", help="How often a random walk goes on as it went."),
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            metavar="P",
+            help="Probability that a step of a random walk keeps its direction.",
+        ),
     ] = 0.6,
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of random walks and pairs.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random walks and pairs.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
     """Report what a behavior distance weighs.
 
-    The weight of a cell is what adding it to a random walk, or removing it, does to the distance. The relation with
-    length is the rank correlation of the distance of two behaviors with the difference in visited cells: over random
-    walks and, with a folder, over trials of different runs of each condition.
+    The weight of a cell is the change in distance when the cell is added to a random walk, or removed from it. The
+    relation with length is a rank correlation: the distance of two behaviors against their difference in visited cells.
+    It is computed over random walks. If you name a folder, it is also computed over trials of different runs of each
+    condition.
 
     Example: realitygap audit-distance paper -o paper.svg
 

@@ -11,6 +11,7 @@ from realitygap._limits import parse_toml
 from realitygap.errors import StudyError, did_you_mean
 
 DEFAULT_SEEDS = 100
+_ONLY_TASKS = "Only with a task"
 _PEAK = "Peak of one core, measured: {:.0f} GFlop/s of multiply-adds in single precision"
 
 
@@ -19,48 +20,65 @@ def bench(
         str | None,
         typer.Argument(
             metavar="[TASK]",
-            help="xor, double-pole, double-pole-no-velocity, maze-medium or maze-hard; realism: speed of sim; "
-            "without it, speed.",
+            help="Task for NEAT: xor, double-pole, double-pole-no-velocity, maze-medium or maze-hard; or realism, the "
+            "speed of the platform sim. [default: the speed of the platform jyro]",
         ),
     ] = None,
     settings: Annotated[
-        str | None, typer.Option(help="With a task: a named set of NEAT's settings. [default: default]")
+        str | None,
+        typer.Option(help="Named set of NEAT's settings. [default: default]", rich_help_panel=_ONLY_TASKS),
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, help=f"With a task: how many runs. [default: {DEFAULT_SEEDS}; mazes 40]"),
+        typer.Option(
+            min=1,
+            help=f"Number of runs. [default: {DEFAULT_SEEDS}; mazes 40]",
+            rich_help_panel=_ONLY_TASKS,
+        ),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, max=2**63 - 1, help="With a task: of the random numbers. [default: 1]"),
+        typer.Option(
+            min=0,
+            max=2**63 - 1,
+            help="Seed of the random numbers. [default: 1]",
+            rich_help_panel=_ONLY_TASKS,
+        ),
     ] = None,
     change: Annotated[
         list[str] | None,
-        typer.Option(metavar="KEY=VALUE", help="With a task: a setting changed; may be given again."),
+        typer.Option(
+            metavar="KEY=VALUE", help="Change one setting of NEAT. Repeatable.", rich_help_panel=_ONLY_TASKS
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
     seconds: Annotated[
         float | None,
-        typer.Option(min=0.01, max=3600, help="Of speed: how long each figure is measured. [default: 2]"),
+        typer.Option(
+            min=0.01,
+            max=3600,
+            help="Duration of each measurement. [default: 2]",
+            rich_help_panel="Only for speed and realism",
+        ),
     ] = None,
 ) -> None:
     """Measure the speed of this machine.
 
     With a TASK, it counts how many evaluations NEAT needs for that task instead.
 
-    Speed: robot-steps and whole paper runs a second, on one core and on all. A robot-step holds its noise and
-    its line coverage; a paper run its NEAT; a recorded one the writing of its rows. Compilation is not counted. The
-    robot-steps per GFlop of the core's peak compare machines of different speed.
+    Speed: robot-steps and whole paper runs per second, on one core and on all cores. A robot-step includes its noise
+    and its line coverage. A paper run includes NEAT, and a recorded run also writes its rows. Compilation is not
+    counted. Robot-steps per GFlop of the core's peak compare machines of different speed.
 
-    Realism: robot-steps a second of one core on the platform sim with a real outline, sliding contact, infrared sensors
-    with their noise and a noisy drive, all numbers different in each trial.
+    Realism: robot-steps per second of one core on the platform sim. The robot has a real outline, sliding contact,
+    noisy infrared sensors, and a noisy drive. All its numbers differ from trial to trial.
 
-    A task: runs of NEAT from many seeds, beside the results of Stanley & Miikkulainen (2002). An evaluation is
-    one network tried once, counted up to and with the first that solves the task; figures are over the runs that
-    solved it.
+    A task: runs of NEAT from many seeds, next to the results of Stanley & Miikkulainen (2002). An evaluation is one
+    network tried once, counted up to and including the first one that solves the task. Figures are over the runs that
+    solved the task.
 
-    A maze: as many runs rewarded for novelty, and as many for nearness to the exit, beside the results of Lehman &
-    Stanley (2011). A run in which no network reaches the exit counts as its limit of evaluations.
+    A maze: the same number of runs with novelty and with nearness to the exit as the reward, next to the results of
+    Lehman & Stanley (2011). A run in which no network reaches the exit counts as its limit of evaluations.
 
     Example: realitygap bench --json
 

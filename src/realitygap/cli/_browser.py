@@ -1,4 +1,4 @@
-"""Showing a page to whoever sits at the machine."""
+"""Showing a page in the user's browser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 
 def show_page(path: Path) -> None:
-    """Open a page in the user's browser; where there is none, say on standard error where the page is."""
+    """Open a page in the user's browser; if there is no browser, print the page's address on standard error."""
     address = path.resolve().as_uri()
     try:
         opened = webbrowser.open(address)

@@ -23,60 +23,64 @@ _OBSERVE = ("cells", "encoders", "track")
 
 
 def calibrate(
-    what: Annotated[str, typer.Argument(metavar="WHAT", help="path, sensors, motion, contact or all.")],
+    what: Annotated[
+        str, typer.Argument(metavar="WHAT", help="Part of the robot: path, sensors, motion, contact or all.")
+    ],
     robot: Annotated[
         str | None,
         typer.Option(
             metavar="PLATFORM",
-            help="What is calibrated: scribbler:PORT, thymio:PORT, enki, twin:FILE, sim or sim:FILE.",
+            help="Robot to measure: scribbler:PORT, thymio:PORT, enki, twin:FILE, sim or sim:FILE.",
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help="The calibration to write (.toml).")
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="Calibration to write (.toml).")
     ] = None,
     observe: Annotated[
         str | None,
         typer.Option(
             metavar="HOW",
-            help="How much is seen of it: cells (and a ruler), encoders, or track (a camera). [default: cells]",
+            help="Data to record: cells (and a ruler), encoders, or track (a camera). [default: cells]",
         ),
     ] = None,
     budget: Annotated[
-        int | None, typer.Option(min=1, metavar="TRIALS", help="Trials in all. [default: what it takes]")
+        int | None,
+        typer.Option(min=1, metavar="TRIALS", help="Total number of trials. [default: depends on WHAT]"),
     ] = None,
     choose: Annotated[
         bool,
         typer.Option(
-            "--choose", help="Of all: choose the last trials after a first fit, as those that tell most."
+            "--choose",
+            help="Choose the last trials after a first fit, as the most informative ones. Only for all.",
         ),
     ] = False,
     data: Annotated[
         Path | None,
-        typer.Option(
-            "--from", metavar="DATA", help="Fit trials that were recorded before, and carry out none."
-        ),
+        typer.Option("--from", metavar="DATA", help="Fit recorded trials instead of driving new ones."),
     ] = None,
     base: Annotated[
         str | None,
         typer.Option(
             metavar="ROBOT",
-            help="On whose numbers the fit builds: a robot, its file, or an earlier calibration. "
+            help="Robot, robot file, or earlier calibration whose numbers the fit starts from. "
             "[default: that of the platform, such as scribbler-s2-fluke2 or thymio]",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of trials and draws.")] = 0,
-    arena: Annotated[str, typer.Option(metavar="ARENA", help="By name or file.")] = "paper",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the trials and samples.")] = 0,
+    arena: Annotated[str, typer.Option(metavar="ARENA", help="Arena by name or file.")] = "paper",
     witness: Annotated[
         str | None,
         typer.Option(
-            metavar="HOST:PORT", help="Of an emulator: it places its robot and sees where it drives."
+            metavar="HOST:PORT",
+            help="Witness of an emulator in another program. It places the robot and observes its path.",
         ),
     ] = None,
     camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     figure: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Of sensors: also draw the readings (.svg, .pdf, .png), as Figure 3."
+            metavar="FILE",
+            help="Draw the readings as the paper's Figure 3 (.svg, .pdf, .png). Only for sensors.",
         ),
     ] = None,
     allow_code: AllowPlatforms = False,
@@ -86,10 +90,12 @@ def calibrate(
 
     The file that it writes describes the robot as it was measured. Use it as platform `sim:FILE`.
 
-    path and sensors are the paper's calibrations: five full steps ahead and five turning, and fifty readings at each
-    distance from a wall, 3 in apart. motion fits motors and drift, contact what happens at walls, all everything at
-    once. A twin, an emulator and sim are measured unattended; with a robot you are led through at the terminal. Trials
-    are kept beside FILE as they end, and the same command goes on where it was stopped.
+    The paper's calibrations are path and sensors. For path, the robot drives five full steps ahead and five turning.
+    For sensors, it takes fifty readings at each distance from a wall, 3 in apart. The others are motion for motors and
+    drift, contact for the behavior at walls, and all for everything together.
+
+    Twins, emulators and sim need no operator. With a robot, the terminal leads you through the trials. Each trial is
+    saved next to FILE when it ends. Run the same command again to resume.
 
     Example: realitygap calibrate sensors --robot sim -o sensors.toml --figure sensors.svg
 
@@ -205,7 +211,7 @@ def _measured(
     choose: bool,
     quiet: bool,
 ) -> Calibration:
-    """Carry out the trials, and fit."""
+    """Drive the trials, and fit."""
     from realitygap.platforms import class_of
     from realitygap.study import StoppedByPerson, calibrate, open_target
     from realitygap.world import load_arena, load_robot

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from realitygap.world import Arena
 
 CAMERA_HELP = (
-    'Above the robot: its number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml".'
+    'Overhead camera by number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml".'
 )
 
 

@@ -1,4 +1,4 @@
-"""`realitygap closing-the-gap`: the study of many twins, in which the gap is measured and shrunk."""
+"""`realitygap closing-the-gap`: the study that measures and shrinks the gap to many robots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def closing(
         str,
         typer.Option(
             metavar="PLAN",
-            help="twins: MuJoCo twins of a Scribbler; thymio: a Thymio in Enki and in Aseba's playground.",
+            help="Plan of the study. twins: MuJoCo twins of a Scribbler. thymio: a Thymio in Enki and in Aseba's "
+            "playground.",
         ),
     ] = "twins",
     twins: Annotated[
@@ -31,19 +32,19 @@ def closing(
         typer.Option(
             min=1,
             max=900,
-            help="Number of twins of each family, or of sittings with each robot. [default: as the plan says]",
+            help="Number of twins per family, or of sittings per robot. [default: from the plan]",
         ),
     ] = None,
     families: Annotated[
         str | None,
-        typer.Option(metavar="LIST", help="Families of twins, or robots. [default: all of the plan]"),
+        typer.Option(metavar="LIST", help="Families of twins, or robots. [default: all in the plan]"),
     ] = None,
     budgets: Annotated[
         str | None,
-        typer.Option(metavar="LIST", help="Numbers of trials to calibrate by. [default: 0,10,20,40]"),
+        typer.Option(metavar="LIST", help="Calibration budgets, in trials. [default: 0,10,20,40]"),
     ] = None,
     observe: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Observation levels. [default: as the plan says]")
+        str | None, typer.Option(metavar="LIST", help="Observation levels. [default: from the plan]")
     ] = None,
     small: Annotated[
         bool, typer.Option("--small", help="Run a small version, which takes minutes and shows no result.")
@@ -67,8 +68,9 @@ def closing(
 ) -> None:
     """Measure and shrink the gap to many robots.
 
-    Twins of several families are each calibrated by a few trials and transferred to (extra twin). With --plan thymio,
-    the robot is a Thymio in simulators of other authors. Interrupt the command at any moment: the same command resumes.
+    The study calibrates to each twin of several families with a few trials, and transfers controllers to it. Twins need
+    the extra 'twin'. With --plan thymio, the robot is a Thymio in simulators of other authors. You can interrupt the
+    command at any time. Run the same command again to resume.
 
     Example: realitygap closing-the-gap --small
 

@@ -32,6 +32,7 @@ class Command:
 
 SECTIONS: dict[str, tuple[Command, ...]] = {
     "Run a study": (
+        Command("demo", "Take a two-minute tour with an emulated robot.", "_demo", "demo"),
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
         Command("drive", "Drive the conditions of a study that are on a robot.", "_drive", "drive"),
         Command(
@@ -101,5 +102,10 @@ def root_help(columns: int) -> str:
                 subsequent_indent=" " * len(start),
                 break_on_hyphens=False,
             )
-    lines += ["", "  Example: realitygap run paper", "", "  `realitygap COMMAND --help` describes a command."]
+    lines += [
+        "",
+        "  Start with: realitygap demo --open",
+        "",
+        "  `realitygap COMMAND --help` describes a command.",
+    ]
     return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""`realitygap drive`: the conditions of a study that are on a robot."""
+"""`realitygap drive`: drive the conditions of a study that are on a robot."""
 
 from __future__ import annotations
 
@@ -30,36 +30,40 @@ def drive(
             "in this program, emulator://s2?speed=off or thymio:emulator://playground?speed=8.",
         ),
     ],
-    replicates: Annotated[int | None, typer.Option(min=1, help="Number of runs of each condition.")] = None,
+    replicates: Annotated[
+        int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed that replaces the study's.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")
+    ] = None,
     randomize: Annotated[
-        str | None, typer.Option(metavar="HOW", help="Value that `realitygap run` was given, if any.")
+        str | None, typer.Option(metavar="HOW", help="Value of --randomize in `realitygap run`, if any.")
     ] = None,
     witness: Annotated[
         str | None,
         typer.Option(
             metavar="HOST:PORT",
-            help="Witness of an emulator in another program. It places the robot and sees what it drew.",
+            help="Witness of an emulator in another program. It places the robot and observes its line.",
         ),
     ] = None,
     camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
     in_flight: Annotated[
         str | None,
         typer.Option(
-            metavar="VERDICT", help="Verdict on a trial that was cut off: void or driven. [default: asks]"
+            metavar="VERDICT", help="Verdict on an interrupted trial: void or driven. [default: ask]"
         ),
     ] = None,
     score: Annotated[
-        str, typer.Option(metavar="WHEN", help="When to ask for cells: after each trial or sheet, or later.")
+        str, typer.Option(metavar="WHEN", help="When to ask for the cells: trial, sheet or later.")
     ] = "sheet",
     no_wait: Annotated[
         bool, typer.Option("--no-wait", help="Drive each trial without waiting for Enter.")
     ] = False,
     despite_preflight: Annotated[
-        bool, typer.Option("--despite-preflight", help="Drive whatever the pre-flight finds.")
+        bool, typer.Option("--despite-preflight", help="Drive even if the pre-flight check fails.")
     ] = False,
     who: Annotated[
         str | None,
@@ -73,8 +77,8 @@ def drive(
 ) -> None:
     """Drive the conditions of a study that are on a robot.
 
-    You are led through the trials. Each one is saved when it ends, so you can interrupt the command at any moment: the
-    same command resumes. `realitygap run` computes the other conditions of the study.
+    The command leads you through the trials. Each trial is saved when it ends, so you can interrupt the command at any
+    time. Run the same command again to resume. `realitygap run` computes the other conditions of the study.
 
     Example: realitygap drive paper-robot --port /dev/rfcomm0
 

@@ -20,43 +20,57 @@ if TYPE_CHECKING:
 
 
 def emulate(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="scribbler, or thymio: Aseba's playground.")],
+    robot: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT",
+            help="Robot to emulate: scribbler, a Parallax Scribbler; or thymio, a Thymio II in Aseba's playground.",
+        ),
+    ],
     model: Annotated[
-        str | None, typer.Option(help="s1, or s2 for an S2 or S3. [default: s2]", show_default=False)
+        str | None, typer.Option(help="Model: s1, or s2 for an S2 or S3. [default: s2]", show_default=False)
     ] = None,
     fluke: Annotated[
-        str | None, typer.Option(help="none, 1 or 2: the board with the camera. [default: that of the model]")
+        str | None, typer.Option(help="Board with the camera: none, 1 or 2. [default: that of the model]")
     ] = None,
     arena: Annotated[
-        str, typer.Option(metavar="NAME", help="Where it stands: an arena by name, or a TOML or SVG file.")
+        str, typer.Option(metavar="NAME", help="Arena by name, or a TOML or SVG file.")
     ] = "paper",
     twin: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A twin to drive behind it, from `realitygap twin sample`."),
+        typer.Option(metavar="FILE", help="Twin that moves as the robot, from `realitygap twin sample`."),
     ] = None,
     link: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Also make a link to the pseudo-terminal here.")
+        Path | None, typer.Option(metavar="PATH", help="Symbolic link to make to the pseudo-terminal.")
     ] = None,
     tcp: Annotated[
         int | None,
-        typer.Option(metavar="PORT", min=0, max=65535, help="A TCP port of this machine instead; 0 for any."),
+        typer.Option(
+            metavar="PORT",
+            min=0,
+            max=65535,
+            help="TCP port of this machine, instead of a pseudo-terminal; 0 for any.",
+        ),
     ] = None,
     speed: Annotated[
         float,
         typer.Option(
             min=0,
             max=1000,
-            help="Its seconds in one of real time; 0: as fast as it goes, where its witness lets time pass. "
-            "A playground: 0.1 to 8.",
+            help="Seconds of the robot per real second. 0: the witness sets the time, as fast as possible. "
+            "A playground takes 0.1 to 8.",
         ),
     ] = 1.0,
     timing: Annotated[
         str | None,
-        typer.Option(metavar="on|off", help="off: bytes, tones and sensors take no time. [default: on]"),
+        typer.Option(
+            metavar="on|off",
+            help="Time that bytes, tones and sensors take: on, or off for none. [default: on]",
+        ),
     ] = None,
     faults: Annotated[
         str,
-        typer.Option(metavar="LIST", help="What goes wrong, as in drop=0.001,delay=0.05,hangup=60,sag=0.2."),
+        typer.Option(metavar="LIST", help="Faults, such as drop=0.001,delay=0.05,hangup=60,sag=0.2."),
     ] = "",
     witness: Annotated[
         int | None,
@@ -66,11 +80,11 @@ def emulate(
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(min=0, help="Of sensor noise and faults. A playground has none. [default: 0]"),
+        typer.Option(min=0, help="Seed of sensor noise and faults. A playground has none. [default: 0]"),
     ] = None,
     window: Annotated[bool, typer.Option("--window", help="Show the playground in its window.")] = False,
     state: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep name, password, data and settings in this file.")
+        Path | None, typer.Option(metavar="FILE", help="File that keeps name, password, data and settings.")
     ] = None,
     command: Annotated[
         str | None,
@@ -82,17 +96,16 @@ def emulate(
     ] = None,
     quiet: Annotated[
         bool,
-        typer.Option(
-            "--quiet", help="Print the port, the witness's address where there is one, and nothing else."
-        ),
+        typer.Option("--quiet", help="Print only the port, and the witness's address if there is one."),
     ] = False,
 ) -> None:
     """Emulate a robot on a pseudo-terminal or TCP port.
 
-    The name of the port comes first: a pseudo-terminal for `--port` of other commands and for other programs, or a
-    TCP port. In a terminal a live view of a Scribbler follows: arena, robot, path, lights and the last command.
+    The first line is the name of the port: a pseudo-terminal, for `--port` of other commands and for other programs, or
+    a TCP port. In a terminal, a live view of a Scribbler follows. It shows the arena, the robot, its path and lights,
+    and the last command.
 
-    A Thymio is the one of Aseba's playground, if it is installed (Debian: aseba dbus iproute2 faketime). It takes
+    A Thymio is the one of Aseba's playground, if that is installed (Debian: aseba dbus iproute2 faketime). It takes
     --arena, --speed, --tcp, --witness and --window.
 
     Example: realitygap emulate scribbler --model s2 --fluke 2

@@ -19,41 +19,47 @@ _FRAMES = ("species", "innovations", "lineage")
 def export(
     what: Annotated[
         str,
-        typer.Argument(metavar="WHAT", help="A folder of results; or species, innovations or lineage."),
+        typer.Argument(metavar="WHAT", help="Folder of results; or species, innovations or lineage."),
     ],
     name: Annotated[
         str | None,
-        typer.Argument(metavar="NAME", help="After species, innovations and lineage, the folder."),
+        typer.Argument(metavar="NAME", help="Folder of results, after species, innovations or lineage."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Not one of a study's own files.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="FILE", help="File to write, except a study's own files."),
     ] = None,
     format: Annotated[
         str | None,
         typer.Option(
             metavar="FORMAT",
-            help="Of an individual: json, onnx, graphml, c or aseba. [default: by FILE's ending]",
+            help="json, onnx, graphml, c or aseba. Only for an individual. [default: by FILE's ending]",
         ),
     ] = None,
     condition: Annotated[
-        str | None, typer.Option(help="Of which. [default: the first; of species and so on, all]")
+        str | None, typer.Option(help="Name of the condition. [default: the first; for tables, all]")
     ] = None,
     replicate: Annotated[
-        int | None, typer.Option(help="Which run. [default: the typical one; of species and so on, all]")
+        int | None, typer.Option(help="Number of the run. [default: the typical one; for tables, all]")
     ] = None,
-    generation: Annotated[int | None, typer.Option(help="Of an individual. [default: the last]")] = None,
-    individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
+    generation: Annotated[
+        int | None, typer.Option(help="Generation of the individual. [default: the last]")
+    ] = None,
+    individual: Annotated[
+        int | None, typer.Option(help="Individual of the generation. [default: the best]")
+    ] = None,
 ) -> None:
     """Export a network as JSON, ONNX, C, Aseba, or a graph.
 
     It also exports the species, the innovations, or the lineage of a run.
 
-    A folder alone gives one individual, which realitygap show network draws with the same options. json is the genome,
-    which realitygap.Genome.load reads. c is the network as a header of C99, for robots that carry it. aseba is the
-    network as a program for a Thymio II, which Aseba Studio opens. onnx is the network for any ONNX runtime, and
-    graphml is the genome as a graph: both need the extra, pip install 'realitygap[export]'. Species, innovations and
-    lineage are tables in Parquet: each species of each generation, when each innovation arose, and each individual with
-    its parents. A file that is there gives way once the new one is complete.
+    A folder alone gives one individual, the one that `realitygap show network` draws with the same options. The format
+    json is the genome, which realitygap.Genome.load reads. The format c is the network as a header of C99, for robots
+    that carry it. The format aseba is the network as a program for a Thymio II, which Aseba Studio opens. The formats
+    onnx, for any ONNX runtime, and graphml, a graph, need an extra: pip install 'realitygap[export]'.
+
+    Species, innovations and lineage are tables in Parquet. They list each species of each generation, the origin of
+    each innovation, and the parents of each individual. An existing FILE is replaced when the new one is complete.
 
     Example: realitygap export results/paper --condition novelty-50 --replicate 3 -o champion.json
 

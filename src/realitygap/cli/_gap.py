@@ -1,4 +1,4 @@
-"""`realitygap gap` and `realitygap plan`: how far two platforms are apart, and how many trials it takes to tell."""
+"""`realitygap gap` and `realitygap plan`: measure a gap, and plan the trials for it."""
 
 from __future__ import annotations
 
@@ -21,21 +21,23 @@ if TYPE_CHECKING:
     from realitygap.trials import PortObserver
 
 
+_ONLY_TWINS = "Only for twins"
+_ONLY_ROBOTS = "Only for robots"
 TASK_HELP = (
-    "What scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function. [default: the task of the "
+    "Task that scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function. [default: the task of the "
     "controllers; coverage for random ones]"
 )
 
 
 class Randomize(StrEnum):
-    """Whether robots are drawn from a calibration."""
+    """Source of the robots of trials: no sampling, or samples of a calibration."""
 
     no = "no"
     posterior = "posterior"
 
 
 class Seen(StrEnum):
-    """How much is seen of the target."""
+    """Observation level of the target."""
 
     readings = "readings"
     cells = "cells"
@@ -44,81 +46,108 @@ class Seen(StrEnum):
 
 
 def gap(
-    sim: Annotated[str, typer.Argument(metavar="SIM", help="The simulator: sim, sim:FILE or jyro.")],
+    sim: Annotated[str, typer.Argument(metavar="SIM", help="Simulator: sim, sim:FILE or jyro.")],
     target: Annotated[
         str,
         typer.Argument(
             metavar="TARGET",
-            help="twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
+            help="Target: twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
         ),
     ],
     controllers: Annotated[
         str,
         typer.Option(
             metavar="WHICH",
-            help="random: unrelated networks; a study by name or file, or a folder of results: its champions.",
+            help="random for unrelated networks; or a study or a folder of results, for its champions.",
         ),
     ] = "random",
-    n_controllers: Annotated[int, typer.Option(min=2, max=1024, help="How many.")] = 30,
+    n_controllers: Annotated[int, typer.Option(min=2, max=1024, help="Number of controllers.")] = 30,
     task: Annotated[str | None, typer.Option(metavar="KIND", help=TASK_HELP)] = None,
-    trials: Annotated[int, typer.Option(min=1, max=4096, help="Of each controller on each platform.")] = 10,
+    trials: Annotated[int, typer.Option(min=1, max=4096, help="Trials per controller and platform.")] = 10,
     margin: Annotated[
         float | None,
         typer.Option(
-            metavar="M", help="Test equivalence in level at this margin, in units of the score, such as 0.05."
+            metavar="M", help="Largest difference in score that counts as equivalent, such as 0.05."
         ),
     ] = None,
     observe: Annotated[
         Seen | None,
-        typer.Option(help="What is seen of the target; track: replays, too. [default: what the task needs]"),
+        typer.Option(
+            help="Data recorded on the target. track also measures replays. [default: what the task needs]"
+        ),
     ] = None,
     arena: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="An arena by name, or a file. [default: the controllers' own]"),
+        typer.Option(metavar="NAME", help="Arena by name or file. [default: that of the controllers]"),
     ] = None,
     noise: Annotated[
         float | None,
-        typer.Option(min=0, max=10, help="The paper's a on simulators. [default: 0.1 on jyro, else none]"),
+        typer.Option(
+            min=0,
+            max=10,
+            help="Noise level a of the paper, on simulators. [default: 0.1 on jyro, 0 on others]",
+        ),
     ] = None,
     randomize: Annotated[
         Randomize,
-        typer.Option(help="posterior draws the robot of each trial from the calibration that SIM is."),
+        typer.Option(
+            help="posterior: sample the robot of each trial from the calibration SIM. no: use its estimate."
+        ),
     ] = Randomize.no,
     reevolved: Annotated[
         str | None,
         typer.Option(
             metavar="WHICH",
-            help="Champions evolved on the target: adds the re-evolved gap (apart, the paper's).",
+            help="Study or folder of champions evolved on the target. Adds the re-evolved gap, which is the paper's.",
         ),
     ] = None,
     why: Annotated[
         bool,
-        typer.Option("--why", help="What each part of the model carries; SIM is a calibration sim:FILE."),
+        typer.Option(
+            "--why",
+            help="Report how much of the gap each part of the model explains. SIM must be a calibration.",
+        ),
     ] = False,
     report: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write figures and tables as one page (.html).")
+        Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
     ] = None,
     allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", metavar="FILE", help="Keep the target's trials here (.jsonl), and go on with them."
+            "-o",
+            "--out",
+            metavar="FILE",
+            help="File to save the target's trials in (.jsonl). Run the command again to resume.",
         ),
     ] = None,
     processes: Annotated[
-        int | None, typer.Option(min=1, help="Of a twin: trials at once. [default: all processors]")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Number of twin trials to run in parallel. [default: all processors]",
+            rich_help_panel=_ONLY_TWINS,
+        ),
     ] = None,
     witness: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulated robot in another program.")
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Witness of an emulated robot in another program.",
+            rich_help_panel=_ONLY_ROBOTS,
+        ),
     ] = None,
-    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of all random numbers.")] = 1,
+    camera: Annotated[
+        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=_ONLY_ROBOTS)
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of all random numbers.")] = 1,
 ) -> None:
     """Measure the gap between a simulator and a target.
 
-    Printed with intervals of 95 %: level, root mean square over controllers without the noise of trials, order,
-    behavior, and equivalence at a margin. What so few trials cannot carry is refused, with how many would do.
+    Runs the same controllers on both platforms. Reports level, RMS gap without the noise of trials, ranking, behavior,
+    and equivalence at a margin, with 95 % intervals. If there are too few trials for a measure, the report says how
+    many you need.
 
     Example: realitygap gap sim jyro --n-controllers 10 --trials 5
 
@@ -274,7 +303,7 @@ class _TrialsBar:
             self._progress.stop()
 
     def show(self, name: str, done: int, total: int) -> None:
-        """So many trials are done."""
+        """Show the number of finished trials."""
         if not self._console.is_terminal:
             return
         if not self._progress.live.is_started:
@@ -285,39 +314,48 @@ class _TrialsBar:
         self._progress.update(self._tasks[key], completed=done)
 
     def say(self, text: str) -> None:
-        """What is done otherwise, on a terminal."""
+        """Print other progress, on a terminal."""
         if self._console.is_terminal:
             self._console.print(text, highlight=False, markup=False)
 
 
 def plan(
     effect: Annotated[
-        float | None, typer.Option(metavar="D", help="Find a mean difference in score of so much.")
+        float | None, typer.Option(metavar="D", help="Detect a mean difference D in score.")
     ] = None,
     margin: Annotated[
-        float | None, typer.Option(metavar="M", help="Show equivalence within a margin of scores.")
+        float | None, typer.Option(metavar="M", help="Show equivalence within a margin M of scores.")
     ] = None,
     correlation: Annotated[
-        float | None, typer.Option(metavar="R", help="Show that a correlation of so much is above --least.")
+        float | None, typer.Option(metavar="R", help="Show that a correlation R is above --least.")
     ] = None,
-    least: Annotated[float, typer.Option(help="Of --correlation.")] = 0.5,
+    least: Annotated[float, typer.Option(help="Lower bound for --correlation.")] = 0.5,
     spread: Annotated[
         float | None,
         typer.Option(
-            min=0, help="Standard deviation of true differences over controllers. [default: half of theirs]"
+            min=0,
+            help="Standard deviation of true differences between platforms over controllers. [default: half of the "
+            "standard deviation of the controllers]",
         ),
     ] = None,
-    power: Annotated[float, typer.Option(min=0.05, max=0.999, help="How often it shall be found.")] = 0.8,
+    power: Annotated[
+        float,
+        typer.Option(min=0.05, max=0.999, help="Statistical power: the probability of detecting the effect."),
+    ] = 0.8,
     data: Annotated[
         Path | None,
         typer.Option(
-            "--from", metavar="FILE", help="Trials that were observed (.jsonl). [default: a pilot on sim]"
+            "--from",
+            metavar="FILE",
+            help="Recorded trials to estimate the noise from (.jsonl). [default: a pilot on sim]",
         ),
     ] = None,
-    task: Annotated[str, typer.Option(metavar="KIND", help="The task that scores trials.")] = "coverage",
-    arena: Annotated[str, typer.Option(metavar="NAME", help="The arena of the pilot.")] = "paper",
+    task: Annotated[str, typer.Option(metavar="KIND", help="Task that scores trials.")] = "coverage",
+    arena: Annotated[str, typer.Option(metavar="NAME", help="Arena of the pilot.")] = "paper",
     allow_code: AllowPlatforms = False,
-    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Of pilot and simulated studies.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=2**31, help="Seed of the pilot and the simulated studies.")
+    ] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
 ) -> None:
     """Estimate how many controllers and trials you need.

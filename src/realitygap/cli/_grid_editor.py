@@ -86,7 +86,7 @@ class GridEdit:
         self.cells = cells
 
     def lines(self) -> list[str]:
-        """The grid as text, the highest row first; the cursor stands in brackets."""
+        """Return the grid as text, the highest row first, with the cursor in brackets."""
         shown = []
         for row in reversed(range(self.rows)):
             cells = "".join(self._shown(column, row) for column in range(self.columns))
@@ -108,7 +108,7 @@ def edit_cells(
     write: Callable[[str], None],
     cells: Iterable[int] = (),
 ) -> list[int] | None:
-    """Let somebody pick cells, from the one that trials start in.
+    """Let the operator pick cells, beginning at the start cell of trials.
 
     Args:
         grid: Of reachable cells.

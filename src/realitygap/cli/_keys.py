@@ -20,7 +20,7 @@ _REST_S = 0.05
 
 
 def read_line() -> str:
-    """A line that somebody types, without blanks around it.
+    """Return a typed line, without blanks around it.
 
     Ctrl-C ends it at once: a plain `input` goes on reading, because polars has signals restart what they interrupt,
     while `select` is never restarted.
@@ -37,7 +37,7 @@ def read_line() -> str:
 
 
 class NoKeys:
-    """Where no terminal is: no key is ever pressed."""
+    """Keys without a terminal: no key is ever pressed."""
 
     def read(self, timeout_s: float | None = None) -> str | None:
         """Nothing."""

@@ -9,18 +9,15 @@ import typer
 
 
 def lab(
-    folder: Annotated[
-        Path, typer.Argument(metavar="[DIR]", help="The folder that the studies are in, or will be.")
-    ] = Path("results"),
+    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Folder of the studies.")] = Path("results"),
     port: Annotated[
-        int, typer.Option(min=0, max=65535, metavar="N", help="To answer at; 0 takes one that is free.")
+        int, typer.Option(min=0, max=65535, metavar="N", help="Port to answer at; 0 takes a free port.")
     ] = 8321,
     host: Annotated[
         str,
         typer.Option(
             metavar="H",
-            help="Address to answer at; 0.0.0.0 is for phones in the same network, for which the address is also "
-            "printed as a QR code.",
+            help="Address to answer at. 0.0.0.0 also answers phones in the same network and prints a QR code.",
         ),
     ] = "127.0.0.1",
     allow_code: Annotated[
@@ -29,15 +26,15 @@ def lab(
             "--allow-code", help="Let every visitor start studies that run Python files in DIR as tasks."
         ),
     ] = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="Do not open the page in the browser.")] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="Don't open the page in the browser.")] = False,
 ) -> None:
     """Serve the web interface for studies, robots, and trials.
 
     Every browser needs the token in the address that is printed. Each start makes a new one.
 
-    It needs the extra 'lab', and no network beyond this machine. What is entered is in the study's folder and its
-    ledger at once: a page that is loaded anew, or a lab that is started anew, goes on where it was. Ctrl-C ends the
-    lab, and stops its robot first.
+    The lab needs the extra 'lab', and no network beyond this machine. Each entry is saved immediately, in the study's
+    folder and its ledger. You can reload the page or restart the lab without losing an entry. Ctrl-C stops the robot,
+    then ends the lab.
 
     Example: realitygap lab
 

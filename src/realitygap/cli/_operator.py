@@ -31,7 +31,7 @@ _ARROWS = ">/^\\</v\\"
 
 @dataclass(frozen=True)
 class Answers:
-    """What was answered in advance.
+    """Answers that options give in advance.
 
     Attributes:
         who: Enters the scores; the account's name when None.
@@ -58,12 +58,12 @@ class Answers:
 
     @property
     def name(self) -> str:
-        """Of who enters the scores."""
+        """Return the name of the operator who enters the scores."""
         return self.who or getpass.getuser()
 
     @property
     def verdict(self) -> Verdict | None:
-        """What becomes of a trial that was cut off."""
+        """Return the verdict on a trial that was cut off."""
         return "void" if self.in_flight == "void" else "driven" if self.in_flight == "driven" else None
 
 

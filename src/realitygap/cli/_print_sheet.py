@@ -15,27 +15,32 @@ if TYPE_CHECKING:
 
 
 def print_sheet(
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.pdf", help="Where it is written.")],
-    arena: Annotated[str, typer.Option(metavar="NAME", help="An arena by name, or its file.")] = "paper",
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.pdf", help="PDF to write.")],
+    arena: Annotated[str, typer.Option(metavar="NAME", help="Arena by name or file.")] = "paper",
     pens: Annotated[
         str | None,
         typer.Option(
-            metavar="LIST", help="Names beside the boxes, such as black,red. [default: a study's eight]"
+            metavar="LIST", help="Names next to the boxes, such as black,red. [default: the eight of a study]"
         ),
     ] = None,
     study: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Take arena and pens from a folder of results.")
+        Path | None, typer.Option(metavar="DIR", help="Folder of results to take arena and pens from.")
     ] = None,
     paper: Annotated[
-        str, typer.Option(metavar="a4|letter|a3|arena", help="Pages to join, or one as large as the sheet.")
+        str,
+        typer.Option(
+            metavar="a4|letter|a3|arena",
+            help="Size of the pages to join, or arena for one page as large as the sheet.",
+        ),
     ] = "a4",
 ) -> None:
     """Write the paper sheet of an arena (PDF, true scale).
 
-    It shows the grid, the start, four tags, and a box in which you try each pen.
+    The sheet shows the grid, the start, four tags, and a box in which you try each pen.
 
-    Print it at 100 %, cut the pages at their marks and join them edge to edge; lay tracing paper over it, or draw on it
-    at once. Before a photo is taken draw a line with each pen in its box: so its color is known in that light.
+    Print it at 100 %, cut the pages at their marks, and join them edge to edge. Lay tracing paper over the sheet, or
+    draw directly on it. Before you take a photo, draw a line with each pen in its box. This shows its color in the
+    light of the photo.
 
     Example: realitygap print-sheet --paper a3 -o sheet.pdf
 

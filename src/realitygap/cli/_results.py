@@ -1,4 +1,4 @@
-"""`realitygap report` and `realitygap digest`: what looks at results."""
+"""`realitygap report` and `realitygap digest`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ import typer
 
 from ._browser import show_page
 
-Folder = Annotated[Path, typer.Argument(metavar="DIR", help="A folder of results, such as results/paper.")]
+Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results, such as results/paper.")]
 
 
 def report(
     folder: Folder,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The page. [default: DIR/report.html]")
+        Path | None, typer.Option(metavar="FILE", help="Page to write. [default: DIR/report.html]")
     ] = None,
     figures: Annotated[
         Path | None,
-        typer.Option(metavar="DIR2", help="A folder for every figure as SVG and PDF and every table as CSV."),
+        typer.Option(metavar="DIR2", help="Folder for every figure as SVG and PDF, and every table as CSV."),
     ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser.")] = False,
 ) -> None:
@@ -44,7 +44,7 @@ def report(
 def written_report(
     folder: Path, out: Path | None = None, *, figures: Path | None = None, to_stderr: bool = False
 ) -> Path:
-    """Write a report, and say where it is and what it took."""
+    """Write a report; print its path and the seconds that it took."""
     started = time.perf_counter()
     from realitygap.report import write_report
 
@@ -56,8 +56,8 @@ def written_report(
 def digest(folder: Folder) -> None:
     """Print the hash of a study's results.
 
-    It is equal for any number of threads, any chunks and any interruption; another digest means other
-    results. That runs are missing is said on standard error.
+    The digest does not depend on threads, chunks or interruptions. A different digest means different results. If runs
+    are missing, a note on standard error says so.
 
     Example: realitygap digest results/paper
 

@@ -24,13 +24,13 @@ Port = Annotated[
     str,
     typer.Argument(
         metavar="PORT",
-        help="Port of a Scribbler: /dev/rfcomm0, COM3, socket://HOST:PORT, emulator://s2?fluke=2. Port of a Thymio: "
-        "thymio:/dev/ttyACM0, thymio:socket://HOST:PORT, thymio:emulator://playground. "
-        "`realitygap robot list` names those that are there.",
+        help="Port of a Scribbler: /dev/rfcomm0, COM3, socket://HOST:PORT or emulator://s2?fluke=2. Port of a Thymio: "
+        "thymio:/dev/ttyACM0, thymio:socket://HOST:PORT or thymio:emulator://playground. "
+        "`realitygap robot list` lists the ports of this machine.",
     ),
 ]
 Record = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Keep all that is said in a new file, to be shown later.")
+    Path | None, typer.Option(metavar="FILE", help="New file to record the session in, for show-recording.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
 
@@ -67,7 +67,7 @@ def _opened_with(part: str, port: str, record: Path | None) -> Iterator[Any]:
 
 @robot.command("list")
 def list_ports(as_json: Json = False) -> None:
-    """Name the serial ports of this machine, and what they seem to be.
+    """List the serial ports and their probable devices.
 
     Example: realitygap robot list
 
@@ -86,7 +86,9 @@ def list_ports(as_json: Json = False) -> None:
 
 @robot.command("info")
 def info(port: Port, as_json: Json = False, record: Record = None) -> None:
-    """Say who answers on a port: robot, Fluke, their firmware, and whether it is real or emulated.
+    """Identify the robot on a port.
+
+    Prints the robot, its Fluke, their firmware, and whether the robot is real or emulated.
 
     Example: realitygap robot info /dev/rfcomm0
 
@@ -99,7 +101,7 @@ def info(port: Port, as_json: Json = False, record: Record = None) -> None:
 
 @robot.command("sense")
 def sense(port: Port, as_json: Json = False, record: Record = None) -> None:
-    """Read every sensor of the robot and its Fluke once, camera apart.
+    """Read every sensor except the camera once.
 
     Example: realitygap robot sense /dev/rfcomm0
 
@@ -113,12 +115,18 @@ def sense(port: Port, as_json: Json = False, record: Record = None) -> None:
 @robot.command("drive")
 def drive(
     port: Port,
-    move: Annotated[float, typer.Argument(metavar="MOVE", help="-1 (back) to 1 (ahead), of full speed.")],
-    turn: Annotated[float, typer.Argument(metavar="TURN", help="-1 (right) to 1 (left).")] = 0.0,
-    seconds: Annotated[float, typer.Option(metavar="S", help="How long, at most 3600.")] = 0.5,
+    move: Annotated[
+        float, typer.Argument(metavar="MOVE", help="Share of full speed, -1 (back) to 1 (ahead).")
+    ],
+    turn: Annotated[
+        float, typer.Argument(metavar="TURN", help="Share of full turn, -1 (right) to 1 (left).")
+    ] = 0.0,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Duration [s], at most 3600.")] = 0.5,
     record: Record = None,
 ) -> None:
-    """Drive for a while, then stop. Ctrl-C stops at once.
+    """Drive for a while, then stop.
+
+    Ctrl-C stops the robot immediately.
 
     Example: realitygap robot drive /dev/rfcomm0 0.5 0.2 --seconds 2
 
@@ -141,7 +149,7 @@ def drive(
 
 @robot.command("stop")
 def stop(port: Port) -> None:
-    """Stop the motors, whatever the robot is doing.
+    """Stop the motors.
 
     Example: realitygap robot stop /dev/rfcomm0
 
@@ -154,7 +162,9 @@ def stop(port: Port) -> None:
 
 @robot.command("battery")
 def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
-    """Read the battery. A Scribbler has about 9 V when full, and is low below 6.15 V.
+    """Read the battery.
+
+    A Scribbler has about 9 V when full. Below 6.15 V it is low.
 
     Example: realitygap robot battery /dev/rfcomm0
 
@@ -169,18 +179,18 @@ def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
 @robot.command("picture")
 def picture(
     port: Port,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.png", help="Where to.")] = Path(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.png", help="Picture to write.")] = Path(
         "picture.png"
     ),
     kind: Annotated[
         str,
         typer.Option(
-            metavar="KIND", help="jpeg, jpeg-fast, gray, grayjpeg-fast, grayraw, color (raw) or blob."
+            metavar="KIND", help="Kind: jpeg, jpeg-fast, gray, grayjpeg-fast, grayraw, color (raw) or blob."
         ),
     ] = "jpeg",
     record: Record = None,
 ) -> None:
-    """Take a picture with the Fluke's camera and write it as PNG.
+    """Take a picture with the Fluke's camera (PNG).
 
     Example: realitygap robot picture /dev/rfcomm0 -o picture.png
 
@@ -199,9 +209,9 @@ def picture(
 @robot.command("beep")
 def beep(
     port: Port,
-    seconds: Annotated[float, typer.Option(metavar="S", help="How long, at most 8.191.")] = 0.5,
-    hz: Annotated[float, typer.Option(metavar="HZ", help="How high, at most 10000.")] = 880.0,
-    hz2: Annotated[float | None, typer.Option(metavar="HZ", help="A second tone with it.")] = None,
+    seconds: Annotated[float, typer.Option(metavar="S", help="Duration [s], at most 8.191.")] = 0.5,
+    hz: Annotated[float, typer.Option(metavar="HZ", help="Frequency [Hz], at most 10000.")] = 880.0,
+    hz2: Annotated[float | None, typer.Option(metavar="HZ", help="Frequency of a second tone [Hz].")] = None,
     record: Record = None,
 ) -> None:
     """Play a tone.
@@ -216,13 +226,13 @@ def beep(
 
 @robot.command("show-recording")
 def show_recording(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What --record kept.")],
-    wire: Annotated[
-        bool, typer.Option("--wire", help="Every command with its bytes, not only the calls.")
-    ] = False,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that --record wrote.")],
+    wire: Annotated[bool, typer.Option("--wire", help="Show every command with its bytes.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Show what was recorded with a robot: a row for each call, or for each command with --wire.
+    """Show a recorded session with a robot.
+
+    Each call has a row. With --wire, each command has one.
 
     Example: realitygap robot show-recording session.jsonl --wire
 
@@ -248,10 +258,12 @@ def show_recording(
 
 @robot.command("export-recording")
 def export_recording(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What --record kept.")],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.mcap", help="Where to.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that --record wrote.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE.mcap", help="MCAP file to write.")],
 ) -> None:
-    """Write a recording as MCAP, for viewers of robotics data. Needs the extra: pip install 'realitygap[export]'.
+    """Write a recording as MCAP.
+
+    Viewers of robotics data read MCAP. The command needs an extra: pip install 'realitygap[export]'.
 
     Example: realitygap robot export-recording session.jsonl -o session.mcap
 

@@ -1,4 +1,4 @@
-"""`realitygap score`: what a photo of a sheet says of the trials that drew on it."""
+"""`realitygap score`: the cells of trials, from a photo of their sheet."""
 
 from __future__ import annotations
 
@@ -18,58 +18,102 @@ if TYPE_CHECKING:
     from realitygap.vision import SheetScore, SheetTrials, TraceScore
 
 
+_WITH_STUDY = "Only with --study"
+_WITHOUT_STUDY = "Only without --study"
+
+
 def score(
     photo: Annotated[
-        Path, typer.Argument(metavar="PHOTO", help="JPEG, PNG, TIFF or WebP, of the whole sheet.")
+        Path, typer.Argument(metavar="PHOTO", help="Photo of the whole sheet (JPEG, PNG, TIFF or WebP).")
     ],
     study: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Enter what is confirmed into this folder's ledger.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of results whose ledger gets the confirmed cells."),
     ] = None,
     generation: Annotated[
-        int | None, typer.Option(min=0, metavar="G", help="Of the trials on the sheet.")
+        int | None,
+        typer.Option(
+            min=0, metavar="G", help="Generation of the trials on the sheet.", rich_help_panel=_WITH_STUDY
+        ),
     ] = None,
-    condition: Annotated[str | None, typer.Option(metavar="NAME", help="Of the trials on the sheet.")] = None,
-    run: Annotated[int | None, typer.Option(min=0, help="Of the trials on the sheet.")] = None,
+    condition: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Condition of the trials on the sheet.", rich_help_panel=_WITH_STUDY
+        ),
+    ] = None,
+    run: Annotated[
+        int | None,
+        typer.Option(min=0, help="Run of the trials on the sheet.", rich_help_panel=_WITH_STUDY),
+    ] = None,
     sheet: Annotated[
-        int | None, typer.Option(min=1, help="Its number, as `realitygap trials list` has it.")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Number of the sheet, from `realitygap trials list`.",
+            rich_help_panel=_WITH_STUDY,
+        ),
     ] = None,
     arena: Annotated[
-        str, typer.Option(metavar="NAME", help="Without a study: an arena by name, or its file.")
+        str, typer.Option(metavar="NAME", help="Arena by name or file.", rich_help_panel=_WITHOUT_STUDY)
     ] = "paper",
     pens: Annotated[
         str | None,
         typer.Option(
-            metavar="LIST", help="Without a study: pens as printed on the sheet. [default: a study's eight]"
+            metavar="LIST",
+            help="Pens as printed on the sheet. [default: the eight of a study]",
+            rich_help_panel=_WITHOUT_STUDY,
         ),
     ] = None,
     overlay: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.png", help="The picture to confirm. [default with a study: DIR/sheet-N.png]"
+            metavar="FILE.png",
+            help="Picture to write, for your check. [default: DIR/sheet-N.png with a study]",
         ),
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="You have looked at the picture: enter its cells without asking.")
+        bool,
+        typer.Option(
+            "--yes",
+            help="Enter the cells of the picture without asking. Check the picture first.",
+            rich_help_panel=_WITH_STUDY,
+        ),
     ] = False,
     who: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Who confirms. [default: your account's name]")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Name to record with each score. [default: your account's name]",
+            rich_help_panel=_WITH_STUDY,
+        ),
     ] = None,
     second: Annotated[
-        bool, typer.Option("--second", help="As a second count, for the agreement alone.")
+        bool,
+        typer.Option(
+            "--second",
+            help="Enter the cells as a second count, only for the agreement.",
+            rich_help_panel=_WITH_STUDY,
+        ),
     ] = False,
     correct: Annotated[
-        bool, typer.Option("--correct", help="As a correction after the generation was closed.")
+        bool,
+        typer.Option(
+            "--correct",
+            help="Enter the cells as a correction, after the generation was closed.",
+            rich_help_panel=_WITH_STUDY,
+        ),
     ] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print as JSON; enters nothing without --yes.")
+        bool, typer.Option("--json", help="Print JSON. Enters nothing without --yes.")
     ] = False,
 ) -> None:
     """Read the crossed cells from a photo of a sheet.
 
-    The sheet is found by its four tags and its grid; lens, tilt and light are taken out; pens are told apart by how
-    they look in their boxes. Look at the picture that is written: cells less than 90 % sure are framed in it. In a
-    terminal each trial is asked for; elsewhere the same command with --yes enters them. The ledger then has the photo's
-    SHA-256, what was read from it, and who confirmed what.
+    The command finds the sheet by its four tags and its grid, and corrects lens, tilt and light. It identifies each pen
+    by its line in the pen's box. Check the picture that it writes: cells less than 90 % sure have a frame. In a
+    terminal, the command then asks for each trial. Without a terminal, run the same command again with --yes to enter
+    the cells. The ledger records the photo's SHA-256, the cells read, and the name of the person who confirmed them.
 
     Example: realitygap score sheet.jpg --study results/paper-robot --generation 0
 
@@ -232,7 +276,7 @@ def _all_confirmed(
 def _confirmed(
     on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str, arena: Any
 ) -> Iterator[dict[int, Score]]:
-    """Trial by trial, as somebody at the terminal says."""
+    """Yield the cells of each trial, as the operator at the terminal confirms them."""
     from ._operator import pick_cells
 
     for trial in on_sheet.waiting:

@@ -15,62 +15,89 @@ if TYPE_CHECKING:
     from realitygap.report import Each, Subject
 
 
+_ONLY_MOVIES = "Only for a movie"
+_ONLY_DIVERGENCE = "Only for a divergence"
+
+
 def show(
     what: Annotated[
         str,
         typer.Argument(
             metavar="WHAT",
-            help="A folder of results; or network, species, lineage, divergence, movie, arena or robot.",
+            help="Folder of results; or network, species, lineage, divergence, movie, arena or robot.",
         ),
     ],
     names: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="NAME",
-            help="After network, species, lineage and divergence, the folder; after movie, one or more; after arena, "
-            "an arena's name or file; after robot, a robot's.",
+            help="Folder of results after network, species, lineage or divergence; one or more folders after movie; "
+            "arena or robot, by name or file, after arena or robot.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--out", metavar="FILE", help="Ends in .svg, .pdf, .png or, for a trial, .gif or .mp4."
+            "-o",
+            "--out",
+            metavar="FILE",
+            help="Picture to write (.svg, .pdf, .png; for trials also .gif or .mp4).",
         ),
     ] = None,
-    condition: Annotated[str | None, typer.Option(help="Of which. [default: the first]")] = None,
-    replicate: Annotated[int | None, typer.Option(help="Which run. [default: the typical one]")] = None,
-    generation: Annotated[int | None, typer.Option(help="Of a trial, network or lineage.")] = None,
-    individual: Annotated[int | None, typer.Option(help="Of the generation. [default: its best]")] = None,
+    condition: Annotated[str | None, typer.Option(help="Name of the condition. [default: the first]")] = None,
+    replicate: Annotated[
+        int | None, typer.Option(help="Number of the run. [default: the typical one]")
+    ] = None,
+    generation: Annotated[
+        int | None, typer.Option(help="Generation of the trial, network or lineage.")
+    ] = None,
+    individual: Annotated[
+        int | None, typer.Option(help="Individual of the generation. [default: the best]")
+    ] = None,
     each: Annotated[
         str | None,
         typer.Option(
             metavar="WHAT",
-            help="Of a movie: each individual of a generation, the best of each generation, or of each condition.",
+            help="Trials to show: each individual of a generation, or the best trial of each generation or condition.",
+            rich_help_panel=_ONLY_MOVIES,
         ),
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(help="Of a movie: 2 is twice as fast as it was. [default: 1]")
+        float | None,
+        typer.Option(
+            help="Speed of the movie; 2 is twice the speed of the robot. [default: 1]",
+            rich_help_panel=_ONLY_MOVIES,
+        ),
     ] = None,
     against: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Of a divergence: another condition, or a platform (twin:FILE), to try the network on; or two, A,B.",
+            help="Condition or platform (twin:FILE) to try the network on as well; or two of them, A,B.",
+            rich_help_panel=_ONLY_DIVERGENCE,
         ),
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of an arena: a robot's name or file, at the start.")
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Robot, by name or file, to draw at the start.",
+            rich_help_panel="Only for an arena",
+        ),
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option(help="Of a divergence: trials on each of them. [default: 30]")
+        int | None,
+        typer.Option(
+            help="Number of trials on each platform. [default: 30]", rich_help_panel=_ONLY_DIVERGENCE
+        ),
     ] = None,
 ) -> None:
     """Draw a run, trial, network, arena, or robot.
 
-    A folder alone gives the best path of each generation of a run; with --generation, one trial with its readings and
-    commands. FILE.gif and FILE.mp4 show a trial in motion (without --generation, the run's best), movie several of
-    them. divergence tries a trial's network on two platforms or three, and shows how far they come apart. Trials are
-    recomputed from their rows. A file that is there gives way once the new one is complete.
+    A folder alone gives the best path of each generation of a run. With --generation, the picture shows one trial with
+    its readings and commands. A FILE in .gif or .mp4 shows a trial in motion: without --generation, the best of the
+    run. Use movie for several trials in motion. Use divergence to try a network on two or three platforms and compare
+    its paths. Trials are recomputed from their rows. An existing FILE is replaced when the new one is complete.
 
     Example: realitygap show results/paper --condition coverage-50 --replicate 3 -o run.svg
 
@@ -143,7 +170,7 @@ def show(
 
 
 def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
-    """What to show of which folder."""
+    """Return the subject to show, and its folder."""
     subjects: dict[str, Subject] = {"network": "network", "species": "species", "lineage": "lineage"}
     if what in subjects:
         if name is None:

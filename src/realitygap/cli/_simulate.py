@@ -9,14 +9,19 @@ import typer
 
 
 def simulate(
-    case: Annotated[Path, typer.Argument(metavar="CASE.json", help="The scene, and what drives its robots.")],
-    out: Annotated[Path, typer.Option("--out", metavar="OUT.csv", help="Where the track is written.")],
+    case: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CASE.json", help="Scene, and the commands or networks that drive its robots."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="OUT.csv", help="Track to write.")],
 ) -> None:
     """Run one case file as the Jyro simulator does.
 
-    The case is a JSON file: walls, lights, robots with their devices, and commands or a network. The track
-    is a CSV file: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy and the readings s0, s1, ...
-    Stall flags are Jyro's at every step, and so are poses under given commands. Numbers are float64.
+    The case is a JSON file with walls, lights, robots with their devices, and commands or a network. The track is a CSV
+    file with the columns step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy and the readings s0, s1, ...
+    Stall flags equal Jyro's at every step. So do poses under given commands. Numbers are float64.
 
     Example: realitygap simulate tests/data/jyro/s15_net_linear_a.json --out track.csv
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from realitygap.study import Progress, StudyResult
 
 
+_COMPUTING = "Computing"
 # Below it a summary's numbers would be cut; a narrower terminal wraps the lines instead.
 NARROWEST = 78
 
@@ -31,39 +32,48 @@ def run(
         str,
         typer.Argument(
             metavar="STUDY",
-            help="Name of a study, such as paper, paper-choices, or distances; or a study file (.toml).",
+            help="Name of a study, such as paper, paper-choices or distances; or a study file (.toml).",
         ),
     ],
     replicates: Annotated[
-        int | None, typer.Option(min=1, help="Runs of each condition, in place of the study's.")
+        int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="In place of the study's.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")
+    ] = None,
     randomize: Annotated[
         str | None,
         typer.Option(
             metavar="HOW",
-            help="posterior draws each trial's robot from the calibration of sim:FILE; no does not. "
-            "[default: as the study says]",
+            help="posterior: sample the robot of each trial from the calibration of sim:FILE. no: use its estimate. "
+            "[default: from the study]",
         ),
     ] = None,
     threads: Annotated[
-        int | None, typer.Option(min=1, help="Kernels at once. [default: all processors]")
+        int | None,
+        typer.Option(min=1, help="Number of threads. [default: all processors]", rich_help_panel=_COMPUTING),
     ] = None,
     chunk: Annotated[
-        int | None, typer.Option(min=1, help="Runs written together. [default: by their length]")
+        int | None,
+        typer.Option(
+            min=1,
+            help="Number of runs per file. [default: depends on their length]",
+            rich_help_panel=_COMPUTING,
+        ),
     ] = None,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Delete the study that is in the folder and start anew.")
+        bool, typer.Option("--fresh", help="Delete the existing study in the folder and start again.")
     ] = False,
     cluster: Annotated[
         str | None,
         typer.Option(
             metavar="WHERE",
-            help="Compute on a Dask cluster: tcp://HOST:8786, or slurm (pbs, sge, lsf, oar, htcondor, moab); "
-            "slurm:20 asks for 20 jobs.",
+            help="Dask cluster to compute on: tcp://HOST:8786, or slurm (pbs, sge, lsf, oar, htcondor, moab); "
+            "slurm:20 requests 20 jobs.",
+            rich_help_panel=_COMPUTING,
         ),
     ] = None,
     allow_code: Annotated[bool, typer.Option("--allow-code", help=ALLOW_CODE_HELP)] = False,
@@ -74,11 +84,11 @@ def run(
 ) -> None:
     """Run a study, or resume one that was interrupted.
 
-    Interrupt it at any moment: the same command goes on where it stopped. More replicates or new conditions
-    extend what is there. The results do not depend on threads, clusters, chunks or interruptions.
+    You can interrupt it at any time. Run the same command again to resume. More replicates or new conditions extend
+    existing results. The results do not depend on threads, clusters, chunks or interruptions.
 
-    A study may have tasks in Python files. The first time that such a file is met, it is shown, and you are asked
-    whether it may run. The answer is remembered until the file changes.
+    A study may have tasks in Python files. Before such a file runs for the first time, the command shows it and asks
+    for your permission. The answer is remembered until the file changes.
 
     `realitygap drive` drives the conditions that are on a robot.
 
@@ -124,7 +134,9 @@ def run(
 
 
 def new_study(
-    path: Annotated[Path, typer.Argument(metavar="FILE", help="The file to write.")] = Path("my-study.toml"),
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file to write (.toml).")] = Path(
+        "my-study.toml"
+    ),
 ) -> None:
     """Write a template study file that documents every setting.
 
@@ -286,7 +298,7 @@ def _physical_json(result: StudyResult) -> dict[str, Any]:
 
 
 def _print_physical(result: StudyResult, *, to_stderr: bool = False) -> None:
-    """How far the runs on a robot are, and what is to be done next."""
+    """Print the progress of the runs on a robot, and the next step."""
     physical = result.physical
     if physical is None:
         return

@@ -67,7 +67,7 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
 
 
 def calibration_table(calibration: Calibration) -> Table:
-    """What was fitted: one row a parameter, with its interval and whether it is identified."""
+    """Return a table of fitted parameters, one per row, with interval and whether it is identified."""
     table = table_of(
         f"Calibration of {calibration.kind}, {calibration.target} ({calibration.label}), {calibration.trials} "
         f"trials, observed: {calibration.observe}"

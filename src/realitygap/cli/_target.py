@@ -1,4 +1,4 @@
-"""A target as a command opens it: a robot on a port is attended by its witness, or by whoever sits at the terminal."""
+"""Opening a target: a witness, or the operator at the terminal, places a robot and counts its cells."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def opened_target(
     spec: str, arena: Arena, *, witness: str | None = None, processes: int | None = None, seed: int = 0
 ) -> Target:
-    """A target by name; of a robot without a witness, somebody at the terminal places it and counts its cells.
+    """Return a target by name. Without a witness, the operator at the terminal places a robot and counts its cells.
 
     Raises:
         StudyError: There is no such platform, or nobody attends to the robot.

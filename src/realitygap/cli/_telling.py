@@ -1,4 +1,4 @@
-"""How far trials are that nobody leads through: some lines on standard error."""
+"""Progress of trials without an operator, as lines on standard error."""
 
 from __future__ import annotations
 

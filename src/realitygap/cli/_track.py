@@ -19,99 +19,130 @@ if TYPE_CHECKING:
     from realitygap.study import TrackedTrial, TrialToTrack
     from realitygap.vision import Marks, RobotTag, Source, Tracked
 
+_TRIAL = "Only for a trial of a study or file"
 _Tag = Annotated[
     str,
     typer.Option(
         metavar="ID",
-        help="On the robot: its number, or FAMILY:ID such as aruco4x4:7. [families: 36h11 (AprilTag), 25h9, 16h5, "
-        "aruco4x4 to aruco7x7, aruco; found by looking when not named]",
+        help="Tag on the robot: a number, or FAMILY:ID such as aruco4x4:7. Families: 36h11 (AprilTag), 25h9, 16h5, "
+        "aruco4x4 to aruco7x7, aruco. [default family: detected]",
     ),
 ]
-_TagSize = Annotated[float, typer.Option(metavar="M", help="Side of its black square [m].")]
+_TagSize = Annotated[float, typer.Option(metavar="M", help="Side of the tag's black square [m].")]
 
 
 def track(
     camera: Annotated[
-        str, typer.Option(metavar="CAMERA", help="A camera's number, such as 0, or a video file.")
+        str, typer.Option(metavar="CAMERA", help="Number of a camera, such as 0, or video file.")
     ],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="The track as a table (.csv).")
+        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Track to write, as a table (.csv).")
     ] = None,
     arena: Annotated[
-        str | None, typer.Option(metavar="ARENA", help="By name or file. [default: the trial's, or paper]")
+        str | None,
+        typer.Option(metavar="ARENA", help="Arena by name or file. [default: that of the trial, or paper]"),
     ] = None,
     sheet: Annotated[
         bool,
         typer.Option(
             "--sheet",
-            help="The corner tags are those of print-sheet and print-tags; also when nothing is said.",
+            help="Use the corner tags of print-sheet and print-tags. This is the default.",
         ),
     ] = False,
     tag: _Tag = "10",
     tag_size: _TagSize = 0.07,
-    tag_height: Annotated[float, typer.Option(metavar="M", help="Of the tag above the floor [m].")] = 0.1,
+    tag_height: Annotated[
+        float, typer.Option(metavar="M", help="Height of the tag above the floor [m].")
+    ] = 0.1,
     tag_at: Annotated[
         str,
         typer.Option(
             metavar="AHEAD,LEFT,DEG",
-            help="Its middle from the robot's middle [m], and how it is turned counter-clockwise [degrees].",
+            help="Position of the tag from the robot's middle [m], and its counter-clockwise rotation [degrees].",
         ),
     ] = "0,0,0",
     corner_size: Annotated[
         float | None,
-        typer.Option(metavar="M", help="Side of the corner tags' black squares. [default: 0.06]"),
+        typer.Option(metavar="M", help="Side of the corner tags' black squares [m]. [default: 0.06]"),
     ] = None,
     corner_inset: Annotated[
         float | None,
         typer.Option(
-            metavar="M", help="From the walls to them, below 0 outside. [default: 0.01, or outside]"
+            metavar="M",
+            help="Distance from the walls to the corner tags [m], below 0 outside. [default: 0.01 if there is room]",
         ),
     ] = None,
     lens: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The camera's, of realitygap lens. [default: fitted to the tags]"),
+        typer.Option(metavar="FILE", help="Lens file from `realitygap lens`. [default: fitted to the tags]"),
     ] = None,
     save_lens: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep the lens that was fitted to the tags (.toml).")
+        Path | None,
+        typer.Option(metavar="FILE", help="Lens file to write, with the lens fitted to the tags (.toml)."),
     ] = None,
     overlay: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The video with what was found drawn into it (.mp4).")
+        Path | None, typer.Option(metavar="FILE", help="Video to write, with the track drawn into it (.mp4).")
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option(min=0.1, metavar="S", help="Of a camera: how long. [default: until Ctrl-C]"),
+        typer.Option(
+            min=0.1, metavar="S", help="Duration of the recording from a camera [s]. [default: until Ctrl-C]"
+        ),
     ] = None,
     study: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Enter cells and path of --trial into this study's ledger."),
+        typer.Option(
+            metavar="DIR",
+            help="Folder of the study. Its ledger gets the cells and the path.",
+            rich_help_panel=_TRIAL,
+        ),
     ] = None,
     trials: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="--trial is one of this file of trials (.jsonl).")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="File of trials (.jsonl), instead of --study.", rich_help_panel=_TRIAL
+        ),
     ] = None,
-    trial: Annotated[int | None, typer.Option(metavar="NUMBER", help="Which trial the video shows.")] = None,
+    trial: Annotated[
+        int | None,
+        typer.Option(
+            metavar="NUMBER", help="Number of the trial that the video shows.", rich_help_panel=_TRIAL
+        ),
+    ] = None,
     into: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Add the trial with its poses to this file, for calibrate and gap (.jsonl)."
+            metavar="FILE",
+            help="File that gets the trial with its poses, for calibrate and gap (.jsonl).",
+            rich_help_panel=_TRIAL,
         ),
     ] = None,
     begins: Annotated[
         float | None,
         typer.Option(
-            metavar="S", help="When the trial begins in the video. [default: found by its commands]"
+            metavar="S",
+            help="Time in the video at which the trial begins [s]. [default: matched by its commands]",
+            rich_help_panel=_TRIAL,
         ),
     ] = None,
     second: Annotated[
-        bool, typer.Option("--second", help="Enter it as a second count, for the agreement alone.")
+        bool,
+        typer.Option(
+            "--second",
+            help="Enter the cells as a second count, only for the agreement.",
+            rich_help_panel=_TRIAL,
+        ),
     ] = False,
-    who: Annotated[str, typer.Option(metavar="NAME", help="Enters it.")] = "camera",
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
+    who: Annotated[
+        str, typer.Option(metavar="NAME", help="Name to record with the score.", rich_help_panel=_TRIAL)
+    ] = "camera",
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Track a tagged robot in a video or camera stream.
 
-    The arena is known by a tag at each of its corners. What was not seen is filled in between, and marked. With --study
-    or --trials and --trial, the trial is found in the video by its commands; its cells and path go to the ledger, and
-    with its poses it goes to a file that `calibrate --from` and `gap` take.
+    A tag at each corner locates the arena. The track is interpolated, and marked, while the robot's tag is not visible.
+    With --trial, the commands of the trial locate it in the video. Its cells and path go to the ledger of --study.
+    With --into, the trial and its poses go to a file for `calibrate --from` and `gap`.
 
     Example: realitygap track --camera trial-12.mp4 --sheet -o trial-12.csv --overlay seen.mp4
 
@@ -153,17 +184,18 @@ def track(
 
 
 def print_tags(
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The PDF to write.")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="PDF to write.")],
     tag: _Tag = "10",
     tag_size: _TagSize = 0.07,
     corner_size: Annotated[
         float, typer.Option(metavar="M", help="Side of the corner tags' black squares [m].")
     ] = 0.06,
-    paper: Annotated[str, typer.Option(metavar="PAPER", help="a4, letter or a3.")] = "a4",
+    paper: Annotated[str, typer.Option(metavar="PAPER", help="Size of the pages: a4, letter or a3.")] = "a4",
 ) -> None:
     """Write the tags for the camera (PDF, true scale).
 
-    Print it at 100 %, and measure the printed ruler. A sheet of `realitygap print-sheet` has the corner tags already.
+    Print the tags at 100 %, and measure the printed ruler. A sheet of `realitygap print-sheet` already has the corner
+    tags.
 
     Example: realitygap print-tags -o tags.pdf
 
@@ -186,18 +218,20 @@ def print_tags(
 
 def lens(
     camera: Annotated[
-        str, typer.Option(metavar="CAMERA", help="A video of a chessboard, or a camera's number.")
+        str, typer.Option(metavar="CAMERA", help="Video of a checkerboard, or number of a camera.")
     ],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="The lens to write (.toml).")],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="FILE", help="Lens file to write (.toml).")],
     board: Annotated[
         str, typer.Option(metavar="COLUMNSxROWS", help="Inner corners of the board, where four squares meet.")
     ] = "9x6",
     square: Annotated[float, typer.Option(metavar="M", help="Side of a square [m].")] = 0.025,
-    seconds: Annotated[float, typer.Option(min=1, metavar="S", help="Of a camera: how long.")] = 30.0,
+    seconds: Annotated[
+        float, typer.Option(min=1, metavar="S", help="Duration of the recording from a camera [s].")
+    ] = 30.0,
 ) -> None:
     """Calibrate a camera lens from a checkerboard video.
 
-    Without a lens, `realitygap track` fits one to the tags that it sees, which does for most cameras.
+    Most cameras don't need this: without a lens file, `realitygap track` fits a lens to the tags.
 
     Example: realitygap lens --camera board.mp4 --board 9x6 --square 0.025 -o phone.toml
 
@@ -372,7 +406,7 @@ def _enter(
 
 @dataclass(frozen=True)
 class _Written:
-    """Where things went."""
+    """The files and the folder that were written."""
 
     out: Path | None
     lens: Path | None

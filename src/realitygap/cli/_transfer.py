@@ -1,4 +1,4 @@
-"""`realitygap transfer`: what evolved in simulation, on a target, by strategy."""
+"""`realitygap transfer`: strategies that transfer controllers to a target."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 
 def transfer(
-    study: Annotated[str, typer.Argument(metavar="STUDY", help="A study's name or file; see --condition.")],
+    study: Annotated[str, typer.Argument(metavar="STUDY", help="Study by name or file. See --condition.")],
     to: Annotated[
         str,
         typer.Option(
             "--to",
             metavar="PLATFORM",
-            help="The target: sim:FILE, twin:FILE, scribbler:PORT, thymio:PORT, ...",
+            help="Target: sim:FILE, twin:FILE, scribbler:PORT, thymio:PORT, ...",
         ),
     ],
     budget: Annotated[
@@ -30,37 +30,47 @@ def transfer(
         typer.Option(
             min=0,
             max=4999,
-            help="Trials on the target that a strategy may spend; may be given again. [default: 20]",
+            help="Trials that each strategy may spend on the target. Repeatable. [default: 20]",
         ),
     ] = None,
     strategy: Annotated[
         list[str] | None,
         typer.Option(
-            help="plain, select, halving, noise, randomized, calibrated, posterior, transferability, direct or all; "
-            "may be given again. [default: all]"
+            help="plain, select, halving, noise, randomized, calibrated, posterior, transferability, direct or all. "
+            "Repeatable. [default: all]"
         ),
     ] = None,
     condition: Annotated[
         str | None,
-        typer.Option(help="Of the study. [default: its first that selects for the score, best on sim]"),
+        typer.Option(
+            help="Condition of the study. [default: the first that selects for the score, preferably on sim]"
+        ),
     ] = None,
     calibration: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Made before; its trials count as spent. [default: makes one]"),
+        typer.Option(
+            metavar="FILE",
+            help="Existing calibration. Its trials count toward the budget. [default: calibrate first]",
+        ),
     ] = None,
     observe: Annotated[
-        str, typer.Option(help="What calibrating sees of a trial: cells, encoders or track.")
+        str, typer.Option(help="Observation level for calibrating: cells, encoders or track.")
     ] = "cells",
     replicates: Annotated[
-        int, typer.Option(min=1, max=1000, help="Times that everything is done, each evolving anew.")
+        int, typer.Option(min=1, max=1000, help="Number of replicates, each with its own evolution.")
     ] = 1,
     fresh_trials: Annotated[
-        int, typer.Option(min=1, max=5000, help="By which each champion is judged; not of the budget.")
+        int,
+        typer.Option(
+            min=1,
+            max=5000,
+            help="Trials used to judge each champion. They don't count toward the budget.",
+        ),
     ] = 20,
-    runs: Annotated[int, typer.Option(min=1, help="Evolutions in simulation of each replicate.")] = 100,
-    repeats: Annotated[int, typer.Option(min=1, help="Trials of each individual in simulation.")] = 8,
+    runs: Annotated[int, typer.Option(min=1, help="Evolutions in simulation per replicate.")] = 100,
+    repeats: Annotated[int, typer.Option(min=1, help="Trials per individual in simulation.")] = 8,
     seed: Annotated[
-        int, typer.Option(min=0, max=2**63 - 1, help="Of all random numbers but a twin's own.")
+        int, typer.Option(min=0, max=2**63 - 1, help="Seed of all random numbers except a twin's own.")
     ] = 1,
     out: Annotated[
         Path | None,
@@ -69,10 +79,11 @@ def transfer(
         ),
     ] = None,
     processes: Annotated[
-        int | None, typer.Option(min=1, help="Of a twin: trials at once. [default: all processors]")
+        int | None,
+        typer.Option(min=1, help="Number of twin trials to run in parallel. [default: all processors]"),
     ] = None,
     witness: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="Of an emulator in another program.")
+        str | None, typer.Option(metavar="HOST:PORT", help="Witness of an emulator in another program.")
     ] = None,
     allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -81,13 +92,15 @@ def transfer(
 
     Controllers evolve in simulation. Each strategy then spends a few trials on the target.
 
-    Each strategy has the same evolution in simulation and may spend the same trials. What it chose is judged by fresh
-    trials. Every trial on the target is kept as it comes: the same command goes on where it was interrupted.
+    All strategies start from the same simulated evolution and may spend the same trials on the target. Separate trials
+    judge the controllers that they choose. Each trial on the target is saved immediately. Run the same command again to
+    resume.
 
-    plain: the best champion in simulation. select: the N best, tried once each. halving: the same in rounds. noise:
-    evolved under the paper's three levels. randomized: with numbers drawn by hand. calibrated: in the fitted simulator.
-    posterior: with a robot of the posterior in each trial. transferability: Koos, Mouret & Doncieux (2013). direct:
-    evolved on the target.
+    Strategy plain takes the best champion in simulation. Strategy select tries the N best champions once each, and
+    halving tries them in rounds. Strategy noise evolves under the paper's three noise levels, and randomized with
+    numbers sampled from ranges set by hand. Strategy calibrated evolves in the fitted simulator, and posterior with a
+    robot sampled from the calibration in each trial. Strategy transferability is that of Koos, Mouret & Doncieux
+    (2013). Strategy direct evolves on the target.
 
     Example: realitygap transfer sim-paper --to twin:worn-1.toml --budget 20
 

@@ -1,4 +1,4 @@
-"""`realitygap trials`: what a robot drove, and what people say of it."""
+"""`realitygap trials`: the trials of a robot, their scores, and notes."""
 
 from __future__ import annotations
 
@@ -19,43 +19,68 @@ if TYPE_CHECKING:
 _WHAT = ("list", "score", "undo", "void", "note", "agreement")
 
 
+_ONLY_SCORE = "Only for score"
+
+
 def trials(
-    what: Annotated[str, typer.Argument(metavar="WHAT", help="list, score, undo, void, note or agreement.")],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of results with a ledger.")],
+    what: Annotated[
+        str, typer.Argument(metavar="WHAT", help="Action: list, score, undo, void, note or agreement.")
+    ],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results with a ledger.")],
     trial: Annotated[
         str | None,
-        typer.Argument(metavar="TRIAL", help="A trial's number or code. [default: for score, all driven]"),
+        typer.Argument(
+            metavar="TRIAL", help="Number or code of a trial. [default: all driven trials, for score]"
+        ),
     ] = None,
     cells: Annotated[
-        str | None, typer.Option(metavar="LIST", help="To score: the cells crossed, such as 0,1,13.")
+        str | None,
+        typer.Option(metavar="LIST", help="Crossed cells, such as 0,1,13.", rich_help_panel=_ONLY_SCORE),
     ] = None,
     file: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="To score many: lines 'TRIAL: 0 1 13', a trial's number or code."),
+        typer.Option(
+            metavar="FILE",
+            help="File with the cells of many trials: lines 'TRIAL: 0 1 13'. TRIAL is a number or code.",
+            rich_help_panel=_ONLY_SCORE,
+        ),
     ] = None,
     who: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Who says so. [default: your account's name]")
+        str | None,
+        typer.Option(metavar="NAME", help="Name to record with each entry. [default: your account's name]"),
     ] = None,
     second: Annotated[
-        bool, typer.Option("--second", help="To score: as a second person, for the agreement alone.")
+        bool,
+        typer.Option(
+            "--second",
+            help="Enter the cells as a second count, only for the agreement.",
+            rich_help_panel=_ONLY_SCORE,
+        ),
     ] = False,
     correct: Annotated[
         bool,
         typer.Option(
-            "--correct", help="To score: a correction after the generation was closed, for reports alone."
+            "--correct",
+            help="Enter the cells as a correction, after the generation was closed. Only reports use it.",
+            rich_help_panel=_ONLY_SCORE,
         ),
     ] = False,
     text: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Of a note, or why a trial is void.")
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Text of the note, or reason why the trial is void.",
+            rich_help_panel="Only for note and void",
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """List, score, and annotate physical trials.
 
-    Cells are numbered columns * row + column, 0 at the lower left of the reachable ones. Without --cells and --file
-    they are picked in the terminal. A score can be taken back until its generation is closed; later only --correct is
-    taken, which reports use and the evolution does not. With cells by two people, agreement is Cohen's kappa with its
-    interval.
+    The number of a cell is columns * row + column. Cell 0 is the lower left of the reachable cells. Without --cells and
+    --file, you pick the cells in the terminal. undo removes a score until its generation is closed. After that, only
+    --correct changes it: reports use the correction, and the evolution does not. If two people counted cells, agreement
+    prints Cohen's kappa with its interval.
 
     Example: realitygap trials list results/paper-robot
 
@@ -207,7 +232,7 @@ def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> I
 
 
 class _Titles:
-    """How the trials of a folder are shown."""
+    """Names that the list of a folder's trials shows."""
 
     def __init__(self, folder: Path) -> None:
         from realitygap.records import ResultsFolder

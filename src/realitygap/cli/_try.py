@@ -16,17 +16,20 @@ from ._code import AllowPlatforms
 
 def try_genome(
     genome: Annotated[
-        Path, typer.Argument(metavar="GENOME", help="A file of realitygap export or transfer.")
+        Path,
+        typer.Argument(metavar="GENOME", help="Genome from `realitygap export` or `realitygap transfer`."),
     ],
     on: Annotated[
         str,
         typer.Option(
-            "--on", metavar="PLATFORM", help="jyro, sim, sim:FILE, twin:FILE, scribbler:PORT or thymio:PORT."
+            "--on",
+            metavar="PLATFORM",
+            help="Platform: jyro, sim, sim:FILE, twin:FILE, scribbler:PORT or thymio:PORT.",
         ),
     ],
     trials: Annotated[int, typer.Option(min=1, max=9999, help="Number of trials.")] = 1,
-    steps: Annotated[int, typer.Option(min=1, help="Commands in each.")] = 100,
-    observe: Annotated[str, typer.Option(help="Observe cells, encoders or track.")] = "cells",
+    steps: Annotated[int, typer.Option(min=1, help="Number of commands per trial.")] = 100,
+    observe: Annotated[str, typer.Option(help="Observation level: cells, encoders or track.")] = "cells",
     inputs: Annotated[
         str | None,
         typer.Option(
@@ -36,27 +39,29 @@ def try_genome(
     ] = None,
     outputs: Annotated[
         str | None,
-        typer.Option(metavar="NAMES", help="Names of its outputs: move,turn or left,right."),
+        typer.Option(metavar="NAMES", help="Names of the controller's outputs: move,turn or left,right."),
     ] = None,
     arena: Annotated[str, typer.Option(metavar="NAME", help="Name or file of an arena.")] = "paper",
     witness: Annotated[
-        str | None, typer.Option(metavar="HOST:PORT", help="The witness of an emulator in another program.")
+        str | None, typer.Option(metavar="HOST:PORT", help="Witness of an emulator in another program.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulator's noise.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option("-o", "--out", metavar="FILE", help="Keep the trials, one a line, as they come."),
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="FILE",
+            help="File to save the trials in, one per line. Run the command again to resume.",
+        ),
     ] = None,
     allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the coverage as JSON.")] = False,
 ) -> None:
     """Drive one exported controller on any platform.
 
-    The command prints how much of the arena the controller covers.
-
-    A controller drives in simulation, on a twin, and over the wire on a robot or an emulated one, if they have its
-    inputs.
-    With -o, trials that are in the file already are not driven again.
+    The command prints how much of the arena the controller covers. A controller can drive in simulation, on a twin, and
+    on a real or emulated robot, if the platform has its inputs.
 
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
 

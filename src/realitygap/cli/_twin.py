@@ -1,4 +1,4 @@
-"""`realitygap twin`: robots of real wheels, motors and sensors, as pseudo-reality: drawn, shown, filmed."""
+"""`realitygap twin`: sample, show, and film twins."""
 
 from __future__ import annotations
 
@@ -20,17 +20,22 @@ twin = typer.Typer(
     rich_markup_mode=None,
 )
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="Of a twin, from `realitygap twin sample`.")]
+File = Annotated[Path, typer.Argument(metavar="FILE", help="Twin file from `realitygap twin sample`.")]
 
 
 @twin.command("families")
 def families(
     name: Annotated[
-        str | None, typer.Argument(metavar="FAMILY", help="One of them; or every, what all draw.")
+        str | None,
+        typer.Argument(
+            metavar="FAMILY", help="Family to describe; or every, for the numbers that all twins draw."
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print data as JSON.")] = False,
 ) -> None:
-    """Say which families of twins there are, or which numbers one of them draws, and between what limits.
+    """List the families of twins.
+
+    With FAMILY, list the numbers that the family draws and their limits.
 
     Example: realitygap twin families worn
 
@@ -82,14 +87,17 @@ def build() -> None:
 @twin.command("sample")
 def sample(
     family: Annotated[
-        str, typer.Option(metavar="FAMILY", help="Of which kind; `realitygap twin families` names them.")
+        str, typer.Option(metavar="FAMILY", help="Family of the twin. `realitygap twin families` lists them.")
     ],
-    seed: Annotated[int, typer.Option(min=0, help="Another twin for each; also of its noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the twin and of its noise.")] = 0,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", metavar="FILE", help="Instead of printing it.")
+        Path | None,
+        typer.Option("-o", "--out", metavar="FILE", help="Twin file to write. [default: print the twin]"),
     ] = None,
 ) -> None:
-    """Draw a twin from a family: a TOML file in which every number stands below what it means.
+    """Sample a twin from a family.
+
+    A twin is a TOML file. A comment above each number explains it.
 
     Example: realitygap twin sample --family worn --seed 1 -o worn-1.toml
 
@@ -112,7 +120,9 @@ def sample(
 @twin.command("show")
 def show_twin(
     file: File,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="PICTURE", help="Ends in .svg, .pdf or .png.")],
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="PICTURE", help="Picture to write (.svg, .pdf or .png).")
+    ],
 ) -> None:
     """Draw a twin from above, to scale, with its dimensions.
 
@@ -132,22 +142,31 @@ def show_twin(
 @twin.command("render")
 def render(
     file: File,
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="PICTURE", help="Ends in .gif, .mp4 or .png.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", metavar="PICTURE", help="Film (.gif or .mp4) or last picture (.png) to write."
+        ),
+    ],
     arena: Annotated[
-        str, typer.Option(metavar="NAME", help="Where it drives: an arena by name, or a TOML or SVG file.")
+        str, typer.Option(metavar="NAME", help="Arena by name, or a TOML or SVG file.")
     ] = "paper",
-    steps: Annotated[int, typer.Option(min=1, max=10_000, help="Commands.")] = 60,
-    number: Annotated[int, typer.Option(min=0, help="Of the trial: it chooses the noise.")] = 0,
+    steps: Annotated[int, typer.Option(min=1, max=10_000, help="Number of commands.")] = 60,
+    number: Annotated[int, typer.Option(min=0, help="Number of the trial. It determines the noise.")] = 0,
     view: Annotated[
         str | None,
         typer.Option(
             metavar="mujoco|above",
-            help="In three dimensions, or from above with rays and cells. [default: mujoco where this machine can]",
+            help="mujoco: in three dimensions. above: from above, with rays and cells. [default: mujoco if possible]",
         ),
     ] = None,
-    speed: Annotated[float, typer.Option(help="4 is four times as fast as it was.")] = 4.0,
+    speed: Annotated[
+        float, typer.Option(help="Speed of the film; 4 is four times the speed of the robot.")
+    ] = 4.0,
 ) -> None:
-    """Let a twin wander through an arena, and film it; of a .png, where it ends.
+    """Film a twin that wanders through an arena.
+
+    A .png shows the end of the trial.
 
     Example: realitygap twin render worn-1.toml -o worn-1.mp4
 

@@ -4,10 +4,10 @@ import time
 
 import numpy as np
 import pytest
+from realitygap.platforms.thymio._playground import Playground, why_not
 
 from realitygap.evolution import ControllerInterface, Network, to_aseba
 from realitygap.evolution._fixed_point import ONE, fixed_point
-from realitygap.platforms.thymio._playground import Playground, why_not
 from realitygap.robots.thymio import _messages as messages
 from realitygap.robots.thymio._link import Link, open_port
 from realitygap.robots.thymio._messages import Kind

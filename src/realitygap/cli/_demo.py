@@ -1,0 +1,114 @@
+"""`realitygap demo`: a tour of the main commands."""
+
+from __future__ import annotations
+
+import shlex
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from realitygap.errors import StudyError
+
+from ._browser import show_page
+
+_ROBOT = "scribbler:emulator://s2?fluke=2&speed=off"
+
+
+def demo(
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results. [default: a new temporary folder]"),
+    ] = None,
+    open_page: Annotated[
+        bool, typer.Option("--open", help="When done, show the report of the study in the browser.")
+    ] = False,
+) -> None:
+    """Take a two-minute tour with an emulated robot.
+
+    The tour runs a small study, writes its report, drives a controller on an emulated robot, and measures the gap
+    between a simulator and that robot. It prints each command before it runs it. Ctrl-C ends the tour.
+
+    Example: realitygap demo --open
+
+    Example: realitygap demo --out my-tour
+
+    In Python: realitygap.run_study("paper", "my-tour/paper", replicates=20)
+    """
+    folder = _made(out)
+    steps = _steps(folder)
+    typer.echo(f"The results go to {folder}.")
+    try:
+        for number, (purpose, commands) in enumerate(steps, 1):
+            typer.echo(f"\nStep {number} of {len(steps)}: {purpose}")
+            for words in commands:
+                typer.echo(f"$ realitygap {shlex.join(words)}")
+                _run(words)
+    except KeyboardInterrupt:
+        typer.echo(f"Interrupted. The results of the finished commands are in {folder}.", err=True)
+        raise typer.Exit(130) from None
+    typer.echo(
+        f"\nThe results of this tour are in {folder}:\n"
+        "  paper/report.html   report of the study: figures, tables, and trials to play\n"
+        "  champion.gif        film of the controller in simulation\n"
+        "  gap.html            report of the gap\n"
+        "Next, write your own study: realitygap new-study my-study.toml"
+    )
+    if open_page:
+        show_page(folder / "paper" / "report.html")
+
+
+def _made(out: Path | None) -> Path:
+    """Return the folder for the results, which exists from now on.
+
+    Raises:
+        StudyError: The name is that of a file.
+    """
+    if out is None:
+        return Path(tempfile.mkdtemp(prefix="realitygap-demo-"))
+    if out.exists() and not out.is_dir():
+        raise StudyError(f"--out is the file {out}, expected a folder. Name another one.")
+    out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:
+    """Return the purpose of each step of the tour, and the words of its commands."""
+    study, champion, film = (str(folder / name) for name in ("paper", "champion.json", "champion.gif"))
+    return [
+        (
+            "Evolve controllers in simulation. The paper's study has 9 conditions, here with 20 runs each.",
+            [["run", "paper", "--replicates", "20", "--out", study]],
+        ),
+        ("Write the report of the study.", [["report", study]]),
+        (
+            "Save the best controller of a novelty search, film it, and drive it on an emulated Scribbler.",
+            [
+                ["export", study, "--condition", "novelty-50", "-o", champion],
+                ["show", study, "--condition", "novelty-50", "-o", film],
+                ["try", champion, "--on", _ROBOT, "--trials", "3"],
+            ],
+        ),
+        (
+            "Measure the gap between a simulator and the emulated robot.",
+            [
+                [
+                    *("gap", "sim", _ROBOT, "--n-controllers", "10", "--trials", "3"),
+                    *("--report", str(folder / "gap.html")),
+                ]
+            ],
+        ),
+    ]
+
+
+def _run(words: list[str]) -> None:
+    """Run a command in this process.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C ended the command.
+    """
+    from ._app import app_for
+
+    if app_for(words)(words, prog_name="realitygap", standalone_mode=False):
+        raise KeyboardInterrupt

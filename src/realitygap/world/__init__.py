@@ -41,6 +41,7 @@ from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
+from ._toml import toml_table
 from ._units import INCH
 
 __all__ = [
@@ -96,5 +97,6 @@ __all__ = [
     "robot_names",
     "robot_picture",
     "rounded",
+    "toml_table",
     "why_no_part",
 ]

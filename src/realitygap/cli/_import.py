@@ -58,25 +58,10 @@ def import_log(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
 ) -> None:
-    r"""Turn a log of a real robot into trials.
+    """Turn a log of a real robot into trials.
 
     A mapping says which column is what, in which unit, with which sign, and by which clock. Without a mapping, the
-    names of the columns are used; --show-map prints the result, to be saved and changed:
-
-    \b
-        # drive.map.toml
-        robot = "pioneer"
-        [commands]
-        time = "t"
-        left = "v_left"
-        right = "v_right"
-        unit = "mm/s"
-        [poses]
-        time = "t"
-        x = "x"
-        y = "y"
-        heading = "yaw"
-        heading_unit = "deg"
+    names of the columns are used. --show-map prints the mapping as TOML, to be saved and changed.
 
     All parts are resampled to steps of one length. The report gives the method of each part, and the time by which
     poses follow commands. It also names the usual mistakes: wheels that are swapped or reversed, half of the track,

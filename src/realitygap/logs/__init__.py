@@ -7,29 +7,35 @@ makes observed trials of them. This package fits nothing.
 
 from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trials_of
 from ._clock_offset import ClockOffset, clock_offset
+from ._end_poses import EndPoses, read_end_poses
 from ._guess import guess_log_map
-from ._import import DEFAULT_ROBOT, ImportReport, import_log, map_beside, mapping_of, robot_of
+from ._import import ImportReport, import_log, map_beside, mapping_of, robot_of
 from ._log_map import Commands, LogMap, Poses, Readings, TextFormat, Wheels, load_log_map
 from ._mistakes import Diagnosis, Mistake, diagnose
 from ._open import KINDS, open_source
+from ._range_table import RangeTable, read_range_table
 from ._read import Log, read_logs
 from ._source import Batch, Source
+from ._table_map import TableColumns, TableMap, load_table_map
 
 __all__ = [
-    "DEFAULT_ROBOT",
     "KINDS",
     "NO_HEADING",
     "Batch",
     "ClockOffset",
     "Commands",
     "Diagnosis",
+    "EndPoses",
     "ImportReport",
     "Log",
     "LogMap",
     "Mistake",
     "Poses",
+    "RangeTable",
     "Readings",
     "Source",
+    "TableColumns",
+    "TableMap",
     "TextFormat",
     "Wheels",
     "arena_of",
@@ -39,11 +45,14 @@ __all__ = [
     "head_of",
     "import_log",
     "load_log_map",
+    "load_table_map",
     "map_beside",
     "mapping_of",
     "open_source",
     "path_headings",
+    "read_end_poses",
     "read_logs",
+    "read_range_table",
     "robot_of",
     "trials_of",
 ]

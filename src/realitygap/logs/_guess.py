@@ -70,7 +70,7 @@ def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
         shown = ", ".join(names[:MOST_SHOWN])
         raise LogError(
             f"{path}: the names of its columns do not say which are the wheels: {shown}. Write a mapping, and name it "
-            "with --map: `realitygap import --help` has an example."
+            "with --map."
         )
     if source.is_table:
         time = _time(names)
@@ -88,7 +88,7 @@ def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
     return LogMap(**values)
 
 
-def _tokens(name: str) -> list[str]:
+def tokens_of(name: str) -> list[str]:
     """The words of a name, in lower case: leftSpeed_mm_s has left, speed, mm, s."""
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     return [part for part in re.split(r"[^a-zA-Z0-9]+", name.lower()) if part]
@@ -96,17 +96,17 @@ def _tokens(name: str) -> list[str]:
 
 def _pick(names: Iterable[str], wanted: Callable[[list[str]], bool]) -> str:
     """Return the column that fits, poses seen from outside before the robot's own; empty if no column fits."""
-    found = [name for name in names if wanted(_tokens(name))]
-    return min(found, key=lambda name: (not TRUTH & set(_tokens(name)), len(name)), default="")
+    found = [name for name in names if wanted(tokens_of(name))]
+    return min(found, key=lambda name: (not TRUTH & set(tokens_of(name)), len(name)), default="")
 
 
-def _unit(name: str, default: str) -> str:
+def unit_in(name: str, default: str) -> str:
     """The unit in a name, without that of the time."""
-    return next((UNITS[token] for token in reversed(_tokens(name)[1:]) if token in UNITS), default)
+    return next((UNITS[token] for token in reversed(tokens_of(name)[1:]) if token in UNITS), default)
 
 
 def _speed_unit(name: str) -> str:
-    unit = _unit(name, "m")
+    unit = unit_in(name, "m")
     return unit if unit in ("rpm", "percent") else f"{unit}/s"
 
 
@@ -133,7 +133,7 @@ def _commands(names: Sequence[str]) -> dict[str, Any] | None:
     flat = [name for name in names if "/" not in name]
     forward, turn = _pick(flat, _has(FORWARD, without=COUNTED)), _pick(flat, _has(TURN, without=COUNTED))
     if forward and turn and forward != turn:
-        rate = _unit(turn, "rad")
+        rate = unit_in(turn, "rad")
         return {
             "forward": forward,
             "turn": turn,
@@ -148,8 +148,8 @@ def _wheels(names: Sequence[str]) -> dict[str, Any] | None:
     right = _pick(names, lambda tokens: bool(RIGHT & set(tokens) and COUNTED & set(tokens)))
     if not (left and right):
         return None
-    is_ticks = bool({"enc", "encoder", "encoders", "tick", "ticks", "count", "counts"} & set(_tokens(left)))
-    return {"left": left, "right": right, "unit": _unit(left, "ticks" if is_ticks else "m")}
+    is_ticks = bool({"enc", "encoder", "encoders", "tick", "ticks", "count", "counts"} & set(tokens_of(left)))
+    return {"left": left, "right": right, "unit": unit_in(left, "ticks" if is_ticks else "m")}
 
 
 def _poses(names: Sequence[str]) -> dict[str, Any] | None:
@@ -190,9 +190,9 @@ def _poses(names: Sequence[str]) -> dict[str, Any] | None:
     if not (x and y):
         return None
     heading = _pick(flat, _has(HEADING, without={"vel", "speed", "rate", "cmd", "acc", "gyro"}))
-    found: dict[str, Any] = {"x": x, "y": y, "unit": _unit(x, "m")}
+    found: dict[str, Any] = {"x": x, "y": y, "unit": unit_in(x, "m")}
     if heading:
-        found |= {"heading": heading, "heading_unit": _unit(heading, "rad")}
+        found |= {"heading": heading, "heading_unit": unit_in(heading, "rad")}
     return found
 
 
@@ -212,7 +212,7 @@ def _readings(names: Sequence[str]) -> dict[str, Any] | None:
 def _time(names: Sequence[str]) -> dict[str, str] | None:
     for word in TIME:
         for name in names:
-            tokens = _tokens(name)
+            tokens = tokens_of(name)
             if word in tokens or (len(tokens) == 1 and tokens[0].startswith(word) and len(word) > 2):
                 unit = next((TIME_UNITS[token] for token in tokens[1:] if token in TIME_UNITS), "s")
                 return {"time": name, "time_unit": unit}

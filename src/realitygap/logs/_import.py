@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from realitygap.errors import LogError
 from realitygap.records import ObservedTrial, write_observations
-from realitygap.world import RobotModel, load_robot
+from realitygap.world import RobotModel, load_robot, robot_names
 
 from ._as_trials import NO_HEADING, head_of, trials_of
 from ._clock_offset import ClockOffset
@@ -16,7 +17,6 @@ from ._log_map import LogMap, load_log_map
 from ._mistakes import Mistake, diagnose
 from ._read import Log, read_logs
 
-DEFAULT_ROBOT = "scribbler-s2-fluke2"
 MOST_DIAGNOSED = 20
 """Trials of a log that are searched for mistakes; those after them have the same."""
 
@@ -74,9 +74,14 @@ def robot_of(log_map: LogMap, base: str | None = None) -> tuple[str, RobotModel]
         base: The robot, in place of the one that the mapping names.
 
     Raises:
+        LogError: Neither names a robot.
         DescriptionError: There is no such robot.
     """
-    name = base or log_map.robot or DEFAULT_ROBOT
+    name = base or log_map.robot
+    if not name:
+        raise LogError(
+            f"The mapping does not name the robot that drove. Give --base ROBOT: {', '.join(robot_names())}, or a file."
+        )
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
     return name, load_robot(name).with_numbers({key: value for key, value in given.items() if value})
 

@@ -22,6 +22,8 @@ from ._units import TIMES, unit_factor
 
 REGULAR = 0.25
 """Share by which most intervals may differ from their median where a step is taken from them."""
+SAME_STEP = 0.01
+"""Share by which the mean of intervals may differ from their median if no row is missing."""
 FEWEST_STEPS = 2
 
 
@@ -247,7 +249,8 @@ def _step_of(stream: _Stream, times: Floats) -> float:
             f"[{stream.name}] comes at irregular times, mostly {low:.3g} to {high:.3g} s apart. Choose the length of a "
             f"step: step_s = {usual:.3g} in the mapping, or --step."
         )
-    return usual
+    mean = float(intervals.mean())  # less rounded, unless rows are missing
+    return mean if abs(mean - usual) < SAME_STEP * usual else usual
 
 
 def _streams(path: Path, log_map: LogMap, robot: RobotModel, *, drop: bool) -> list[_Stream]:

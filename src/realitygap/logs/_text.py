@@ -119,13 +119,13 @@ class TextSource:
         """As `Source.batches`."""
         chosen = {name: self._index(name) for name in names}
         first = 1
+        # numbers stand for the names, so that rows may be shorter than the widest, and names may be anything
+        head = self._separator.join(str(k) for k in range(len(self._names))).encode() + b"\n"
         for block in self._blocks(rows):
             try:
                 frame = pl.read_csv(
-                    block,
-                    has_header=False,
-                    new_columns=self._names,
-                    schema=dict.fromkeys(self._names, pl.String),
+                    head + block,
+                    infer_schema=False,
                     columns=sorted(set(chosen.values())),
                     separator=self._separator,
                     quote_char='"' if b'"' in block else None,
@@ -134,9 +134,7 @@ class TextSource:
                 )
             except pl.exceptions.PolarsError as error:
                 raise LogError(f"{self.path} cannot be read near row {first}: {error}") from None
-            values = {
-                name: self._column(name, frame[self._names[index]], first) for name, index in chosen.items()
-            }
+            values = {name: self._column(name, frame[str(index)], first) for name, index in chosen.items()}
             if len(frame):
                 yield Batch(first, values)
             first += len(frame)

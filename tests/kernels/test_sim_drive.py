@@ -173,6 +173,24 @@ def test_what_wheels_do_is_theirs() -> None:
     np.testing.assert_allclose(slow.poses[:, 0, 0] - 20, 0.8 * slow.wheels[:, 0, 0], atol=1e-12)
 
 
+def test_wheel_stands_in_soft_dead_band_and_starts_from_zero_beyond_it() -> None:
+    commands = np.array([[share, 0.0] for share in (0.05, 0.1, 0.11, 0.55, 1.0, -0.55, -0.1, 0.0)])
+    wheels = drive_robots({**FIELD, "drive.soft_dead_band": 0.1}, commands).wheels[:, 0]
+    shares = np.diff(wheels, axis=0) / 0.5 / SPEED
+    np.testing.assert_allclose(shares, np.array([[0, 0, 0.01 / 0.9, 0.5, 1, -0.5, 0, 0]] * 2).T, atol=1e-8)
+    whole = drive_robots({**FIELD, "drive.soft_dead_band": 1.0}, commands).wheels
+    assert np.abs(whole).max() == 0
+
+
+def test_robot_without_soft_dead_band_drives_the_same_to_the_bit_among_others_with_it() -> None:
+    commands = np.random.default_rng(3).uniform(-1, 1, (20, 2))
+    soft = np.where(np.arange(8) % 2, 0.1, 0.0)
+    some = drive_robots({**FIELD, "drive.soft_dead_band": soft}, commands, n=8).poses
+    none = drive_robots(FIELD, commands, n=8).poses
+    assert (some[:, ::2] == none[:, ::2]).all()
+    assert (some[-1, 1::2] != none[-1, 1::2]).any()
+
+
 def test_only_speeds_that_exist_are_driven_the_slower_wheel_in_proportion() -> None:
     """Twelve of them, from the second on."""
     commands = np.array([[0.03, 0.0], [0.05, 0.0], [0.55, 0.0], [1.0, 0.0], [0.4, 0.14]])

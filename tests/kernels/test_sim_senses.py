@@ -52,6 +52,7 @@ def numbers_of(rng: np.random.Generator) -> Numbers:
         "noise_gain": (0.0, 0.2), "drop_most": (0.0, 0.6), "drop_at": (0.1, 0.4), "drop_width": (0.02, 0.1),
         "outlier_most": (0.0, 0.4), "outlier_at": (0.1, 0.4), "outlier_width": (0.02, 0.1), "burst": (0.0, 1.0),
         "incidence": (0.0, 0.0), "cone": (0.1, 0.6), "half_width": (0.06, 0.3), "peak": (-0.05, 0.05),
+        "compression": (0.0, 0.0),
     }  # fmt: skip
     numbers = {
         f"range.{s}.{name}": rng.uniform(*span, LANES)
@@ -164,6 +165,8 @@ class Plain:
         else:
             choice, value = self.mixture_words(s)
             reading *= 1 + of["noise_gain"] * float(normal(np.uint32(value), 0.0))
+            if kind == "ir":
+                reading = reference.compressed(reading, self.number(f"range.{s}.compression"))
             choices = ((choice >> 11) + 0.5) / 2**21, ((value >> 9) + 0.5) / 2**23
             reading = reference.mixed(reading, *choices, nothing, anything)
         uniform = ((self.word(1, self.step * -(-len(RESPONSES) // 4), s) >> 8) * 2 + 1 - 2**24) / 2**24
@@ -191,12 +194,13 @@ class Plain:
         return reference.limited(1 - bright) if k == 1 else float(bright < self.number(f"line.{k}.threshold"))
 
 
-@pytest.mark.parametrize("most_incidence", [0.0, 3.0])
-def test_every_sensor_answers_what_its_own_words_say(most_incidence: float) -> None:
+@pytest.mark.parametrize(("most_incidence", "most_compression"), [(0.0, 0.0), (3.0, 0.0), (3.0, 20.0)])
+def test_every_sensor_answers_what_its_own_words_say(most_incidence: float, most_compression: float) -> None:
     rng = np.random.default_rng(1)
     numbers = numbers_of(rng)
     for s in range(len(RESPONSES)):
         numbers[f"range.{s}.incidence"] = most_incidence * np.arange(LANES) / LANES
+        numbers[f"range.{s}.compression"] = most_compression * np.arange(LANES) / LANES
     block = Block(numbers)
     for step in [0, 1, 7, *range(100, 100 + cases(8, 1))]:
         x, y, heading = rng.uniform(-0.5, 0.5, (3, LANES)) * [[1], [1], [6]]
@@ -217,6 +221,19 @@ def test_every_sensor_answers_what_its_own_words_say(most_incidence: float) -> N
             ]
             assert answer[:, lane] == pytest.approx(wanted, abs=1e-9)
         assert ((answer >= 0) & (answer <= 1)).all()
+
+
+def test_compression_keeps_small_readings_and_presses_large_ones() -> None:
+    """Without noise, too; a lane with a compression of 0 reads as before to the bit."""
+    shape = make_sim_shape(parts=[1], range_response=["ir"])
+    numbers = {"range.0.reach": 1.0, "range.0.amplitude": 50.0, "range.0.decay": 0.01}
+    distances = np.linspace(0.0, 0.2, LANES)[None]
+    plain = Block(numbers, shape=shape).readings((0.0, 0.0, 0.0), distances, 0)[0]
+    some = {**numbers, "range.0.compression": np.where(np.arange(LANES) % 2, 3.0, 0.0)}
+    pressed = Block(some, shape=shape).readings((0.0, 0.0, 0.0), distances, 0)[0]
+    assert (pressed[::2] == plain[::2]).all()
+    light = 50 * np.exp(-distances[0, 1::2] / 0.01)
+    assert pressed[1::2] == pytest.approx(np.minimum(np.log1p(3 * light) / 3, 1), abs=1e-12)
 
 
 def test_a_trial_reads_the_same_in_any_lane() -> None:

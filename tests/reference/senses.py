@@ -42,6 +42,10 @@ def infrared(distances: Sequence[float], reach: float, amplitude: float, decay: 
     return amplitude * returned(distances, reach, decay, [1.0] * len(distances))
 
 
+def compressed(reading: float, compression: float) -> float:
+    return math.log(1 + compression * max(reading, 0.0)) / compression if compression else reading
+
+
 def lorentz(distance: float, reach: float, amplitude: float, half_width: float, peak: float) -> float:
     """Enki's law of one ray: m = amplitude, c = half_width^2, x0 = peak."""
     if distance >= reach:

@@ -15,6 +15,10 @@ from ._toml import toml_table
 MOST_DRAWS = 10_000
 NEAR_END = 0.05  # of the prior's width: what is nearer to an end of it lies at that end
 
+AT_WALL = 0.03
+"""Distance from an interval to an end of the prior, in widths of the interval, below which the prior binds. An interval
+of draws that are even between the ends of the prior is 0.056 away; one of a tail at an end, 0.017."""
+
 _HEAD = """\
 # What was measured of a robot, with intervals of 90 %. `sim:FILE` simulates it with [numbers];
 # `--randomize posterior` draws a column of [draws] for each trial. In meters, radians and seconds.
@@ -38,6 +42,19 @@ class Fitted(Settings):
     unit: str = Field("", description="Such as m/s.")
     advice: str = Field("", description="Where it is not identified: what to record to identify it.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _is_not_identified_by_its_prior(cls, values: Any) -> Any:
+        """An interval that begins at an end of the prior is that of the prior, however narrow it is."""
+        if not isinstance(values, Mapping) or not values.get("identified") or not _is_bound(values):
+            return values
+        low, high, unit = values["prior_low"], values["prior_high"], values.get("unit", "")
+        advice = (
+            f"The prior binds: the estimate is at an end of {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}. Build "
+            "on another robot (--base ROBOT)."
+        )
+        return {**values, "identified": False, "advice": advice}
+
     @model_validator(mode="after")
     def _has_its_ends_in_order(self) -> Self:
         for low, high in (("low", "high"), ("prior_low", "prior_high")):
@@ -53,6 +70,18 @@ class Fitted(Settings):
         ways = [self.estimate - self.prior_low if self.prior_low else math.inf]
         ways += [self.prior_high - self.estimate if self.prior_high else math.inf]
         return self.identified and min(ways) < NEAR_END * (self.prior_high - self.prior_low)
+
+
+def _is_bound(values: Mapping[str, Any]) -> bool:
+    """Whether an interval begins at an end of its prior. At 0, and at 1 of what is at most 1, nothing is cut off."""
+    try:
+        low, high, least, most = (float(values[name]) for name in ("low", "high", "prior_low", "prior_high"))
+    except (KeyError, TypeError, ValueError):
+        return False
+    if low < least or high > most:
+        return False
+    near = AT_WALL * (high - low)
+    return (least != 0.0 and low - least <= near) or ((least, most) != (0.0, 1.0) and most - high <= near)
 
 
 class Calibration(Settings):

@@ -20,6 +20,11 @@ SAME_EVERYWHERE = math.pi  # half angle of a cone that is a full circle [rad]
 HalfAngle = Annotated[NotNegative, Field(le=SAME_EVERYWHERE)]
 
 
+def _without(values: dict[str, Any], unused: dict[str, float]) -> dict[str, Any]:
+    """Return values without those that are as if nobody had said anything."""
+    return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
+
+
 class Contact(Settings):
     """What happens where the body meets something."""
 
@@ -93,12 +98,22 @@ class Drive(Settings):
     battery_sag: NotNegative = Field(
         0.0, description="Share of the speed that is lost in each second of a trial."
     )
+    soft_dead_band: Share = Field(
+        0.0,
+        description="A wheel stands at commands up to this share d of full speed, and starts from 0 there: "
+        "(|u| - d) / (1 - d) of full speed, in both directions.",
+    )
 
     @model_validator(mode="after")
     def _has_its_lowest_level(self) -> Self:
         if self.lowest_level > self.levels:
             raise ValueError(f"lowest_level is {self.lowest_level}, expected at most levels, {self.levels}")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_no_soft_dead_band(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """It came later: a robot without it leaves it out, so that conditions keep their hashes."""
+        return _without(handler(self), {"soft_dead_band": 0.0})
 
 
 class Sample(Settings):
@@ -162,6 +177,10 @@ class RangeSensor(Settings):
         0.0,
         description="P of lorentz: the distance at which a reading is largest [m]; nearer it stays so. Less than W.",
     )
+    compression: NotNegative = Field(
+        0.0,
+        description="c of ir: of the light x the sensor reads ln(1 + c x) / c, after noise_gain, up to 1. 0: x.",
+    )
 
     @model_validator(mode="after")
     def _has_what_its_response_needs(self) -> Self:
@@ -193,11 +212,10 @@ class RangeSensor(Settings):
             )
 
     @model_serializer(mode="wrap")
-    def _without_unused_lorentz(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The numbers of lorentz came later: without it they are left out, so that conditions keep their hashes."""
-        values: dict[str, Any] = handler(self)
-        unused = {} if self.response == "lorentz" else {"half_width": 0.1, "peak": 0.0}
-        return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
+    def _without_later_numbers(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Numbers that came later are left out if they are not used, so that conditions keep their hashes."""
+        lorentz = {} if self.response == "lorentz" else {"half_width": 0.1, "peak": 0.0}
+        return _without(handler(self), lorentz | {"compression": 0.0})
 
 
 class LightSensor(Settings):

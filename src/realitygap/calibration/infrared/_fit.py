@@ -110,8 +110,8 @@ def fit_sensor(
 def _model(robot: RobotModel, number: int, placements: list[Placement], weight: float) -> SensorModel:
     sensor = robot.range[number]
     if sensor.response == "pulses":
-        return PulseReadings(placements, sensor.reach, sensor.pulses, weight)
-    return MixtureReadings(placements, sensor.reach, weight)
+        return PulseReadings(placements, sensor.reach, sensor.pulses, weight, sensor)
+    return MixtureReadings(placements, sensor.reach, weight, sensor)
 
 
 def _values(model: SensorModel, places: Array) -> Array:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap import _special as special
+from realitygap.world import RangeSensor
 
 from ._readings import Array, Placement, Places, logistic
-from ._scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column
+from ._scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column, scaled
 
 STRAY = 1e-6
 """Probability of any reading, so that one that the model cannot make is unlikely and not impossible."""
@@ -43,13 +44,24 @@ class MixtureReadings:
         placements: Where, and what was read.
         reach: Of the sensor [m].
         weight: Of a reading: below 1 where readings tell less than as many independent ones.
+        sensor: The sensor whose scales and compression these are; by default one that sees `REACH` far and does not
+            compress.
     """
 
-    def __init__(self, placements: list[Placement], reach: float, weight: float = 1.0) -> None:
+    def __init__(
+        self,
+        placements: list[Placement],
+        reach: float,
+        weight: float = 1.0,
+        sensor: RangeSensor | None = None,
+    ) -> None:
         self.places = Places.of(placements, reach)
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER)
         self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        if sensor is not None:
+            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
+        self._compression = 0.0 if sensor is None else sensor.compression
         self.step = step_of(np.concatenate([placement.readings for placement in placements]))
         self._edges = _inner_edges(self.step)
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
@@ -87,13 +99,18 @@ class MixtureReadings:
         """
         return self._at(self.places, values)
 
+    def _light(self, readings: Array) -> Array:
+        """What has to come back for readings: noise is on the light, before it is compressed."""
+        c = self._compression
+        return np.asarray(np.expm1(c * readings) / c) if c else readings
+
     def _at(self, places: Places, values: Array) -> Array:
         back, spread, drop, out = _parts(places, self.scales, values)
-        edges = self._edges
+        edges = self._light(self._edges)
         below = special.ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
         normal = np.diff(below, axis=2)
-        even = np.concatenate([[0.0], np.diff(edges), [0.0]])
+        even = np.concatenate([[0.0], np.diff(self._edges), [0.0]])
         rest = 1.0 - drop - out
         mixed = rest[..., None] * normal + out[..., None] * even
         mixed[..., 0] += drop
@@ -104,8 +121,8 @@ class MixtureReadings:
         which, readings, counts = self._rows
         back, spread, drop, out = (part[:, which] for part in _parts(self.places, self.scales, values))
         half = self.step / 2
-        upper = np.where(readings >= 1.0, np.inf, readings + half)
-        lower = np.where(readings <= 0.0, -np.inf, readings - half)
+        upper = np.where(readings >= 1.0, np.inf, self._light(readings + half))
+        lower = np.where(readings <= 0.0, -np.inf, self._light(readings - half))
         normal = special.ndtr((upper - back) / spread) - special.ndtr((lower - back) / spread)
         inside = (readings > 0.0) & (readings < 1.0)
         chance = (1.0 - drop - out) * normal + out * np.where(inside, self.step, half)

@@ -2,7 +2,7 @@
 
 Source: Rosenzweig & Remy, section 2.3: fifty readings at each distance, 3 in apart. Differs: at least three placements
 at each distance, in rounds, so that a battery that drains is not taken for distance, nor a crooked placement for the
-sensor.
+sensor. A sensor that sees less than 18 in far is placed relative to its reach, as its readings fall off nearby.
 """
 
 from __future__ import annotations
@@ -25,6 +25,12 @@ READINGS = 50
 SPACING = 3 * INCH
 """Between distances [m]."""
 
+FEWEST_SPACINGS = 6
+"""Spacings within the reach below which distances are parts of the reach."""
+
+PARTS = tuple(2.0 ** (-k / 2) for k in range(10, 0, -1))
+"""Of the reach: from 1/32 of it on, each the root of 2 of the one before."""
+
 PLACEMENTS = 3
 """At each distance, where no budget says otherwise."""
 
@@ -36,18 +42,22 @@ Rays = Callable[[Pose], Sequence[NDArray[np.float64]]]
 
 
 def sensor_distances(robot: RobotModel) -> list[float]:
-    """From the wall to the foremost range sensor: multiples of 3 in within its reach [m].
+    """Return distances from the wall to the foremost range sensor within its reach [m]: multiples of 3 in, or parts.
 
     Raises:
-        ValueError: The robot has no range sensor, or one that sees less than 3 in.
+        ValueError: The robot has no range sensor.
     """
     reach = max((sensor.reach for sensor in robot.range), default=0.0)
-    distances = [k * SPACING for k in range(1, math.floor(reach / SPACING) + 1)]
-    if not distances:
-        raise ValueError(
-            f"Robot {robot.name!r} has no range sensor that sees {SPACING / INCH:g} in far: there is nothing to fit."
-        )
-    return distances
+    if not reach:
+        raise ValueError(f"Robot {robot.name!r} has no range sensor: there is nothing to fit.")
+    n = math.floor(reach / SPACING)
+    if n >= FEWEST_SPACINGS:
+        return [k * SPACING for k in range(1, n + 1)]
+    rim = max(x for part in robot.body for x, _ in part.outline())
+    recess = max(
+        rim - max(sensor.x for sensor in robot.range), 0.0
+    )  # nearer, the wall would push the body back
+    return [recess + part * (reach - recess) for part in PARTS]
 
 
 def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[TrialPlan]:
@@ -73,7 +83,7 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
     distances = [distance for distance in distances if distance <= room]
     if not distances:
         raise ValueError(
-            f"Arena {arena.name!r} is too short for a robot to stand {SPACING / INCH:g} in from a wall."
+            f"Arena {arena.name!r} is too short for a robot to stand {sensor_distances(robot)[0]:.3g} m from a wall."
         )
     n = PLACEMENTS * len(distances) if n is None else n
     middle = (min(ys) + max(ys)) / 2

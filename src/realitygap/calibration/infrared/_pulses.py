@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from realitygap import _special as special
 
+from realitygap.world import RangeSensor
+
 from ._readings import Array, Placement, Places, logistic
-from ._scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column
+from ._scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column, scaled
 
 STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
@@ -25,14 +27,24 @@ class PulseReadings:
         reach: Of the sensor [m].
         pulses: Sent for one reading.
         weight: Of a reading: below 1 where readings tell less than as many independent ones.
+        sensor: The sensor whose scales these are; by default one that sees `REACH` far.
     """
 
-    def __init__(self, placements: list[Placement], reach: float, pulses: int, weight: float = 1.0) -> None:
+    def __init__(
+        self,
+        placements: list[Placement],
+        reach: float,
+        pulses: int,
+        weight: float = 1.0,
+        sensor: RangeSensor | None = None,
+    ) -> None:
         self.places = Places.of(placements, reach)
         self.pulses = pulses
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
         self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        if sensor is not None:
+            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
 
     @property

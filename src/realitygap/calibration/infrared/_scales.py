@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from realitygap.world import RangeSensor
 
 Array = NDArray[np.float64]
 
@@ -53,6 +55,12 @@ class Scale:
         return float(np.exp(np.mean(np.log(values)))) if self.kind == "ratio" else float(np.mean(values))
 
 
+REACH = 0.5
+"""The reach that the scales below are for [m]; `scaled` makes them those of another sensor."""
+
+ROOM = 10.0
+"""Factor around a sensor's own amplitude, decay and incidence that is thought possible at least."""
+
 _FAR = "Record nearer to the distance from which readings fall to 0, and beyond it."
 
 AMPLITUDE = Scale(
@@ -85,6 +93,19 @@ BATTERY = Scale(
 """Change of the logarithm of the amplitude with each volt."""
 
 
+def scaled(scale: Scale, sensor: RangeSensor) -> Scale:
+    """Return a scale for a sensor: lengths relative to its reach, and with room around the number that its file has."""
+    size = sensor.reach / REACH if scale.unit == "m" else 1.0
+    low, high = scale.low * size, scale.high * size
+    if scale.name in ("amplitude", "decay"):
+        own = getattr(sensor, scale.name)
+        low, high = min(low, own / ROOM) if own else low, max(high, own * ROOM)
+    if scale.name == "incidence":
+        high = max(high, 2 * sensor.incidence)
+    return replace(scale, low=low, high=high)
+
+
 def column(scales: tuple[Scale, ...], values: Array, scale: Scale) -> Array:
     """(m,) the values of one parameter among (m, d) of all; 0 where it is none of them."""
-    return values[:, scales.index(scale)] if scale in scales else np.zeros(len(values))
+    names = [each.name for each in scales]
+    return values[:, names.index(scale.name)] if scale.name in names else np.zeros(len(values))

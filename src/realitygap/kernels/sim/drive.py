@@ -15,7 +15,7 @@ from .turn import sin_cos_of, turned_by
 
 SPEED, TRACK, AXLE, TURN_RATE, GAIN_LEFT, GAIN_RIGHT, BIAS_LEFT, BIAS_RIGHT = range(8)
 DEAD_BAND, LAG, DELAY, DELAY_JITTER, SLIP, TRAVEL_PER_M, TRAVEL_PER_S = range(8, 15)
-HEADING_PER_M, HEADING_PER_S, DRIFT_PER_M, BATTERY_SAG, RISE = range(15, len(DRIVE_NUMBERS))
+HEADING_PER_M, HEADING_PER_S, DRIFT_PER_M, BATTERY_SAG, RISE, SOFT_DEAD_BAND = range(15, len(DRIVE_NUMBERS))
 
 LEAST_LAG = 1e-9  # [s] what stands for no lag, which would be divided by
 SMALL_TURN = 1e-3  # half a turn [rad] below which sin(x) / x is taken from its series
@@ -77,6 +77,21 @@ def _quantize(levels, lowest, left, right):
 
 
 @stage
+def _soften(soft, wheel):
+    """A wheel stands up to a soft dead band, and its speed rises from 0 there to full."""
+    real = wheel.dtype.type
+    for lane in range(LANES):
+        asked = wheel[lane]
+        size = abs(asked) - soft[lane]
+        room = real(1.0) - soft[lane]
+        has_room = room > real(0.0)
+        size = size / (room if has_room else real(1.0))
+        moves = (size > real(0.0)) & has_room
+        size = size if moves else real(0.0)
+        wheel[lane] = size if asked > real(0.0) else -size
+
+
+@stage
 def _to_speeds(speed, sag, seconds, gain_left, gain_right, bias_left, bias_right, left, right):
     real = left.dtype.type
     for lane in range(LANES):
@@ -115,6 +130,9 @@ def _ask(shape, rules, lanes, step):
         _mix_wheels(move, turn, shape.ahead, p[d + DEAD_BAND], left, right)
         if shape.levels > 0:
             _quantize(shape.levels, shape.lowest_level, left, right)
+    if any_above_zero(p[d + SOFT_DEAD_BAND]):
+        _soften(p[d + SOFT_DEAD_BAND], left)
+        _soften(p[d + SOFT_DEAD_BAND], right)
     _to_speeds(
         p[d + SPEED], p[d + BATTERY_SAG], step * rules.step_s, p[d + GAIN_LEFT], p[d + GAIN_RIGHT],
         p[d + BIAS_LEFT], p[d + BIAS_RIGHT], left, right,

@@ -164,6 +164,24 @@ def ir_response(distances, reach, amplitude, rate, reading):
 
 
 @stage
+def compress(compression, reading):
+    """ln(1 + c x) / c of a reading x: less is added the more light there is. 0 leaves it as it is.
+
+    Args:
+        compression: (LANES,) c.
+        reading: Changed; one below 0 becomes 0 where c is above 0.
+    """
+    real = reading.dtype.type
+    for lane in range(LANES):
+        c = compression[lane]
+        x = reading[lane]
+        is_on = c > real(0.0)
+        light = x if x > real(0.0) else real(0.0)
+        pressed = log(real(1.0) + c * light) / (c if is_on else real(1.0))
+        reading[lane] = pressed if is_on else x
+
+
+@stage
 def widening_of(cone, widening):
     """The length of a ray at the edge of a cone before a wall that faces it, as a part of the middle ray's.
 

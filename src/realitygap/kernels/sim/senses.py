@@ -24,6 +24,7 @@ from .light import add_light, answer_light, look_to, prepare_light
 from .noise import PER_BLOCK, gain_noise, mixture, second_word, uniform_noise
 from .pulses import count_pulses, pulse_words
 from .ranges import (
+    compress,
     ir_response,
     limit,
     linear_response,
@@ -57,6 +58,7 @@ N_RANGE = len(RANGE_NUMBERS)
     INCIDENCE,
     HALF_WIDTH,
     PEAK,
+    COMPRESSION,
 ) = (
     RANGE_NUMBERS.index(name)
     for name in (
@@ -74,6 +76,7 @@ N_RANGE = len(RANGE_NUMBERS)
         "incidence",
         "half_width",
         "peak",
+        "compression",
     )
 )
 
@@ -86,6 +89,7 @@ class Senses(NamedTuple):
     )
     noisy: NDArray[np.int32]  # (3,) whether any trial has the paper's noise, gain noise, a mixture
     slanted: NDArray[np.int32]  # (1,) whether any trial has walls that send back less at a slant
+    compressed: NDArray[np.int32]  # (1,) whether any trial has sensors that compress
     near: Rows  # (s,) distance to what is nearest [m]
     dim: Rows  # (s,) the distance at which it would send back as little if it were faced [m]
     lobes: Rows  # (4 * l,) of `prepare_light`
@@ -123,6 +127,7 @@ def make_senses(shape, dtype):
         range_rates=rows(3 * s),
         noisy=np.zeros(3, np.int32),
         slanted=np.zeros(1, np.int32),
+        compressed=np.zeros(1, np.int32),
         near=rows(s),
         dim=rows(s),
         lobes=rows(4 * shape.row_light.size),
@@ -152,6 +157,7 @@ def _start_range(shape, p, senses):
     for k in range(senses.noisy.size):
         senses.noisy[k] = 0
     senses.slanted[0] = 0
+    senses.compressed[0] = 0
     for s in range(shape.row_range.size):
         row = shape.row_range[s]
         rate_of(p[row + DECAY], senses.range_rates[3 * s])
@@ -163,6 +169,8 @@ def _start_range(shape, p, senses):
             widening_of(p[row + CONE], senses.range_rates[3 * s])
         senses.noisy[0] |= _any(p[row + UNIFORM])
         senses.slanted[0] |= _any(p[row + INCIDENCE])
+        if shape.range_response[s] == IR:
+            senses.compressed[0] |= _any(p[row + COMPRESSION])
         if shape.range_response[s] != PULSES:
             senses.noisy[1] |= _any(p[row + GAIN])
             senses.noisy[2] |= _any(p[row + DROP]) | _any(p[row + OUTLIER])
@@ -239,6 +247,8 @@ def _mix(shape, key, lanes, senses, step):
             second_word(words[block + place], words[block + 3], place, value)
             if senses.noisy[1] > 0:
                 gain_noise(value, p[row + GAIN], reading)
+            if senses.compressed[0] > 0 and shape.range_response[s] == IR:
+                compress(p[row + COMPRESSION], reading)
             if senses.noisy[2] > 0:
                 mixture(
                     seen_from[s], words[block + place], value, p[row + DROP : row + DROP + 2],
@@ -272,6 +282,10 @@ def _sense_range(shape, rules, key, lanes, senses, step):
     _respond(shape, lanes, senses)
     if senses.noisy[1] + senses.noisy[2] > 0:
         _mix(shape, key, lanes, senses, step)
+    elif senses.compressed[0] > 0:
+        for s in range(n):
+            if shape.range_response[s] == IR:
+                compress(p[shape.row_range[s] + COMPRESSION], lanes.readings[s])
     _count_all_pulses(shape, key, lanes, senses, step)
     if senses.noisy[0] > 0:
         draw_words_of(PURPOSE_NOISE, step, n, lanes.counters, key, senses.words)

@@ -76,6 +76,7 @@ DRIVE_NUMBERS = (
     "drift_per_m",
     "battery_sag",
     "rise",
+    "soft_dead_band",
 )
 RANGE_NUMBERS = (
     "x",
@@ -97,6 +98,7 @@ RANGE_NUMBERS = (
     "incidence",
     "half_width",
     "peak",
+    "compression",
 )  # then distance and reading of each entry of its table
 LIGHT_NUMBERS = ("x", "y", "direction", "width", "gain", "noise")
 LINE_NUMBERS = ("x", "y", "threshold", "noise")

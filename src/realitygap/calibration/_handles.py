@@ -13,7 +13,7 @@ from ._simulate import Floats, plain_numbers
 
 MOTION = (
     "drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "drive.lag", "drive.delay", "drive.slip",
-    "drive.drift_per_m", "drive.battery_sag",
+    "drive.drift_per_m", "drive.battery_sag", "drive.soft_dead_band",
 )  # fmt: skip
 """What decides the mean of a motion, smoothly."""
 

@@ -94,6 +94,7 @@ ADVICE: dict[str, tuple[str, str, str]] = {
     "drive.delay": (WHEELS, CHANGES, CHANGES),
     "drive.delay_jitter": (WHEELS, f"{CHANGES}, in more trials", f"{CHANGES}, in more trials"),
     "drive.dead_band": (f"{WHEELS} under slow commands", SLOW, SLOW),
+    "drive.soft_dead_band": (f"{WHEELS} under slow commands", SLOW, SLOW),
     "drive.slip": (f"{WHEELS} and poses", CAMERA, f"{WHEELS} besides the poses"),
     "drive.drift_per_m": (CAMERA, CAMERA, RUNS),
     "drive.travel_noise_per_m": (CAMERA, CAMERA, "repeat long straight runs"),

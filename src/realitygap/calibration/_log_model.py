@@ -18,6 +18,9 @@ from ._simulate import Bools, Floats
 LEAST_LAG = 1e-6
 """A lag below this is none [s]."""
 
+LEAST_ROOM = 1e-6
+"""Of the commands that a soft dead band leaves."""
+
 FIRST_TURN = 0.3
 """Standard deviation of the first heading, which positions alone show only later [rad]."""
 
@@ -76,7 +79,7 @@ class Tracked:
     log_likelihood: Floats
 
 
-def wheel_steps(log: Log, numbers: Mapping[str, Floats], *, is_soft: bool) -> Floats:
+def wheel_steps(log: Log, numbers: Mapping[str, Floats]) -> Floats:
     """Return the distance of each wheel between two times, shape (m, n - 1, 2) [m].
 
     A command is late by the delay, and a speed nears it within the lag, as in kernels/sim/drive.py. A command that
@@ -85,7 +88,6 @@ def wheel_steps(log: Log, numbers: Mapping[str, Floats], *, is_soft: bool) -> Fl
     Args:
         log: Times and commands.
         numbers: (m,) of `drive.*`.
-        is_soft: Whether speed begins at 0 at the end of the dead band.
     """
     at = {name.removeprefix("drive."): values[:, None] for name, values in numbers.items()}
     time = log.time_s
@@ -93,10 +95,9 @@ def wheel_steps(log: Log, numbers: Mapping[str, Floats], *, is_soft: bool) -> Fl
     for wheel, side in enumerate(("left", "right")):
         asked = log.commands[None, :, wheel]
         size = np.abs(asked)
-        if is_soft:
-            moved = np.maximum(size - at["dead_band"], 0.0) / np.maximum(1.0 - at["dead_band"], 1e-6)
-        else:
-            moved = np.where(size > at["dead_band"], size, 0.0)
+        soft = at["soft_dead_band"]
+        moved = np.where(size > at["dead_band"], size, 0.0)
+        moved = np.maximum(moved - soft, 0.0) / np.maximum(1.0 - soft, LEAST_ROOM)
         target = at["speed"] * at[f"gain_{side}"] * np.sign(asked) * moved
         target = target + np.where(moved > 0, at[f"bias_{side}"], 0.0)
         steps.append(_rolled(_delayed(target, time, at["delay"]), time, at["lag"]))

@@ -18,14 +18,18 @@ from ._simulate import Floats, plain_numbers
 N_DRAWS = 200
 ENDS = (0.05, 0.95)
 LEAST_ROWS = 10
-IDENTIFIED = 0.5
-"""A parameter is identified if its interval is narrower than this share of its prior's."""
+IDENTIFIED = 0.35
+"""A parameter is identified if its standard deviation is below this, in scales of its prior: half of what the prior has
+at its peak."""
+
+LEAST_CURVATURE = 0.03
+"""Of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
 
 STEP = 1e-3
 """Of finite differences, in standard deviations of the prior."""
 
 METHOD = (
-    "Maximum a posteriori with a normal prior around the robot file's numbers; likelihood of the poses by an extended "
+    "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the poses by an extended "
     "Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder readings; intervals from "
     "the curvature (Laplace)."
 )
@@ -37,9 +41,9 @@ class Spread:
 
     Attributes:
         name: As in a calibration.
-        kind: plus: normal around the robot's own number; ratio: its logarithm is; size: normal, and only its absolute
-            value counts.
-        spread: Standard deviation of the prior; chosen for a robot whose file is nearly right.
+        kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value counts.
+        spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails let
+            go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
         unit: Of its values.
         advice: What to record if it is not identified.
     """
@@ -49,9 +53,19 @@ class Spread:
     spread: float
     unit: str
     advice: str
+    is_normal: bool = False
+
+    def log_prior(self, standard: Floats) -> Floats:
+        """Return log densities at points of the standard scale, less a constant."""
+        return np.asarray(-0.5 * standard**2 if self.is_normal else -np.log1p(standard**2))
+
+    @property
+    def most(self) -> float:
+        """The 95 % quantile of the prior on the standard scale."""
+        return 1.645 if self.is_normal else 6.314
 
     def of(self, own: float, standard: Floats) -> Floats:
-        """Return values at points of a standard normal scale."""
+        """Return values at points of the standard scale."""
         if self.kind == "ratio":
             return np.asarray(own * np.exp(self.spread * standard))
         values = own + self.spread * standard
@@ -59,19 +73,19 @@ class Spread:
 
 
 DRIVE = (
-    Spread("drive.gain", "ratio", 0.1, "", "Drive straight for longer."),
-    Spread("drive.asymmetry", "plus", 0.02, "", "Drive straight, ahead and back."),
-    Spread("drive.track", "ratio", 0.1, "m", "Turn in place, both ways, with poses."),
-    Spread("drive.axle", "plus", 0.01, "m", "Turn in place, both ways, with poses."),
-    Spread("drive.drift_per_m", "plus", 0.05, "rad/m", "Drive straight, ahead and back, with poses."),
-    Spread("drive.dead_band", "size", 0.05, "", "Drive at slow commands."),
-    Spread("drive.lag", "size", 0.05, "s", "Start and stop suddenly, and often."),
+    Spread("drive.gain", "ratio", 0.01, "", "Drive straight for longer."),
+    Spread("drive.asymmetry", "plus", 0.005, "", "Drive straight, ahead and back."),
+    Spread("drive.track", "ratio", 0.01, "m", "Turn in place, both ways, with poses."),
+    Spread("drive.axle", "plus", 0.002, "m", "Turn in place, both ways, with poses."),
+    Spread("drive.drift_per_m", "plus", 0.01, "rad/m", "Drive straight, ahead and back, with poses."),
+    Spread("drive.soft_dead_band", "size", 0.02, "", "Drive at slow commands."),
+    Spread("drive.lag", "size", 0.02, "s", "Start and stop suddenly, and often."),
 )
 """Numbers of the drive; the spreads are chosen."""
 
 OWN_NOISE = (
-    Spread("drive.travel_noise_per_m", "ratio", 1.0, "m", "Record poses for longer."),
-    Spread("drive.heading_noise_per_m", "ratio", 1.0, "rad", "Record poses for longer."),
+    Spread("drive.travel_noise_per_m", "ratio", 1.0, "m", "Record poses for longer.", is_normal=True),
+    Spread("drive.heading_noise_per_m", "ratio", 1.0, "rad", "Record poses for longer.", is_normal=True),
 )
 SEEN_NOISE = {"place": 0.003, "angle": 0.01, "wheel": 0.0005, "wheel_per_m": 0.003}
 """What errors of a camera and of encoders are near [m, rad, m, m]; a factor of e is one standard deviation."""
@@ -122,7 +136,8 @@ def fit_motion_log(
 ) -> MotionLogFit:
     """Fit the drive of a robot to a log, and predict the part that the fit does not see.
 
-    The prior is normal around the robot's own numbers, so that a short log changes them little.
+    The prior is narrow around the robot's own numbers and has long tails. So a short log changes them little, and a file
+    that is wrong does not hold the fit back.
 
     Args:
         time_s: (n,) ascending times [s].
@@ -141,7 +156,8 @@ def fit_motion_log(
     Raises:
         ValueError: The arrays do not fit together, or show too little.
 
-    Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2.
+    Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2; Gelman, Jakulin, Pittau & Su (2008), a
+        weakly informative default prior distribution.
     """
     log = _checked(time_s, commands, poses, encoders, hold_out)
     split = _split(log, hold_out)
@@ -235,7 +251,6 @@ class _Problem:
     log: Log
     own: Mapping[str, float]
     free: tuple[Spread, ...]
-    is_soft: bool
 
     @classmethod
     def of(cls, log: Log, robot: RobotModel) -> _Problem:
@@ -252,11 +267,11 @@ class _Problem:
             names += ("place", "angle") if log.sees_heading else ("place",)
         if log.sees_wheels:
             names += ("wheel", "wheel_per_m")
-        free += tuple(Spread(name, "ratio", 1.0, "m", "") for name in names)
-        return cls(log, own, free, False)
+        free += tuple(Spread(name, "ratio", 1.0, "m", "", is_normal=True) for name in names)
+        return cls(log, own, free)
 
     def values(self, standard: Floats) -> dict[str, Floats]:
-        """Return (m,) of everything at (m, p) points on the scale on which the prior is standard normal."""
+        """Return (m,) of everything at (m, p) points on the standard scales of the parameters."""
         m = len(standard)
         values = {name: np.full(m, value) for name, value in self.own.items()}
         for k, one in enumerate(self.free):
@@ -268,8 +283,8 @@ class _Problem:
     def log_posterior(self, standard: Floats) -> Floats:
         """Return (m,) of (m, p) points."""
         values = self.values(standard)
-        logs = -0.5 * (standard**2).sum(axis=1)
-        steps = wheel_steps(self.log, values, is_soft=self.is_soft)
+        logs = np.sum([one.log_prior(standard[:, k]) for k, one in enumerate(self.free)], axis=0)
+        steps = wheel_steps(self.log, values)
         if self.log.sees_poses:
             logs = logs + track(self.log, steps, values, _noise(values)).log_likelihood
         if self.log.sees_wheels:
@@ -295,7 +310,7 @@ class _Problem:
             [(down(best + wide * row)[1] - down(best - wide * row)[1]) / (2 * wide) for row in np.eye(p)]
         )
         sizes, directions = np.linalg.eigh((slopes + slopes.T) / 2)
-        return best, (directions / np.maximum(sizes, 1.0)) @ directions.T  # no less known than before
+        return best, (directions / np.maximum(sizes, LEAST_CURVATURE)) @ directions.T
 
     def fitted(self, best: Floats, spread: Floats, drawn: Mapping[str, Floats]) -> list[Fitted]:
         """Return the robot's parameters with intervals."""
@@ -303,7 +318,7 @@ class _Problem:
         for k, one in enumerate(self.free):
             if not one.name.startswith("drive."):
                 continue
-            ends = one.of(self.own[one.name], np.array([-1.645, 1.645]))
+            ends = one.of(self.own[one.name], np.array([-one.most, one.most]))
             low, high = np.quantile(drawn[one.name], ENDS)
             identified = bool(np.sqrt(spread[k, k]) < IDENTIFIED)
             rows.append(
@@ -344,7 +359,7 @@ def _predict(problem: _Problem, log: Log, split: int, best: Floats) -> tuple[Hel
         values[one.name][0] = problem.own[one.name]
     for side in ("left", "right"):
         values[f"drive.gain_{side}"][0] = problem.own[f"drive.gain_{side}"]
-    steps = wheel_steps(log, values, is_soft=problem.is_soft)
+    steps = wheel_steps(log, values)
     if log.sees_poses:
         predicted = track(problem.log, steps, values, _noise(values)).poses
         rows = split + np.flatnonzero(np.isfinite(log.poses[split:, 0]))

@@ -120,6 +120,7 @@ DRIVE: tuple[tuple[str, Distribution, str, str], ...] = (
     ("delay", _even(0.0, 0.6), "s", "sudden starts and stops, with --observe encoders or track"),
     ("delay_jitter", _even(0.0, 0.25), "s", "many sudden turns, with --observe track"),
     ("dead_band", _even(0.0, 0.3), "", "slow straight lines of growing speed"),
+    ("soft_dead_band", _even(0.0, 0.2), "", "slow straight lines of growing speed"),
     ("slip", _even(0.0, 0.25), "", "straight lines, with --observe track and encoders: without these it is drive.gain"),
     ("drift_per_m", _even(-0.6, 0.6), "rad/m", "straight lines ahead and back, with --observe track"),
     ("heading_noise_per_m", _ratio(0.004, 0.6), "rad", "straight lines, with --observe track"),

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap import _special as special
-
 from realitygap.world import RangeSensor
 
 from ._readings import Array, Placement, Places, logistic

@@ -112,6 +112,12 @@ class TwinMotors(Settings):
         0.0, description="Share of full speed below which the left wheel stands still."
     )
     dead_band_right: Share = Field(0.0, description="Of the right wheel.")
+    soft_dead_band_left: Share = Field(
+        0.0,
+        description="Share d of full speed up to which the left wheel stands still, and from which it starts from 0: "
+        "(|u| - d) / (1 - d).",
+    )
+    soft_dead_band_right: Share = Field(0.0, description="Soft dead band of the right wheel.")
     torque: Annotated[float, Field(ge=0.005, le=1)] = Field(
         0.25, description="The most that a motor gives, on a full battery [N m]."
     )

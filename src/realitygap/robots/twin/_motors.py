@@ -70,6 +70,14 @@ class PlainSpeeds:
         return self._shares
 
 
+def _softened(share: float, dead_band: float) -> float:
+    """Return the share of full speed that a wheel with a soft dead band turns at."""
+    if not dead_band:
+        return share
+    past = abs(share) - dead_band
+    return math.copysign(past / (1 - dead_band), share) if past > 0 else 0.0
+
+
 class Servo:
     """What becomes of the speeds that a twin's wheels should have.
 
@@ -108,6 +116,8 @@ class Servo:
         work = (abs(left) + abs(right)) / 2
         left = 0.0 if abs(left) < motors.dead_band_left else left
         right = 0.0 if abs(right) < motors.dead_band_right else right
+        left = _softened(left, motors.soft_dead_band_left)
+        right = _softened(right, motors.soft_dead_band_right)
         left *= motors.gain_left
         right *= motors.gain_right
         turn = motors.drift_per_m * self._track / 2 * (left + right) / 2

@@ -7,10 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from realitygap.world import RobotModel
 
-from ._range_table import MeasuredFrom, _gaps, wall_reading
+from ._range_table import NUMBERS, MeasuredFrom, _gaps, _plain, wall_reading
 from ._simulate import Floats
 
-NUMBERS = ("amplitude", "decay", "direction", "cone", "incidence")
 FARTHEST = 6
 """Places of the table between an unseen reading and those that it is looked up from, at most."""
 
@@ -40,7 +39,7 @@ def predict_range_table(
     for k in np.unique(which):
         own = robot.range[k]
         at = which == k
-        numbers = {name: float(getattr(own, name)) for name in NUMBERS}
+        numbers = {number.name: _plain(robot, int(k), number.name) for number in NUMBERS}
         readings[at] = wall_reading(gap[at], bearing[at], numbers, own.reach, own.rays)
     return readings
 

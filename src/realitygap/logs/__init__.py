@@ -16,7 +16,7 @@ from ._open import KINDS, open_source
 from ._range_table import RangeTable, read_range_table
 from ._read import Log, read_logs
 from ._source import Batch, Source
-from ._table_map import TableColumns, TableMap, load_table_map
+from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
 
 __all__ = [
     "KINDS",
@@ -29,6 +29,7 @@ __all__ = [
     "ImportReport",
     "Log",
     "LogMap",
+    "MeasuredFrom",
     "Mistake",
     "Poses",
     "RangeTable",

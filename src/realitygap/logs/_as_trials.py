@@ -20,6 +20,8 @@ FAR_M = 100.0
 """Distance of the walls of an open plane."""
 SLOW = 0.2
 """Share of the usual way of a step below which the path shows no direction."""
+MOST_TRIAL_STEPS = 20_000
+"""Steps of one trial in a file; a longer stretch becomes several."""
 MOST_COMMAND = 1.0005
 """A command may be beyond full speed by the rounding of its unit."""
 NO_HEADING = "The log has no headings: those of these trials are the directions of the path."
@@ -113,7 +115,9 @@ def _known(log: Log, poses: Floats) -> list[tuple[int, int]]:
             known &= np.isfinite(rows).all(1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
     found = [
-        (int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > FEWEST_STEPS
+        (first, min(first + MOST_TRIAL_STEPS, int(end) - 1))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+        for first in range(int(begin), int(end) - FEWEST_STEPS, MOST_TRIAL_STEPS)
     ]
     if not found:
         raise LogError(

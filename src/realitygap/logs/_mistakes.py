@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ SURE = 4.0
 CLEAR = 0.75
 """Concentration of angles around one direction, 0 to 1, beyond which they are one direction."""
 FEWEST_WINDOWS = 8
+MOST_STEPS = 20_000
+"""Of a log that are compared."""
 MOST_LATE_S = 0.5
 """A robot's own lag and delay: what follows later is a clock."""
 SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
@@ -67,6 +69,7 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
         speed: Of a wheel at full command [m/s].
         track: Between the wheels, as the robot's file has it [m].
     """
+    log = _begin(log)
     ways = log.commands * speed * log.step_s
     if not len(log.poses) or not np.abs(ways).max(initial=0.0) > LEAST_WAY:
         return Diagnosis()
@@ -86,6 +89,21 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
     if offset is not None and (offset.high < -log.step_s / 4 or offset.low > MOST_LATE_S):
         mistakes.append(_clock(offset))
     return Diagnosis(tuple(mistakes), offset, measured, gain)
+
+
+def _begin(log: Log) -> Log:
+    """The first part of a log, which shows its mistakes as well as all of it."""
+    n = MOST_STEPS
+    if len(log.commands) <= n:
+        return log
+    return replace(
+        log,
+        commands=log.commands[:n],
+        poses=log.poses[: n + 1],
+        wheels=log.wheels[: n + 1],
+        readings=log.readings[: n + 1],
+        raw_headings=log.raw_headings[: n + 1],
+    )
 
 
 def _clock(offset: ClockOffset) -> Mistake:

@@ -54,6 +54,10 @@ class TableError(RealityGapError):
     """A table of results for `realitygap audit-results` cannot be read as written."""
 
 
+class LogError(RealityGapError):
+    """A log or a table of measurements of a robot cannot be read as its mapping says."""
+
+
 class RobotError(RealityGapError):
     """A robot cannot be reached, or does not do what was asked; the text says whether its motors are stopped."""
 

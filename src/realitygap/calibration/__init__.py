@@ -13,6 +13,8 @@ from ._motion_log import MotionLogFit, fit_motion_log
 from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
+from ._path_baselines import drive_on, look_up_motion
+from ._predict_table import look_up_readings, place_ranks, predict_range_table
 from ._predictive import Misfit, misfits
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._range_table import RangeTableFit, fit_range_table
@@ -48,6 +50,7 @@ __all__ = [
     "Vectors",
     "contact_plans",
     "distance_of",
+    "drive_on",
     "end_pose_of",
     "evidence_of",
     "excitation",
@@ -61,6 +64,8 @@ __all__ = [
     "fit_sensor",
     "independence",
     "information_of",
+    "look_up_motion",
+    "look_up_readings",
     "misfits",
     "mixed",
     "motion_plans",
@@ -69,7 +74,9 @@ __all__ = [
     "numbers_of",
     "of_one_length",
     "path_plans",
+    "place_ranks",
     "placements_of",
+    "predict_range_table",
     "random_controllers",
     "ranges_of",
     "ruled",

@@ -56,8 +56,36 @@ def calibrate(
     ] = False,
     data: Annotated[
         Path | None,
-        typer.Option("--from", metavar="DATA", help="Fit recorded trials instead of driving new ones."),
+        typer.Option(
+            "--from",
+            metavar="DATA",
+            help="Trials, a log of a real robot (motion), or a table of readings (sensors), to fit without driving.",
+        ),
     ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="FILE",
+            help="Mapping of the columns of DATA (.toml). [default: DATA.map.toml next to DATA; otherwise a guess]",
+        ),
+    ] = None,
+    hold_out: Annotated[
+        str | None,
+        typer.Option(
+            "--hold-out",
+            metavar="SHARE|blocks",
+            help="Part of a log or table that the fit does not see, and predicts. [default: 0.5 of a log, blocks of a "
+            "table]",
+        ),
+    ] = None,
+    drop_bad_rows: Annotated[
+        bool,
+        typer.Option(
+            "--drop-bad-rows",
+            help="Leave out rows of a log that lack a number or repeat or turn back the time.",
+        ),
+    ] = False,
     base: Annotated[
         str | None,
         typer.Option(
@@ -109,12 +137,34 @@ def calibrate(
 
     Example: realitygap calibrate sensors --from sensors.trials.jsonl -o sensors.toml
 
+    With --from, a log or a table of another program is fitted, too. A log has commands, and poses or encoders
+    (motion). A table has readings by distance and bearing of a wall (sensors). The error of the fit on the part that
+    it did not see is printed. So are those of the robot file's numbers, of the paper's uniform noise, and of a lookup
+    table. Numbers of the robot file stay if they predict better.
+
+    Example: realitygap calibrate motion --from drive.csv --base pioneer -o drive.toml
+
+    Example: realitygap calibrate sensors --from wall.sample --base khepera -o wall.toml
+
+    In Python: realitygap.study.calibrate_from_log("drive.csv", base="pioneer")
+
+    In Python: realitygap.study.calibrate_from_table("wall.sample", base="khepera")
+
     In Python: realitygap.study.calibrate("sensors", target)
     """
     from realitygap.study import calibrate_from, save_calibration
 
     out = _checked(what, robot, out, observe, data, witness, camera, figure, choose=choose)
-    if data is not None:
+    foreign = _is_foreign(data)
+    if not foreign and (map_file is not None or hold_out is not None or drop_bad_rows):
+        raise StudyError(
+            "--map, --hold-out and --drop-bad-rows go with --from and a log or a table of another program."
+        )
+    if foreign and data is not None:
+        if figure is not None:
+            raise StudyError("--figure draws the readings of trials, and this is a table. Leave it out.")
+        made = _from_foreign(what, data, map_file, base, hold_out, seed, drop_bad_rows=drop_bad_rows)
+    elif data is not None:
         made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
     else:
         made = _measured(
@@ -190,6 +240,41 @@ def _refuse_other_files(out: Path) -> None:
         ) from None
     if made is None:
         raise StudyError(f"{out} is there already, and is no calibration: {stays}")
+
+
+def _is_foreign(data: Path | None) -> bool:
+    """Whether the data was written by another program, or is a recording: it is no file of observed trials."""
+    from realitygap.records import is_observations
+
+    return data is not None and data.exists() and not is_observations(data)
+
+
+def _from_foreign(
+    what: str,
+    data: Path,
+    map_file: Path | None,
+    base: str | None,
+    hold_out: str | None,
+    seed: int,
+    *,
+    drop_bad_rows: bool,
+) -> Calibration:
+    """Fit a log or a table of another program."""
+    from realitygap.study import calibrate_from_log, calibrate_from_table, hold_out_of
+
+    if what == "motion":
+        share = hold_out_of(hold_out or "0.5")
+        return calibrate_from_log(
+            data, map_file=map_file, base=base, hold_out=share, seed=seed, drop_bad_rows=drop_bad_rows
+        )
+    if what == "sensors":
+        return calibrate_from_table(
+            data, map_file=map_file, base=base, hold_out=hold_out_of(hold_out or "blocks"), seed=seed
+        )
+    raise StudyError(
+        f"{data} is no file of observed trials. Of a log, motion can be fitted; of a table of readings, sensors. "
+        f"To fit {what}, import the log first: realitygap import."
+    )
 
 
 def _seen(observe: str | None) -> Any:
@@ -274,12 +359,14 @@ def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) 
     from rich.console import Console
 
     from ._study import NARROWEST
-    from ._tables import calibration_table
+    from ._tables import calibration_table, held_out_table
 
     console = Console()
     if console.width < NARROWEST:
         console = Console(width=NARROWEST)
     console.print(calibration_table(made))
+    if "held_out" in made.evidence:
+        console.print(held_out_table(made.evidence["held_out"], made.label))
     for note in made.notes:
         console.print(note, highlight=False, markup=False)
     if made.misspecified:

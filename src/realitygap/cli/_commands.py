@@ -49,6 +49,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     "Measure and close the gap": (
         Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
+        Command("import", "Turn a log of a real robot into trials.", "_import", "import_log"),
         Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_closing", "closing"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.table import Table
@@ -99,3 +99,28 @@ def _number(value: float | None) -> str:
         return "-"
     text = f"{value:.3f}"
     return text.replace("0.", ".", 1) if abs(value) < 1 else text
+
+
+def held_out_table(held_out: dict[str, Any], label: str) -> Table:
+    """Errors on what a fit did not see: one row a prediction, the fit first."""
+    unit = f" [{held_out['unit']}]" if held_out["unit"] else ""
+    table = Table(
+        title=Text(f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}"),
+        caption=Text(f"error: {held_out['measure']}"),
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+    )
+    table.add_column("prediction", no_wrap=True)
+    table.add_column("error", justify="right", no_wrap=True)
+    for name in held_out["more"]:
+        table.add_column(name, justify="right")
+    for name, error in held_out["errors"].items():
+        more = [held_out["more"][key].get(name) for key in held_out["more"]]
+        table.add_row(
+            *(
+                Text(cell)
+                for cell in (name, f"{error:.3g}", *("-" if x is None else f"{x:.3g}" for x in more))
+            )
+        )
+    return table

@@ -248,6 +248,15 @@ def write_observations(path: Path | str, head: ObservationsHead, trials: Iterabl
     write_whole(Path(path), [_first_line(head), *(_line(trial_to_dict(trial)) for trial in trials)])
 
 
+def is_observations(path: Path | str) -> bool:
+    """Return whether a file begins as one with observed trials does, of this version or another."""
+    path = Path(path)
+    if not path.is_file():
+        return False
+    with reading(path), path.open("rb") as file:
+        return b"realitygap observations" in file.read(200)
+
+
 def read_observations(path: Path | str) -> Observations:
     """Read the trials of a file; a torn last line is left out, and `problem` says so.
 

@@ -3,6 +3,9 @@
 from realitygap.platforms import open_target
 
 from ._bench import measure_speed
+from ._calibrate.from_log import calibrate_from_log
+from ._calibrate.from_table import calibrate_from_table
+from ._calibrate.hold_out import hold_out_of
 from ._calibrate.kinds import NO_LINE
 from ._calibrate.one import calibrate, calibrate_from, save_calibration
 from ._calibrate.whole import calibrate_all
@@ -84,6 +87,8 @@ __all__ = [
     "calibrate",
     "calibrate_all",
     "calibrate_from",
+    "calibrate_from_log",
+    "calibrate_from_table",
     "check_files",
     "check_has_robot",
     "choose_condition",
@@ -92,6 +97,7 @@ __all__ = [
     "drive_study",
     "estimate_mean",
     "gap_between",
+    "hold_out_of",
     "keep_tracked",
     "load_study",
     "machine_facts",

@@ -42,6 +42,7 @@ from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._room import bounds_of, room_of, walls_within
 from ._settings import ArenaSettings
+from ._toml import toml_table
 from ._units import INCH
 from ._visited import VisitedCells, cells_along
 
@@ -103,6 +104,7 @@ __all__ = [
     "room_of",
     "rounded",
     "things_in",
+    "toml_table",
     "walls_within",
     "why_no_part",
 ]

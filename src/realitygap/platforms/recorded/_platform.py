@@ -16,7 +16,7 @@ class RecordedPlatform(Platform):
     """The trials in a file of observed trials."""
 
     name: ClassVar[str] = "recorded"
-    summary: ClassVar[str] = "earlier trials: looked up in a file"
+    summary: ClassVar[str] = "earlier trials: looked up in a file or a log"
     rest: ClassVar[str] = "FILE"
     rest_setting: ClassVar[str] = "file"
     needs_rest: ClassVar[bool] = True

@@ -13,7 +13,16 @@ import numpy as np
 from realitygap._closing import ClosedOnExit
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, ObservedTrial, read_observations, sees
+from realitygap.logs import head_of, mapping_of, read_logs, robot_of, trials_of
+from realitygap.records import (
+    OBSERVATIONS,
+    Observations,
+    Observe,
+    ObservedTrial,
+    is_observations,
+    read_observations,
+    sees,
+)
 from realitygap.robots import Label
 from realitygap.trials import TellTrial, TrialPlan, check_plans, those_that_count
 from realitygap.world import Arena
@@ -29,7 +38,7 @@ class RecordedTarget(ClosedOnExit):
     Trials that were cut off are left out; of several with one number and controller the last counts.
 
     Args:
-        path: A file of observed trials.
+        path: A file of observed trials, or a log with a mapping next to it.
         name: As the user named it.
 
     Attributes:
@@ -38,18 +47,24 @@ class RecordedTarget(ClosedOnExit):
 
     Raises:
         RecordError: It cannot be read, or has no whole trial of a controller.
+        LogError: It is a log, and does not go together with its mapping.
     """
 
     is_paced = True
     inputs = None
 
     def __init__(self, path: str | Path, name: str = "") -> None:
-        found = read_observations(path)
+        found = (
+            read_observations(path) if is_observations(path) or not Path(path).exists() else _imported(path)
+        )
         whole = {
             (trial.genome, trial.number): trial for trial in those_that_count(found.trials) if trial.genome
         }
         if not whole:
-            raise RecordError(f"{path} has no whole trial of a controller.")
+            raise RecordError(
+                f"{path} has no whole trial of a controller. If it is a log, name the controller that drove it: "
+                "controller = FILE in its mapping."
+            )
         self._path = Path(path)
         self._trials = list(whole.values())
         self.name = name or f"recorded:{path}"
@@ -96,6 +111,17 @@ class RecordedTarget(ClosedOnExit):
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+def _imported(path: str | Path) -> Observations:
+    """The trials of a log, with the mapping next to it."""
+    log_map, _ = mapping_of(path)
+    name, robot = robot_of(log_map)
+    logs = list(read_logs(path, log_map, robot))
+    trials: list[ObservedTrial] = []
+    for log in logs:
+        trials += trials_of(log, log_map, len(trials))
+    return Observations(head_of(path, log_map, name, logs[0]), tuple(trials))
 
 
 def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:

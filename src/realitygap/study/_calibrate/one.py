@@ -112,7 +112,9 @@ def _calibrated(
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
     parts = _fit(kind, trials, robot, target.arena, observe, seed)
-    return _calibration(kind, parts, robot, target.name, target.label, observe, trials, target.arena, seed)
+    return calibration_of(
+        kind, parts, robot, target.name, target.label, observe, trials, target.arena.name, seed
+    )
 
 
 def _chosen(
@@ -136,7 +138,9 @@ def _chosen(
         made.misspecification_p,
         made.evidence,
     )
-    made_of = _calibration("all", parts, robot, target.name, target.label, observe, (), target.arena, seed)
+    made_of = calibration_of(
+        "all", parts, robot, target.name, target.label, observe, (), target.arena.name, seed
+    )
     return made_of.model_copy(update={"trials": made.trials, "step_s": made.step_s})
 
 
@@ -214,10 +218,17 @@ def calibrate_from(
     trials = [_seen_as(trial, seen) for trial in those_that_count(found.trials)]
     _refuse_other_readings(trials, load_robot(robot))
     parts = _fit(kind, trials, robot, arena, seen, seed)
-    made = _calibration(kind, parts, robot, found.head.target, found.head.label, seen, trials, arena, seed)
-    last = datetime.datetime.fromtimestamp(data.stat().st_mtime, datetime.UTC)
-    more = {"measured": last.isoformat(timespec="seconds")}
+    made = calibration_of(
+        kind, parts, robot, found.head.target, found.head.label, seen, trials, arena.name, seed
+    )
+    more = {"measured": measured_at(data)}
     return made.model_copy(update=more | ({"notes": (*made.notes, found.problem)} if found.problem else {}))
+
+
+def measured_at(path: Path) -> str:
+    """Return when a file of measurements was last changed, ISO 8601."""
+    last = datetime.datetime.fromtimestamp(path.stat().st_mtime, datetime.UTC)
+    return last.isoformat(timespec="seconds")
 
 
 def _arena_of(path: Path, found: Observations) -> Arena:
@@ -288,7 +299,7 @@ def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
     return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
 
 
-def _calibration(
+def calibration_of(
     kind: str,
     parts: Parts,
     robot: str | Path,
@@ -296,7 +307,7 @@ def _calibration(
     label: str,
     observe: Observe,
     trials: Sequence[ObservedTrial],
-    arena: Arena,
+    arena: str,
     seed: int,
 ) -> Calibration:
     """The parts of a fit laid over an earlier calibration, where it builds on one."""
@@ -326,7 +337,7 @@ def _calibration(
         trials=len(trials),
         step_s=step_s,
         date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        arena=arena.name,
+        arena=arena,
         seed=seed,
         software=SOFTWARE,
         method=parts.method,

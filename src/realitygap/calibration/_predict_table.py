@@ -1,0 +1,95 @@
+"""The readings that a robot's sensors are expected to have along a wall, and what a table of them says by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from realitygap.world import RobotModel
+
+from ._range_table import NUMBERS, MeasuredFrom, _gaps, _plain, wall_reading
+from ._simulate import Floats
+
+FARTHEST = 6
+"""Places of the table between an unseen reading and those that it is looked up from, at most."""
+
+
+def predict_range_table(
+    sensor: ArrayLike,
+    distance_m: ArrayLike,
+    bearing_rad: ArrayLike,
+    robot: RobotModel,
+    *,
+    measured_from: MeasuredFrom = "body",
+) -> Floats:
+    """Return the expected readings of a robot along a long, straight wall, shape (n,), 0 to 1.
+
+    Args:
+        sensor: (n,) index of the range sensor in the robot's file.
+        distance_m: (n,) shortest distance to the wall [m].
+        bearing_rad: (n,) direction from the robot to the nearest point of the wall, positive to the left [rad].
+        robot: The robot; its sensors have the response `ir`.
+        measured_from: The point that distances are measured from, as in `fit_range_table`.
+    """
+    which = np.asarray(sensor, np.int64)
+    gap, bearing = _gaps(
+        which, np.asarray(distance_m, np.float64), np.asarray(bearing_rad, np.float64), robot, measured_from
+    )
+    readings = np.empty(len(which))
+    for k in np.unique(which):
+        own = robot.range[k]
+        at = which == k
+        numbers = {number.name: _plain(robot, int(k), number.name) for number in NUMBERS}
+        readings[at] = wall_reading(gap[at], bearing[at], numbers, own.reach, own.rays)
+    return readings
+
+
+def look_up_readings(
+    sensor: ArrayLike,
+    distance_m: ArrayLike,
+    bearing_rad: ArrayLike,
+    readings: ArrayLike,
+    seen: NDArray[np.bool_],
+) -> Floats:
+    """Return the mean of the nearest seen readings of the same sensor for each place, shape (n,).
+
+    Places are neighbors by the ranks of their distances and bearings. nan if no seen place is near.
+
+    Args:
+        sensor: (n,) index of the range sensor.
+        distance_m: (n,) [m].
+        bearing_rad: (n,) [rad].
+        readings: (n,) 0 to 1.
+        seen: (n,) whether a reading is in the table that is looked up.
+    """
+    which, values = np.asarray(sensor, np.int64), np.asarray(readings, np.float64)
+    row, column = place_ranks(distance_m, bearing_rad)
+    shape = (int(which.max()) + 1, int(row.max()) + 1 + 2 * FARTHEST, int(column.max()) + 1 + 2 * FARTHEST)
+    total, count = np.zeros(shape), np.zeros(shape)
+    at = which, row + FARTHEST, column + FARTHEST
+    np.add.at(total, tuple(part[seen] for part in at), values[seen])
+    np.add.at(count, tuple(part[seen] for part in at), 1.0)
+    found = np.full(len(which), np.nan)
+    for reach in range(1, FARTHEST + 1):
+        steps = [
+            (i, j)
+            for i in range(-reach, reach + 1)
+            for j in range(-reach, reach + 1)
+            if 0 < abs(i) + abs(j) <= reach
+        ]
+        near = [(at[0], at[1] + i, at[2] + j) for i, j in steps]
+        n = np.sum([count[place] for place in near], axis=0)
+        mean = np.divide(
+            np.sum([total[place] for place in near], axis=0), n, out=np.full(len(n), np.nan), where=n > 0
+        )
+        found = np.where(np.isnan(found), mean, found)
+    return found
+
+
+def place_ranks(distance_m: ArrayLike, bearing_rad: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the ranks of distances and bearings among all of a table, both (n,)."""
+    ranks = [
+        np.unique(np.round(np.asarray(values, np.float64), 6), return_inverse=True)[1].astype(np.int64)
+        for values in (distance_m, bearing_rad)
+    ]
+    return ranks[0], ranks[1]

@@ -1,0 +1,122 @@
+"""`realitygap import`."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from realitygap.errors import LogError
+
+if TYPE_CHECKING:
+    from realitygap.logs import ImportReport, LogMap
+
+
+def import_log(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="Text table, Parquet, MCAP, bag of ROS, LeRobot dataset, or recording; or the folder of its files.",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="File of trials to write (.jsonl).")
+    ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="FILE",
+            help="Mapping of the columns (.toml). [default: LOG.map.toml next to LOG; otherwise a guess]",
+        ),
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT", help="Robot that drove: a name or a file. [default: as the mapping says]"
+        ),
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001, metavar="SECONDS", help="Length of a step. [default: interval of the commands]"
+        ),
+    ] = None,
+    drop_bad_rows: Annotated[
+        bool,
+        typer.Option(
+            "--drop-bad-rows", help="Leave out rows that lack a number or repeat or turn back the time."
+        ),
+    ] = False,
+    show_map: Annotated[
+        bool, typer.Option("--show-map", help="Print the mapping as TOML, and write nothing.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+) -> None:
+    """Turn a log of a real robot into trials.
+
+    A mapping says which column is what, in which unit, with which sign, and by which clock. Without a mapping, the
+    names of the columns are used. --show-map prints the mapping as TOML, to be saved and changed.
+
+    All parts are resampled to steps of one length. The report gives the method of each part, and the time by which
+    poses follow commands. It also names the usual mistakes: wheels that are swapped or reversed, half of the track,
+    degrees, millimeters, ticks, and clocks that differ.
+
+    Example: realitygap import drive.csv --show-map > drive.map.toml
+
+    Example: realitygap import drive.csv -o trials.jsonl
+
+    In Python: realitygap.logs.import_log("drive.csv", "trials.jsonl", log_map)
+    """
+    from realitygap import logs
+
+    log_map, origin = logs.mapping_of(log, map_file)
+    if step is not None:
+        log_map = log_map.model_copy(update={"step_s": step})
+    if show_map:
+        typer.echo(log_map.to_toml(), nl=False)
+        return
+    if out is None:
+        raise LogError(
+            "Name the file that the trials go to: -o trials.jsonl. Or print the mapping: --show-map."
+        )
+    if out.suffix != ".jsonl":
+        raise LogError(
+            f"{out} does not end in .jsonl. Expected the name of a file of trials, such as trials.jsonl."
+        )
+    if out.resolve() == log.resolve():
+        raise LogError(f"{out} is the log itself. Name another file.")
+    report = logs.import_log(log, out, log_map, base=base, drop_bad_rows=drop_bad_rows)
+    if as_json:
+        typer.echo(json.dumps({"file": str(out), **dataclasses.asdict(report)}, indent=2))
+        return
+    _print(log, out, log_map, origin, report)
+
+
+def _print(log: Path, out: Path, log_map: LogMap, origin: str, report: ImportReport) -> None:
+    trials = "1 trial" if report.n_trials == 1 else f"{report.n_trials:,} trials"
+    seconds = report.n_steps * report.step_s
+    typer.echo(
+        f"{log} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}"
+    )
+    typer.echo(f"Mapping: {origin}.")
+    if "guessed" in origin:
+        typer.echo("".join(f"  {line}\n" for line in log_map.to_toml().splitlines()), nl=False)
+    for note in report.notes:
+        typer.echo(note)
+    offset = report.offset
+    if offset is not None:
+        typer.echo(
+            f"Poses follow commands by {offset.seconds:.2f} s ({offset.low:.2f} to {offset.high:.2f}), a robot's lag "
+            "and delay included."
+        )
+    for mistake in report.mistakes:
+        typer.echo(f"Check ({mistake.kind}): {mistake.message}")
+    typer.echo(
+        f"Written: {out}. Fit a robot to it: realitygap calibrate motion --from {shlex.quote(str(log))}"
+    )

@@ -1,0 +1,147 @@
+"""A log as observed trials: what `calibrate`, `gap`, and the platform `recorded` work with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from realitygap.errors import LogError
+from realitygap.evolution import Genome
+from realitygap.records import ObservationsHead, Observe, ObservedTrial
+from realitygap.world import Arena, Grid, Pose, load_arena
+
+from ._log_map import LogMap
+from ._read import FEWEST_STEPS, Log
+from ._source import Floats
+
+FAR_M = 100.0
+"""Distance of the walls of an open plane."""
+SLOW = 0.2
+"""Share of the usual way of a step below which the path shows no direction."""
+MOST_TRIAL_STEPS = 20_000
+"""Steps of one trial in a file; a longer stretch becomes several."""
+MOST_COMMAND = 1.0005
+"""A command may be beyond full speed by the rounding of its unit."""
+NO_HEADING = "The log has no headings: those of these trials are the directions of the path."
+
+
+def arena_of(log_map: LogMap) -> Arena:
+    """Return the arena of a log: the one that its mapping names, or an open plane."""
+    if log_map.arena:
+        return load_arena(log_map.arena)
+    a = FAR_M
+    walls = ((-a, -a, a, -a), (a, -a, a, a), (a, a, -a, a), (-a, a, -a, -a))
+    return Arena("open", walls, Grid(-a, -a, 2 * a, 1, 1), Pose(0.0, 0.0, 0.0))
+
+
+def head_of(path: str | Path, log_map: LogMap, robot: str, log: Log) -> ObservationsHead:
+    """Return what all trials of a log have in common.
+
+    Args:
+        path: The log.
+        log_map: Its mapping.
+        robot: The robot by name or file.
+        log: One of its trials.
+    """
+    return ObservationsHead(
+        target=str(path), label=log_map.label, robot=robot, arena=arena_of(log_map).to_dict(), step_s=log.step_s,
+        observe=_observe_of(log),
+    )  # fmt: skip
+
+
+def _observe_of(log: Log) -> Observe:
+    if len(log.poses):
+        return "track"
+    return "encoders" if len(log.wheels) else "readings"
+
+
+def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[ObservedTrial]:
+    """Yield the stretches of a log in which everything is known, as trials.
+
+    Args:
+        log: One trial of a log.
+        log_map: Its mapping.
+        first: Number of the first stretch.
+
+    Raises:
+        LogError: A wheel is told to be faster than the robot can be, or nothing is known of any stretch.
+    """
+    left, right = log.commands.T
+    fastest = float(np.abs(log.commands).max(initial=0.0))
+    if fastest > MOST_COMMAND:
+        k = int(np.argmax(np.abs(log.commands).max(1)))
+        raise LogError(
+            f"At {log.time_s[k]:.4g} s a wheel is told {fastest:.3g} times the robot's full speed. Set speed in the "
+            "mapping to its full speed [m/s], or name the robot that drove with --base."
+        )
+    poses = log.poses
+    if len(poses) and not log.has_heading:
+        poses = np.column_stack([poses[:, :2], path_headings(poses[:, :2], left + right)])
+    genome = _controller(log_map)
+    number = first
+    for begin, end in _known(log, poses):
+        rows = slice(begin, end + 1)
+        start = poses[begin] if len(poses) else np.zeros(3)
+        wheels = log.wheels[rows] - log.wheels[begin] if len(log.wheels) else log.wheels
+        commands = np.clip(np.stack([(left + right) / 2, (right - left) / 2], 1)[begin:end], -1, 1)
+        yield ObservedTrial(
+            start=(float(start[0]), float(start[1]), float(start[2])),
+            step_s=log.step_s,
+            commands=commands,
+            readings=log.readings[begin:end] if len(log.readings) else np.empty((end - begin, 0)),
+            stalled=np.zeros(end - begin, np.bool_),
+            cells=(),
+            wheels=wheels,
+            poses=poses[rows] if len(poses) else poses,
+            genome=genome,
+            number=number,
+            purpose="controller" if genome else "motion",
+        )
+        number += 1
+
+
+def _controller(log_map: LogMap) -> str:
+    return Genome.load(log_map.controller).to_json() if log_map.controller else ""
+
+
+def _known(log: Log, poses: Floats) -> list[tuple[int, int]]:
+    """First step and end of each stretch in which everything is known."""
+    known = np.ones(len(log.commands) + 1, bool)
+    known[:-1] &= np.isfinite(log.commands).all(1)
+    for rows in (poses, log.wheels, log.readings):
+        if len(rows):
+            known &= np.isfinite(rows).all(1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
+    found = [
+        (first, min(first + MOST_TRIAL_STEPS, int(end) - 1))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+        for first in range(int(begin), int(end) - FEWEST_STEPS, MOST_TRIAL_STEPS)
+    ]
+    if not found:
+        raise LogError(
+            f"No stretch of {FEWEST_STEPS} steps has commands and all that was seen. Choose a longer step_s, or leave "
+            "out a part of the mapping."
+        )
+    return found
+
+
+def path_headings(xy: Floats, forward: Floats) -> Floats:
+    """Return (n + 1,) headings of a robot that moves along its heading, from its path [rad].
+
+    Where it hardly moves the heading is interpolated.
+
+    Args:
+        xy: (n + 1, 2) positions [m]; nan where it was not seen.
+        forward: (n,) positive if it was told to go ahead.
+    """
+    steps = np.diff(xy, axis=0) * np.where(forward < 0, -1, 1)[:, None]
+    way = np.hypot(*steps.T)
+    moving = way[np.isfinite(way) & (way > 0)]
+    if not len(moving):
+        return np.zeros(len(xy))
+    clear = np.flatnonzero(way > SLOW * np.median(moving))
+    # the direction of a step is the heading in its middle
+    direction = np.unwrap(np.arctan2(steps[clear, 1], steps[clear, 0]))
+    return np.asarray(np.interp(np.arange(len(xy)), clear + 0.5, direction))

@@ -1,0 +1,191 @@
+"""Bags of ROS, and MCAP: messages on topics, whose fields are columns named as `/odom/pose/pose/position/x`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realitygap.errors import LogError, from_extra
+
+from ._source import RECORDED, Batch, check_columns
+
+BATCH_MESSAGES = 20_000
+MOST_FIELDS = 400
+"""Numbers of a message that are offered as columns: not the pixels of an image."""
+MOST_LIST = 64
+NS = 1e-9
+
+
+class BagSource:
+    """A bag of ROS 2 (a folder, .db3, .mcap), one of ROS 1 (.bag), or MCAP with JSON messages.
+
+    Raises:
+        LogError: The file is damaged or cut off, or has none of these.
+        MissingExtraError: The extra `import` is not installed.
+    """
+
+    is_table = False
+    rate_hz = 0.0
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.suffix == ".mcap" and _is_json(path):
+            self._messages: Any = _JsonMessages(path)
+        else:
+            self._messages = _RosMessages(path)
+        self._columns: list[str] | None = None
+
+    def columns(self) -> list[str]:
+        """The names of the columns that the first message on each topic has."""
+        if self._columns is None:
+            found: dict[str, None] = {}
+            for topic in self._messages.topics():
+                for _, message in self._messages.read(topic):
+                    found |= dict.fromkeys(list(_flat(topic, message))[:MOST_FIELDS])
+                    found[f"{topic}/{RECORDED}"] = None
+                    break
+            self._columns = list(found)
+        return self._columns
+
+    def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
+        """As `Source.batches`; all columns have to be of one topic."""
+        if rows:
+            raise LogError(f"{self.path} is a bag: `rows` is for text files. Leave it out of the mapping.")
+        topic = self._topic_of([name for name in names if name != RECORDED])
+        wanted = [name if name != RECORDED else f"{topic}/{RECORDED}" for name in names]
+        check_columns(self, wanted)
+        first, table = 1, []
+        for time_s, message in self._messages.read(topic):
+            values = _flat(topic, message)
+            values[f"{topic}/{RECORDED}"] = time_s
+            table.append([values.get(name, np.nan) for name in wanted])
+            if len(table) == BATCH_MESSAGES:
+                yield _batch(first, names, table)
+                first, table = first + len(table), []
+        if table:
+            yield _batch(first, names, table)
+
+    def _topic_of(self, names: Sequence[str]) -> str:
+        topics = sorted(self._messages.topics(), key=len, reverse=True)
+        found = {next((topic for topic in topics if name.startswith(f"{topic}/")), "") for name in names}
+        if len(found) == 1 and "" not in found:
+            return str(found.pop())
+        if "" in found:
+            check_columns(self, names)
+        raise LogError(
+            f"{self.path}: {', '.join(names)} are of {len(found)} topics, expected one for each part of the mapping."
+        )
+
+
+def _batch(first: int, names: Sequence[str], table: list[list[float]]) -> Batch:
+    values = np.array(table, np.float64).reshape(len(table), len(names))
+    return Batch(first, {name: values[:, k] for k, name in enumerate(names)})
+
+
+class _RosMessages:
+    """Messages of a bag of ROS 1 or 2, by the library rosbags."""
+
+    def __init__(self, path: Path) -> None:
+        highlevel = from_extra("rosbags.highlevel", "import")
+        typesys = from_extra("rosbags.typesys", "import")
+        self.path = path
+        try:
+            self._reader = highlevel.AnyReader(
+                [path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST)
+            )
+            self._reader.open()
+        except Exception as error:  # rosbags, sqlite, and decompressors raise many kinds
+            raise _damaged(path, error) from error
+
+    def topics(self) -> list[str]:
+        return list(self._reader.topics)
+
+    def read(self, topic: str) -> Iterator[tuple[float, Any]]:
+        connections = [each for each in self._reader.connections if each.topic == topic]
+        try:
+            for connection, stamp, data in self._reader.messages(connections):
+                yield stamp * NS, self._reader.deserialize(data, connection.msgtype)
+        except Exception as error:
+            raise _damaged(self.path, error) from error
+
+
+class _JsonMessages:
+    """Messages of an MCAP file that are JSON, by the library mcap."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._topics = list(dict.fromkeys(channel.topic for channel in _channels(path)))
+
+    def topics(self) -> list[str]:
+        return self._topics
+
+    def read(self, topic: str) -> Iterator[tuple[float, Any]]:
+        make_reader = from_extra("mcap.reader", "import").make_reader
+        try:
+            with self.path.open("rb") as file:
+                for _, _, message in make_reader(file).iter_messages(topics=[topic]):
+                    yield message.log_time * NS, json.loads(message.data)
+        except Exception as error:
+            raise _damaged(self.path, error) from error
+
+
+def _channels(path: Path) -> list[Any]:
+    make_reader = from_extra("mcap.reader", "import").make_reader
+    try:
+        with path.open("rb") as file:
+            summary = make_reader(file).get_summary()
+    except Exception as error:
+        raise _damaged(path, error) from error
+    return list(summary.channels.values()) if summary is not None else []
+
+
+def _is_json(path: Path) -> bool:
+    channels = _channels(path)
+    return bool(channels) and all(channel.message_encoding == "json" for channel in channels)
+
+
+def _damaged(path: Path, error: Exception) -> LogError:
+    said = str(error).strip().split("\n")[0].rstrip(".")[:200] or type(error).__name__
+    if path.suffix == ".mcap":
+        advice = f"If it was cut off, `mcap recover {path.name}` saves the whole messages."
+    else:
+        advice = "Record it again, or reindex it with `ros2 bag reindex`."
+    return LogError(f"{path} is damaged, cut off, or no such file ({type(error).__name__}: {said}). {advice}")
+
+
+def _flat(place: str, value: Any) -> dict[str, float]:
+    """The numbers of a message by the path of their fields."""
+    if isinstance(value, bool | int | float | np.number):
+        return {place: float(value)}
+    if isinstance(value, dict):
+        fields = value
+    elif isinstance(value, list | tuple | np.ndarray):
+        if len(value) > MOST_LIST:
+            return {}
+        return {
+            key: number
+            for k, part in enumerate(value)
+            for key, number in _flat(f"{place}[{k}]", part).items()
+        }
+    elif hasattr(value, "__dataclass_fields__"):
+        fields = {name: getattr(value, name) for name in value.__dataclass_fields__ if name != "__msgtype__"}
+    else:
+        return {}
+    found: dict[str, float] = {}
+    for name, part in fields.items():
+        found |= _flat(f"{place}/{name}", part)
+    if {"sec", "nanosec"} <= set(fields):  # the time of a header
+        found[place] = float(fields["sec"]) + float(fields["nanosec"]) * NS
+    names = fields.get("name")
+    if isinstance(names, list) and all(isinstance(name, str) for name in names):  # the state of joints
+        for kind in ("position", "velocity", "effort"):
+            values = fields.get(kind, ())
+            if len(values) == len(names):
+                found |= {
+                    f"{place}/{name}/{kind}": float(part) for name, part in zip(names, values, strict=True)
+                }
+    return found

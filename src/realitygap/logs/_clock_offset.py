@@ -1,0 +1,105 @@
+"""The time by which the poses of a robot follow its commands, by cross-correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._source import Floats
+
+LONGEST_S = 3.0
+"""The longest offset that is looked for."""
+N_BLOCKS = 16
+N_DRAWS = 400
+INTERVAL = (0.05, 0.95)
+FEWEST_STEPS = 40
+LEAST_SCORE = 0.15
+"""Squared correlation below which no offset is reported."""
+
+
+@dataclass(frozen=True)
+class ClockOffset:
+    """The time by which one signal follows another.
+
+    Attributes:
+        seconds: Positive if the second signal is later [s].
+        low, high: Its 90 % interval [s].
+        correlation: At this offset, the root of the mean squared correlation of the signals.
+    """
+
+    seconds: float
+    low: float
+    high: float
+    correlation: float
+
+
+def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) -> ClockOffset | None:
+    """Return the time by which one set of signals follows another; None if they do not show it.
+
+    The sign of a correlation does not count: wheels may be swapped.
+
+    Args:
+        told: (n, k) signals, such as speed and turn rate by the wheels.
+        seen: (n, k) the same signals by the poses; nan where unknown.
+        step_s: Between two rows [s].
+        seed: Of the draws.
+
+    Source: peak of the cross-correlation, with a parabola through its neighbors; interval by a bootstrap of blocks
+        of time (Künsch 1989).
+    """
+    n = len(told)
+    most = min(round(LONGEST_S / step_s), n // 4)
+    if n < FEWEST_STEPS or most < 2:
+        return None
+    lags = np.arange(-most, most + 1)
+    sums = np.stack([_block_sums(told, seen, int(lag)) for lag in lags])  # lag, block, signal, moment
+    score = _score(sums.sum(1))
+    if not np.isfinite(score).any() or np.nanmax(score) < LEAST_SCORE:
+        return None
+    best = _peak(lags, score)
+    rng = np.random.default_rng(seed)
+    weights = rng.multinomial(N_BLOCKS, np.full(N_BLOCKS, 1 / N_BLOCKS), N_DRAWS)
+    drawn = [_peak(lags, _score(np.einsum("lbsm,b->lsm", sums, weight))) for weight in weights]
+    low, high = np.nanquantile(drawn, INTERVAL)
+    return ClockOffset(
+        best * step_s, float(low) * step_s, float(high) * step_s, float(np.sqrt(np.nanmax(score)))
+    )
+
+
+def _block_sums(told: Floats, seen: Floats, lag: int) -> Floats:
+    """(blocks, k, 6) moments of the pairs of a lag: n, x, y, xx, yy, xy."""
+    n = len(told)
+    x = told[max(0, -lag) : n - max(0, lag)]
+    y = seen[max(0, lag) : n - max(0, -lag)]
+    known = np.isfinite(y) & np.isfinite(x)
+    x, y = np.where(known, x, 0.0), np.where(known, y, 0.0)
+    moments = np.stack([known.astype(float), x, y, x * x, y * y, x * y], -1)
+    # blocks lie at the same times of `told` for all lags
+    edges = np.clip(np.linspace(0, n, N_BLOCKS + 1).astype(int) - max(0, -lag), 0, len(x))
+    total = np.concatenate([np.zeros((1, *moments.shape[1:])), np.cumsum(moments, 0)])
+    return np.asarray(np.diff(total[edges], axis=0))
+
+
+def _score(sums: Floats) -> Floats:
+    """(lags,) mean squared correlation over the signals that vary."""
+    n, x, y, xx, yy, xy = np.moveaxis(sums, -1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        vx, vy, cov = xx - x * x / n, yy - y * y / n, xy - x * y / n
+        squared = cov * cov / (vx * vy)
+    varies = (vx > 1e-9 * np.maximum(xx, 1e-30)) & (vy > 1e-9 * np.maximum(yy, 1e-30)) & (n > 8)
+    weights = varies.astype(float)
+    total = weights.sum(-1)
+    return np.where(total > 0, np.nansum(np.where(varies, squared, 0.0), -1) / np.maximum(total, 1), np.nan)
+
+
+def _peak(lags: np.ndarray, score: Floats) -> float:
+    """The lag of the peak, between the lags by a parabola."""
+    if not np.isfinite(score).any():
+        return float("nan")
+    k = int(np.nanargmax(score))
+    if not 0 < k < len(lags) - 1 or not np.isfinite(score[k - 1 : k + 2]).all():
+        return float(lags[k])
+    before, at, after = score[k - 1 : k + 2]
+    bend = before - 2 * at + after
+    return float(lags[k] + (0.5 * (before - after) / bend if bend < 0 else 0.0))

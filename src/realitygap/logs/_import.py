@@ -1,0 +1,160 @@
+"""The import of a log: its trials in a file of observed trials, and a report of what was done and found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from realitygap.errors import LogError
+from realitygap.records import ObservedTrial, write_observations
+from realitygap.world import RobotModel, load_robot, robot_names
+
+from ._as_trials import NO_HEADING, head_of, trials_of
+from ._clock_offset import ClockOffset
+from ._guess import guess_log_map
+from ._log_map import LogMap, load_log_map
+from ._mistakes import Mistake, diagnose
+from ._read import Log, read_logs
+
+MOST_DIAGNOSED = 20
+"""Trials of a log that are searched for mistakes; those after them have the same."""
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """The results of an import.
+
+    Attributes:
+        n_trials: Trials that were written.
+        n_steps: Their steps.
+        step_s: Length of a step [s].
+        observe: What was seen of the robot.
+        notes: What was done to the rows of the first trial.
+        mistakes: What in the log cannot be as the mapping says, each kind once.
+        offset: By how much poses follow commands in the longest trial; None if the log does not show it.
+    """
+
+    n_trials: int = 0
+    n_steps: int = 0
+    step_s: float = 0.0
+    observe: str = ""
+    notes: tuple[str, ...] = ()
+    mistakes: tuple[Mistake, ...] = ()
+    offset: ClockOffset | None = None
+
+
+def map_beside(path: str | Path) -> Path:
+    """Return the file that is the mapping of a log if nobody names another: LOG.map.toml, or map.toml in a folder."""
+    path = Path(path)
+    return path / "map.toml" if path.is_dir() else path.with_name(f"{path.name.split('.')[0]}.map.toml")
+
+
+def mapping_of(path: str | Path, map_file: str | Path | None = None) -> tuple[LogMap, str]:
+    """Return the mapping of a log, and where it comes from in words.
+
+    Args:
+        path: The log.
+        map_file: The mapping; that next to the log, or a guess by the names of its columns, if not given.
+
+    Raises:
+        LogError: The mapping has mistakes, or the names of the columns do not say enough.
+    """
+    file = map_beside(path) if map_file is None else Path(map_file)
+    if map_file is not None or file.is_file():
+        return load_log_map(file), str(file)
+    return guess_log_map(path), "guessed by the names of the columns"
+
+
+def robot_of(log_map: LogMap, base: str | None = None) -> tuple[str, RobotModel]:
+    """Return the robot that drove a log: its name or file, and its numbers with those of the mapping.
+
+    Args:
+        log_map: The mapping.
+        base: The robot, in place of the one that the mapping names.
+
+    Raises:
+        LogError: Neither names a robot.
+        DescriptionError: There is no such robot.
+    """
+    name = base or log_map.robot
+    if not name:
+        raise LogError(
+            f"The mapping does not name the robot that drove. Give --base ROBOT: {', '.join(robot_names())}, or a file."
+        )
+    given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
+    return name, load_robot(name).with_numbers({key: value for key, value in given.items() if value})
+
+
+def import_log(
+    path: str | Path,
+    out: str | Path,
+    log_map: LogMap,
+    *,
+    base: str | None = None,
+    drop_bad_rows: bool = False,
+) -> ImportReport:
+    """Write the trials of a log into a file of observed trials.
+
+    Args:
+        path: The log.
+        out: The file to write, such as trials.jsonl; one that is there is replaced.
+        log_map: The mapping of the log.
+        base: The robot that drove, by name or file.
+        drop_bad_rows: Whether rows with mistakes are left out.
+
+    Raises:
+        LogError: The log and the mapping do not go together, or a row has a mistake; nothing is written.
+        RecordError: The file cannot be written.
+    """
+    name, robot = robot_of(log_map, base)
+    logs = read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows)
+    first = next(logs)
+    found = _Found(first, robot)
+    write_observations(out, head_of(path, log_map, name, first), _trials(first, logs, log_map, found))
+    return found.report
+
+
+class _Found:
+    """A report that grows while trials pass by."""
+
+    def __init__(self, first: Log, robot: RobotModel) -> None:
+        self._speed, self._track = robot.drive.speed, robot.drive.track
+        seen = [name for name in ("commands", "wheels", "poses", "readings") if len(getattr(first, name))]
+        notes = list(first.notes)
+        if len(first.poses) and not first.has_heading:
+            notes.append(NO_HEADING)
+        self.report = ImportReport(step_s=first.step_s, observe=", ".join(seen), notes=tuple(notes))
+        self._n, self._longest = 0, 0
+
+    def look(self, log: Log) -> None:
+        """Search a trial for mistakes."""
+        self._n += 1
+        if self._n > MOST_DIAGNOSED:
+            return
+        diagnosis = diagnose(log, self._speed, self._track)
+        known = {mistake.kind for mistake in self.report.mistakes}
+        more = tuple(mistake for mistake in diagnosis.mistakes if mistake.kind not in known)
+        self.report = replace(self.report, mistakes=self.report.mistakes + more)
+        if diagnosis.offset is not None and len(log.commands) > self._longest:
+            self._longest = len(log.commands)
+            self.report = replace(self.report, offset=diagnosis.offset)
+
+    def count(self, trial: ObservedTrial) -> None:
+        """Count a trial that is written."""
+        report = self.report
+        self.report = replace(
+            report, n_trials=report.n_trials + 1, n_steps=report.n_steps + len(trial.commands)
+        )
+
+
+def _trials(first: Log, rest: Iterator[Log], log_map: LogMap, found: _Found) -> Iterator[ObservedTrial]:
+    number = 0
+    log: Log | None = first
+    while log is not None:
+        found.look(log)
+        for trial in trials_of(log, log_map, number):
+            found.count(trial)
+            number += 1
+            yield trial
+        log = next(rest, None)

@@ -1,0 +1,347 @@
+"""The usual mistakes in logs, found by what cannot be: wheels and poses have to tell of one motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ._clock_offset import ClockOffset, clock_offset
+from ._read import Log
+from ._source import Floats
+
+WINDOW_S = 1.0
+"""Time over which motion is compared: long against lags, short against turns."""
+SAME = 1.35
+"""Factor within which a ratio is taken for a known one, such as 1000 for millimeters."""
+GAINS = 3.0
+"""Factor within which a ratio is a gain, and no unit."""
+SURE = 4.0
+"""Standard errors that a coefficient has to be away from 0 for its sign to count."""
+CLEAR = 0.75
+"""Concentration of angles around one direction, 0 to 1, beyond which they are one direction."""
+FEWEST_WINDOWS = 8
+MOST_STEPS = 20_000
+"""Of a log that are compared."""
+MOST_LATE_S = 0.5
+"""A robot's own lag and delay: what follows later is a clock."""
+SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
+LEAST_WAY = 1e-9
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """Something in a log that cannot be as its mapping says.
+
+    Attributes:
+        kind: swapped, reversed, left reversed, right reversed, degrees, millimeters, centimeters, inches, unit,
+            half track, double track, clockwise, heading offset, or clock.
+        message: What was found, and what to do.
+    """
+
+    kind: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A comparison of the wheels and the poses of a log.
+
+    Attributes:
+        mistakes: What cannot be.
+        offset: By how much poses follow commands; None if the log does not show it.
+        track: Between the wheels, by the poses [m]; nan if unknown.
+        gain: Way by the poses over way by the wheels; nan if unknown.
+    """
+
+    mistakes: tuple[Mistake, ...] = ()
+    offset: ClockOffset | None = None
+    track: float = math.nan
+    gain: float = math.nan
+
+
+def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
+    """Compare what a log says of the wheels with what it says of the poses, and name the usual mistakes.
+
+    Args:
+        log: A trial.
+        speed: Of a wheel at full command [m/s].
+        track: Between the wheels, as the robot's file has it [m].
+    """
+    log = _begin(log)
+    ways = log.commands * speed * log.step_s
+    if not len(log.poses) or not np.abs(ways).max(initial=0.0) > LEAST_WAY:
+        return Diagnosis()
+    xy, raw = log.poses[:, :2], log.raw_headings
+    mistakes: list[Mistake] = []
+    headings = log.poses[:, 2]
+    if log.has_heading:
+        headings, mistakes = _checked_headings(xy, raw, headings, ways)
+    mean, half = ways.sum(1) / 2, np.diff(ways, axis=1)[:, 0] / 2
+    seen = np.stack([np.hypot(*np.diff(xy, axis=0).T), _turns(xy, headings)], 1)
+    offset = clock_offset(np.stack([np.abs(mean), half], 1), seen, log.step_s)
+    if offset is None:  # with one wheel reversed, its speed is in the difference
+        offset = clock_offset(np.stack([np.abs(half), mean], 1), seen, log.step_s)
+    shift = 0 if offset is None else round(offset.seconds / log.step_s)
+    found, gain, measured = _compare_wheels(xy, headings, _shifted(ways, shift), log.step_s, track)
+    mistakes += found
+    if offset is not None and (offset.high < -log.step_s / 4 or offset.low > MOST_LATE_S):
+        mistakes.append(_clock(offset))
+    return Diagnosis(tuple(mistakes), offset, measured, gain)
+
+
+def _begin(log: Log) -> Log:
+    """The first part of a log, which shows its mistakes as well as all of it."""
+    n = MOST_STEPS
+    if len(log.commands) <= n:
+        return log
+    return replace(
+        log,
+        commands=log.commands[:n],
+        poses=log.poses[: n + 1],
+        wheels=log.wheels[: n + 1],
+        readings=log.readings[: n + 1],
+        raw_headings=log.raw_headings[: n + 1],
+    )
+
+
+def _clock(offset: ClockOffset) -> Mistake:
+    when = "before" if offset.seconds < 0 else "after"
+    return Mistake(
+        "clock",
+        f"Poses come {abs(offset.seconds):.2f} s ({abs(offset.low):.2f} to {abs(offset.high):.2f}) {when} the commands "
+        f"that they follow: the clocks differ. Set poses.offset_s = {-offset.seconds:.2f}.",
+    )
+
+
+def _shifted(ways: Floats, shift: int) -> Floats:
+    """The ways of the wheels as much later."""
+    if not shift:
+        return ways
+    moved = np.zeros_like(ways)
+    if shift > 0:
+        moved[shift:] = ways[:-shift]
+    else:
+        moved[:shift] = ways[-shift:]
+    return moved
+
+
+def _turns(xy: Floats, headings: Floats) -> Floats:
+    """(n,) turn in each step [rad]; by the path if there are no headings, and nan where the robot hardly moves."""
+    if np.isfinite(headings).any():
+        return np.diff(headings)
+    steps = np.diff(xy, axis=0)
+    way = np.hypot(*steps.T)
+    direction = np.where(way > 0.2 * np.nanmedian(way[way > 0]) if (way > 0).any() else False,
+                         np.arctan2(steps[:, 1], steps[:, 0]), np.nan)  # fmt: skip
+    turn = np.full(len(steps), np.nan)
+    turn[1:] = _wrapped(np.diff(direction), math.pi)  # ahead and back are one direction
+    return turn
+
+
+def _wrapped(angle: Floats, period: float = 2 * math.pi) -> Floats:
+    return np.asarray((angle + period / 2) % period - period / 2)
+
+
+def _checked_headings(
+    xy: Floats, raw: Floats, headings: Floats, ways: Floats
+) -> tuple[Floats, list[Mistake]]:
+    """The headings as they are meant, and what is wrong with them: they have to be the direction of the path."""
+    steps = np.diff(xy, axis=0) * np.sign(ways.sum(1, keepdims=True))
+    way = np.hypot(*steps.T)
+    moves = np.isfinite(way) & (way > 0.3 * np.nanmax(way, initial=0.0)) & np.isfinite(raw[:-1])
+    if moves.sum() < FEWEST_WINDOWS:
+        return headings, []
+    path = np.arctan2(steps[moves, 1], steps[moves, 0])
+    if np.abs(np.exp(1j * path).mean()) > CLEAR:
+        return headings, []  # one direction all along: any heading that stays agrees
+    fits = {}
+    for unit, factor in (("rad", 1.0), ("deg", math.pi / 180)):
+        for sign in (1, -1):
+            fits[unit, sign] = np.exp(1j * (path - sign * factor * raw[:-1][moves])).mean()
+    best = max(fits, key=lambda key: abs(fits[key]))
+    if abs(fits["rad", 1]) > CLEAR * abs(fits[best]):
+        best = ("rad", 1)
+    elif abs(fits[best]) < CLEAR:
+        return headings, []
+    mistakes = []
+    unit, sign = best
+    if unit == "deg":
+        headings = np.unwrap(raw * math.pi / 180)
+        mistakes.append(
+            Mistake(
+                "degrees",
+                'Headings are in degrees: read so, they follow the path. Set poses.heading_unit = "deg".',
+            )
+        )
+    if sign < 0:
+        headings = -headings
+        mistakes.append(
+            Mistake(
+                "clockwise",
+                "Headings grow clockwise, against the path. Set poses.clockwise = true, or y_down.",
+            )
+        )
+    angle = math.degrees(float(np.angle(fits[best])))
+    if 25 < abs(angle) < 155 and abs(fits[best]) > CLEAR:
+        headings = headings + math.radians(angle)
+        mistakes.append(
+            Mistake(
+                "heading offset",
+                f"Headings are {-angle:.0f} degrees from the direction of the path. Set poses.heading_offset_deg = "
+                f"{angle:.0f}.",
+            )
+        )
+    return headings, mistakes
+
+
+def _compare_wheels(
+    xy: Floats, headings: Floats, ways: Floats, step_s: float, track: float
+) -> tuple[list[Mistake], float, float]:
+    """Mistakes in signs and units of the wheels, the gain, and the track [m]."""
+    width = max(1, min(round(WINDOW_S / step_s), len(ways) // FEWEST_WINDOWS))
+    at = np.arange(0, len(ways) + 1 - width, width)
+    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(ways, 0)])
+    wheels = sums[at + width] - sums[at]
+    chord = xy[at + width] - xy[at]
+    has_heading = bool(np.isfinite(headings).any())
+    if has_heading:
+        turn = headings[at + width] - headings[at]
+        middle = headings[at] + turn / 2
+        ahead = chord[:, 0] * np.cos(middle) + chord[:, 1] * np.sin(middle)
+        turning = wheels
+    else:
+        direction = np.arctan2(chord[:, 1], chord[:, 0])
+        length = np.hypot(*chord.T)
+        direction[length < 0.2 * np.nanmax(length, initial=0.0)] = np.nan
+        turn = np.concatenate([[np.nan], _wrapped(np.diff(direction), math.pi)])
+        turning = np.concatenate([wheels[:1], (wheels[1:] + wheels[:-1]) / 2])
+        ahead = length * np.where(wheels.sum(1) < 0, -1, 1)
+        turn[np.abs(turn) > 1.2] = np.nan  # near half of the period it may be on either side
+    with np.errstate(invalid="ignore", divide="ignore"):
+        bend = np.where(np.abs(turn) > 1e-6, np.sin(turn / 2) / (turn / 2), 1.0)
+    arc = ahead / np.where(np.isfinite(bend) & (np.abs(bend) > 0.3), bend, np.nan if has_heading else 1.0)
+    forward, sure_forward = _slopes(wheels, arc)
+    round_, sure_round = _slopes(turning, turn)
+    if forward is None or round_ is None:
+        return [], math.nan, math.nan
+    mistakes = []
+    if sure_forward and sure_round:
+        kind = _signs(np.sign(forward), np.sign(round_), has_heading=has_heading)
+        mistakes += [kind] if kind is not None else []
+    gain = float(np.abs(forward).sum())
+    spin = float(np.abs(round_).sum() / 2)
+    measured = 1 / spin if gain > GAINS else gain / spin
+    if sure_forward:
+        mistakes += _scale(gain)
+    if (
+        sure_round
+        and sure_forward
+        and not any(mistake.kind in ("left reversed", "right reversed") for mistake in mistakes)
+    ):
+        mistakes += _track(measured, track)
+    return mistakes, gain, measured
+
+
+def _slopes(wheels: Floats, values: Floats) -> tuple[Floats | None, bool]:
+    """(2,) least squares of values over both wheels, and whether the signs of both slopes are sure."""
+    known = np.isfinite(values) & np.isfinite(wheels).all(1)
+    x, y = wheels[known], values[known]
+    if len(y) < FEWEST_WINDOWS or np.linalg.matrix_rank(x) < 2:
+        return None, False
+    slopes = np.linalg.lstsq(x, y, rcond=None)[0]
+    off = y - x @ slopes
+    # slips and lost poses count little
+    weight = 1 / np.maximum(1, np.abs(off) / (3 * np.median(np.abs(off)) + 1e-12))
+    slopes = np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]
+    off = (y - x @ slopes) * weight
+    errors = np.sqrt(np.diag(np.linalg.inv(x.T @ x)) * (off @ off) / max(len(y) - 2, 1))
+    return slopes, bool((np.abs(slopes) > SURE * errors).all())
+
+
+_PATTERNS: dict[tuple[int, int, int, int], tuple[str, str]] = {
+    (1, 1, 1, -1): (
+        "swapped",
+        "The robot turns against its wheels: left and right are swapped, or the poses are mirrored. Swap left and "
+        "right in the mapping, or set poses.y_down = true.",
+    ),
+    (-1, -1, 1, -1): (
+        "reversed",
+        "Both wheels are reversed: the robot goes ahead when they go back. Set left_sign = -1 and right_sign = -1.",
+    ),
+    (-1, -1, -1, 1): (
+        "swapped and reversed",
+        "The robot goes back when its wheels go ahead, and turns as they say: its other end is ahead. Set "
+        "poses.heading_offset_deg = 180, or swap left and right and set both signs to -1.",
+    ),
+    (-1, 1, 1, 1): ("left reversed", "The left wheel is reversed. Set left_sign = -1."),
+    (1, -1, -1, -1): ("right reversed", "The right wheel is reversed. Set right_sign = -1."),
+    (-1, 1, -1, -1): (
+        "swapped, left reversed",
+        "Left and right are swapped, and the column of the left one is reversed. Swap them and set right_sign = -1.",
+    ),
+    (1, -1, 1, 1): (
+        "swapped, right reversed",
+        "Left and right are swapped, and the column of the right one is reversed. Swap them and set left_sign = -1.",
+    ),
+}
+"""By the signs of the slopes: way over left and right wheel, turn over left and right wheel."""
+
+
+def _signs(forward: Floats, round_: Floats, *, has_heading: bool) -> Mistake | None:
+    pattern = (int(forward[0]), int(forward[1]), int(round_[0]), int(round_[1]))
+    if pattern not in _PATTERNS:
+        return None
+    kind, message = _PATTERNS[pattern]
+    if not has_heading and kind == "swapped":
+        message = (
+            "The robot turns against its wheels: left and right are swapped, or both are reversed. A log without "
+            "headings does not tell which. Set left_sign = -1 and right_sign = -1, or swap left and right."
+        )
+        kind = "swapped or reversed"
+    return Mistake(kind, message)
+
+
+def _is_about(ratio: float, known: float) -> bool:
+    return known / SAME < ratio < known * SAME
+
+
+def _scale(gain: float) -> list[Mistake]:
+    if 1 / GAINS < gain < GAINS or not math.isfinite(gain) or gain <= 0:
+        return []
+    for factor, (name, unit) in SCALES.items():
+        if _is_about(gain, factor):
+            message = (
+                f"Poses are {gain:.0f} times the ways of the wheels: they are in {name}. "
+                f'Set poses.unit = "{unit}".'
+            )
+            return [Mistake(name, message)]
+        if _is_about(1 / gain, factor):
+            message = (
+                f"The ways of the wheels are {1 / gain:.0f} times the poses: they are in {name}. "
+                f'Set unit = "{unit}/s".'
+            )
+            return [Mistake(name, message)]
+    message = (
+        f"A meter by the wheels is {gain:.3g} m by the poses: wheels are in ticks or in another unit. If in ticks, "
+        f'set unit = "ticks/s" and ticks_per_m = {1 / gain:.4g}. Otherwise check unit and speed.'
+    )
+    return [Mistake("unit", message)]
+
+
+def _track(measured: float, track: float) -> list[Mistake]:
+    by_poses = f"By the poses there are about {measured:.2g} m between the wheels"
+    if _is_about(measured / track, 2.0):
+        message = (
+            f"{by_poses}, twice the track of {track:.4g} m: is half the track given for the track? Set track = "
+            f"{2 * track:.4g}."
+        )
+        return [Mistake("half track", message)]
+    if _is_about(measured / track, 0.5):
+        message = (
+            f"{by_poses}, half the track of {track:.4g} m: is twice the track given for the track? Set track = "
+            f"{track / 2:.4g}."
+        )
+        return [Mistake("double track", message)]
+    return []

@@ -1,0 +1,52 @@
+"""The right source for a log, by its name and what is in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from realitygap.errors import LogError
+
+from ._bags import BagSource
+from ._log_map import TextFormat
+from ._parquet import ParquetSource, lerobot_source
+from ._recording import RecordingSource
+from ._source import Source
+from ._text import TextSource
+
+BAG_ENDS = (".mcap", ".db3", ".bag")
+KINDS = (
+    "a text table (CSV and the like), Parquet, MCAP, a bag of ROS (folder, .db3, .bag), a folder of a LeRobot dataset, "
+    "or a recording of `realitygap robot --record`"
+)
+
+
+def open_source(path: Path, text: TextFormat | None = None) -> Source:
+    """Return the source of a log.
+
+    Args:
+        path: A file, or the folder of a bag or a dataset.
+        text: How a text file is written, as far as it is not to be found out.
+
+    Raises:
+        LogError: There is no such file, or it is none of the known kinds.
+        MissingExtraError: It is a bag, and the extra `import` is not installed.
+    """
+    if not path.exists():
+        raise LogError(f"There is no file {path}. Name a log: {KINDS}.")
+    if path.is_dir():
+        if (path / "meta" / "info.json").is_file():
+            return lerobot_source(path)
+        if (path / "metadata.yaml").is_file():
+            return BagSource(path)
+        raise LogError(
+            f"{path} is a folder, and neither a bag (metadata.yaml) nor a LeRobot dataset (meta/info.json). If its "
+            "files belong together, name them in the mapping: `file` of [commands], [poses] ..."
+        )
+    end = path.suffix.lower()
+    if end in BAG_ENDS:
+        return BagSource(path)
+    if end == ".parquet":
+        return ParquetSource(path, [path])
+    if end == ".jsonl":
+        return RecordingSource(path)
+    return TextSource(path, text or TextFormat())

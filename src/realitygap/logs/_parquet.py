@@ -1,0 +1,141 @@
+"""Parquet files, and datasets of LeRobot, which are folders of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
+from realitygap.errors import LogError
+
+from ._source import Batch, check_columns
+
+BATCH_ROWS = 200_000
+MOST_PARTS = 256
+"""Numbers in one cell, such as a vector of joint angles."""
+EPISODE = "episode_index"
+TIME = "timestamp"
+
+
+class ParquetSource:
+    """A Parquet file, or several with the same columns, one after another.
+
+    A column of lists has a column for each entry: `action[0]`, or `action.left` if the entries have names.
+
+    Args:
+        path: The file, or the folder that the files belong to.
+        files: The files.
+        names: Names of the entries of columns of lists.
+        rate_hz: Rows each second; 0 if unknown.
+
+    Raises:
+        LogError: A file cannot be read.
+    """
+
+    is_table = True
+
+    def __init__(
+        self,
+        path: Path,
+        files: Sequence[Path],
+        names: dict[str, list[str]] | None = None,
+        rate_hz: float = 0.0,
+    ) -> None:
+        self.path, self.rate_hz = path, rate_hz
+        self._files = list(files)
+        self._columns = _expressions(self._files[0], names or {})
+
+    def columns(self) -> list[str]:
+        """The names of all columns with numbers."""
+        return list(self._columns)
+
+    def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
+        """As `Source.batches`."""
+        if rows:
+            raise LogError(f"{self.path} is Parquet: `rows` is for text files. Leave it out of the mapping.")
+        check_columns(self, names)
+        chosen = [self._columns[name].cast(pl.Float64).alias(name) for name in dict.fromkeys(names)]
+        first = 1
+        for file in self._files:
+            scan, start = pl.scan_parquet(file), 0
+            while True:
+                try:
+                    frame = scan.slice(start, BATCH_ROWS).select(chosen).collect()
+                except (pl.exceptions.PolarsError, OSError) as error:
+                    raise LogError(f"{file} cannot be read: {_first_line(error)}.") from None
+                if not len(frame):
+                    break
+                columns = {name: frame[name].fill_null(float("nan")).to_numpy() for name in frame.columns}
+                yield Batch(first, columns)
+                start, first = start + len(frame), first + len(frame)
+
+
+def lerobot_source(folder: Path) -> ParquetSource:
+    """Return a dataset of LeRobot, of version 2 or 3, as a source.
+
+    Raises:
+        LogError: It is not one, or is not whole.
+    """
+    info = folder / "meta" / "info.json"
+    try:
+        values = parse_json(read_file(info, MOST_JSON_BYTES))
+        rate_hz = float(values["fps"])
+        features = dict(values.get("features", {}))
+    except OSError as error:
+        raise LogError(f"Cannot read {info}: {error.strerror or error}.") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise LogError(f"{info} is not as LeRobot writes it: {error}.") from None
+    files = sorted(folder.glob("data/**/*.parquet"))
+    if not files:
+        raise LogError(f"{folder} has no Parquet file in data/. Expected a whole dataset of LeRobot.")
+    names = {name: _entry_names(feature) for name, feature in features.items() if isinstance(feature, dict)}
+    return ParquetSource(folder, files, names, rate_hz)
+
+
+def _entry_names(feature: dict[str, Any]) -> list[str]:
+    """The names of the entries of a feature, which may be listed in a table of groups."""
+    names = feature.get("names")
+    if isinstance(names, dict):
+        names = [name for group in names.values() if isinstance(group, list) for name in group]
+    return [str(name) for name in names] if isinstance(names, list) else []
+
+
+def _expressions(file: Path, names: dict[str, list[str]]) -> dict[str, pl.Expr]:
+    """Return the expression of each column with numbers."""
+    try:
+        schema = pl.scan_parquet(file).collect_schema()
+        row = pl.scan_parquet(file).head(1).collect()
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise LogError(f"{file} cannot be read as Parquet: {_first_line(error)}.") from None
+    found: dict[str, pl.Expr] = {}
+    for name, kind in schema.items():
+        column = pl.col(name)
+        if kind.is_numeric() or kind == pl.Boolean:
+            found[name] = column
+        elif isinstance(kind, pl.Datetime):
+            found[name] = column.dt.epoch("ns") / 1e9
+        elif isinstance(kind, pl.Duration):
+            found[name] = column.dt.total_nanoseconds() / 1e9
+        elif isinstance(kind, pl.List | pl.Array) and kind.inner is not None and kind.inner.is_numeric():
+            entries = row[name][0] if len(row) else None
+            size = 0 if entries is None else min(len(entries), MOST_PARTS)
+            given = names.get(name, [])
+            for k in range(size):
+                part = (
+                    column.arr.get(k) if isinstance(kind, pl.Array) else column.list.get(k, null_on_oob=True)
+                )
+                found[f"{name}[{k}]"] = part
+                if len(given) == size:
+                    found[f"{name}.{given[k]}"] = part
+        elif isinstance(kind, pl.Struct):
+            for field in kind.fields:
+                if field.dtype.is_numeric():
+                    found[f"{name}.{field.name}"] = column.struct.field(field.name)
+    return found
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n")[0].rstrip(".")[:200]

@@ -1,0 +1,248 @@
+"""A calibration of a drive to a log that another program wrote."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.calibration import HeldOut, MotionLogFit, drive_on, fit_motion_log, look_up_motion
+from realitygap.errors import StudyError
+from realitygap.logs import Diagnosis, Log, LogMap, diagnose, mapping_of, read_logs, robot_of
+from realitygap.platforms import JyroPlatform
+from realitygap.records import Observe
+from realitygap.world import Calibration, RobotModel
+
+from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut
+from .one import calibration_of, measured_at
+from .parts import Parts
+
+BLOCKS = 4
+"""Parts of a log, each of which is fitted in its first half and predicted in its second."""
+NOISE_DRAWS = 100
+N_SPEEDS = 3
+HARMLESS = ("half track", "double track", "clock", "heading offset")
+"""Mistakes that a fit survives: they are noted."""
+
+Floats = NDArray[np.float64]
+
+
+def calibrate_from_log(
+    path: str | Path,
+    *,
+    map_file: str | Path | None = None,
+    base: str | Path | None = None,
+    hold_out: HoldOut = 0.5,
+    seed: int = 0,
+    step_s: float | None = None,
+    drop_bad_rows: bool = False,
+) -> Calibration:
+    """Fit the drive of a robot to a log of commands, with poses or encoders.
+
+    Args:
+        path: The log.
+        map_file: Its mapping; that next to the log, or a guess by the names of its columns, if not given.
+        base: The robot that drove, by name or file; as the mapping says if not given.
+        hold_out: What the fit does not see. A share: the end of the log. blocks: the log is cut into four, each is
+            fitted in its first half and predicted in its second, and the numbers are those of a fit to everything.
+        seed: Of draws.
+        step_s: Length of a step, in place of the mapping's [s].
+        drop_bad_rows: Whether rows with mistakes are left out.
+
+    Raises:
+        StudyError: The log shows too little, or wheels and poses do not go together.
+        LogError: The log cannot be read.
+    """
+    log_map, origin = mapping_of(path, map_file)
+    if step_s is not None:
+        log_map = log_map.model_copy(update={"step_s": step_s})
+    name, robot = robot_of(log_map, None if base is None else str(base))
+    log, n_logs = _longest(path, log_map, robot, drop_bad_rows=drop_bad_rows)
+    diagnosis = diagnose(log, robot.drive.speed, robot.drive.track)
+    _refuse_mistakes(path, diagnosis)
+    fit, compared = _fit(path, log, robot, hold_out, seed)
+    notes = [f"Mapping: {origin}.", *log.notes, *_notes(diagnosis), *fit.notes]
+    if n_logs > 1:
+        notes.append(f"The longest of {n_logs} trials is fitted{f', {log.name}' if log.name else ''}.")
+    given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
+    numbers: dict[str, float] = {key: value for key, value in given.items() if value}
+    draws = fit.draws
+    evidence = {key: value for key, value in fit.evidence.items() if key != "held_out"}
+    if compared is not None:
+        evidence["held_out"] = compared.to_dict()
+    if compared is not None and not compared.is_better:
+        draws = {}
+        notes.append("The robot file's numbers predict better than the fit, and stay.")
+    else:
+        numbers |= fit.numbers
+    parts = Parts(fit.fitted, numbers, draws, fit.method, tuple(notes), evidence=evidence)
+    observe: Observe = "track" if len(log.poses) else "encoders"
+    arena = log_map.arena or "open"
+    made = calibration_of("motion", parts, name, str(path), log_map.label, observe, (), arena, seed)
+    more = {"trials": 1, "step_s": round(log.step_s, 4), "measured": measured_at(Path(path))}
+    return made.model_copy(update=more)
+
+
+def _longest(path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_rows: bool) -> tuple[Log, int]:
+    """The longest trial of a log, and the number of its trials."""
+    longest, n = None, 0
+    for log in read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows):
+        n += 1
+        if longest is None or len(log.commands) > len(longest.commands):
+            longest = log
+    if longest is None or not (len(longest.poses) or len(longest.wheels)):
+        raise StudyError(
+            f"{path} has commands alone. Expected poses or encoders, too: add [poses] or [wheels] to the mapping."
+        )
+    return longest, n
+
+
+def _refuse_mistakes(path: str | Path, diagnosis: Diagnosis) -> None:
+    """Raise an error if wheels and poses contradict each other.
+
+    Raises:
+        StudyError: They do; the message has every mistake.
+    """
+    found = [mistake.message for mistake in diagnosis.mistakes if mistake.kind not in HARMLESS]
+    if found:
+        raise StudyError(f"{path} cannot be fitted as its mapping has it. {' '.join(found)}")
+
+
+def _notes(diagnosis: Diagnosis) -> list[str]:
+    notes = [f"Check ({mistake.kind}): {mistake.message}" for mistake in diagnosis.mistakes]
+    offset = diagnosis.offset
+    if offset is not None:
+        notes.append(
+            f"Poses follow commands by {offset.seconds:.2f} s ({offset.low:.2f} to {offset.high:.2f}), a robot's lag "
+            "and delay included."
+        )
+    return notes
+
+
+def _fit(
+    path: str | Path, log: Log, robot: RobotModel, hold_out: HoldOut, seed: int
+) -> tuple[MotionLogFit, Compared | None]:
+    """The fit, and the errors on what it did not see."""
+    try:
+        if hold_out != "blocks":
+            fit = _fit_one(log, robot, hold_out, seed)
+            return fit, None if fit.held_out is None else _compare(log, robot, fit.held_out, hold_out, seed)
+        n = len(log.commands)
+        edges = np.linspace(0, n, BLOCKS + 1).astype(int)
+        found = []
+        for first, end in pairwise(edges):
+            part = _part(log, int(first), int(end))
+            held_out = _fit_one(part, robot, 0.5, seed).held_out
+            if held_out is not None:
+                found.append(_compare(part, robot, held_out, 0.5, seed))
+        return _fit_one(log, robot, 0.0, seed), _joined(found)
+    except ValueError as error:
+        raise StudyError(f"{path}: {error}") from None
+
+
+def _part(log: Log, first: int, end: int) -> Log:
+    rows = slice(first, end + 1)
+    wheels = log.wheels[rows] - log.wheels[first] if len(log.wheels) else log.wheels
+    return replace(
+        log, commands=log.commands[first:end], poses=log.poses[rows], wheels=wheels, readings=log.readings[rows],
+        raw_headings=log.raw_headings[rows],
+    )  # fmt: skip
+
+
+def _arrays(log: Log) -> tuple[Floats, Floats, Floats | None]:
+    """Times, commands with the last one once more, and poses, without headings if the log has none."""
+    commands = np.concatenate([log.commands, log.commands[-1:]])
+    if not len(log.poses):
+        return log.time_s, commands, None
+    return log.time_s, commands, log.poses if log.has_heading else log.poses[:, :2]
+
+
+def _fit_one(log: Log, robot: RobotModel, hold_out: float, seed: int) -> MotionLogFit:
+    time_s, commands, poses = _arrays(log)
+    encoders = log.wheels if len(log.wheels) else None
+    return fit_motion_log(
+        time_s, commands, robot, poses=poses, encoders=encoders, hold_out=hold_out, seed=seed
+    )
+
+
+def _split(time_s: Floats, hold_out: float) -> int:
+    """First row that a fit does not see."""
+    return int(np.searchsorted(time_s, time_s[0] + (1 - hold_out) * (time_s[-1] - time_s[0])))
+
+
+def _compare(log: Log, robot: RobotModel, held_out: HeldOut, hold_out: float, seed: int) -> Compared:
+    """The errors of the fit next to those of simpler predictions."""
+    time_s, commands, poses = _arrays(log)
+    split = _split(time_s, hold_out)
+    errors = {FITTED: held_out.fitted, NOMINAL: held_out.nominal}
+    more = {key: {FITTED: values[1], NOMINAL: values[0]} for key, values in held_out.more.items()}
+    if poses is None:
+        errors |= _wheel_baselines(log, robot, commands, split, seed)
+        return Compared(held_out.measure, held_out.unit, held_out.n, errors, more)
+    seen = poses[split:, :2]
+
+    def off(path: Floats) -> Floats:
+        away = np.hypot(*(path - seen).T)
+        return np.asarray(away[np.isfinite(away)])
+
+    table = off(look_up_motion(time_s, commands, poses, split))
+    rng = np.random.default_rng(seed)
+    noisy = [
+        off(drive_on(_steps(time_s, commands + _noise(rng, commands.shape), robot), poses, split))
+        for _ in range(NOISE_DRAWS)
+    ]
+    errors |= {NOISE: float(np.mean([each.mean() for each in noisy])), TABLE: float(table.mean())}
+    if "at the end" in more:
+        more["at the end"] |= {NOISE: float(np.mean([each[-1] for each in noisy])), TABLE: float(table[-1])}
+    return Compared(held_out.measure, held_out.unit, held_out.n, errors, more)
+
+
+def _noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """The paper's uniform noise, here on wheels: the paper has it on sensors only."""
+    return np.asarray(JyroPlatform.default_noise * rng.uniform(-1, 1, shape))
+
+
+def _steps(time_s: Floats, commands: Floats, robot: RobotModel) -> Floats:
+    """Way ahead [m] and turn [rad] of each step by the robot's nominal gains and track, without lag."""
+    gains = np.array([robot.drive.gain_left, robot.drive.gain_right]) * robot.drive.speed
+    ways = commands[:-1] * gains * np.diff(time_s)[:, None]
+    return np.stack([ways.mean(1), (ways[:, 1] - ways[:, 0]) / robot.drive.track], 1)
+
+
+def _wheel_baselines(
+    log: Log, robot: RobotModel, commands: Floats, split: int, seed: int
+) -> dict[str, float]:
+    """Errors of wheel speeds by uniform noise and by seen speeds at similar commands [m/s]."""
+    speeds = np.diff(log.wheels, axis=0) / log.step_s
+    nominal = commands[:-1] * robot.drive.speed
+    noise = _noise(np.random.default_rng(seed), nominal.shape) * robot.drive.speed
+    looked_up = np.empty_like(speeds)
+    for wheel in range(2):
+        known = np.flatnonzero(np.isfinite(speeds[: split - 1, wheel]))
+        for k, command in enumerate(commands[:-1, wheel]):
+            near = known[np.argsort(np.abs(commands[known, wheel] - command), kind="stable")[:N_SPEEDS]]
+            looked_up[k, wheel] = speeds[near, wheel].mean() if len(near) else np.nan
+    return {
+        name: float(np.sqrt(np.nanmean((predicted - speeds)[split:] ** 2)))
+        for name, predicted in ((NOISE, nominal + noise), (TABLE, looked_up))
+    }
+
+
+def _joined(found: list[Compared]) -> Compared | None:
+    """The errors of several blocks as their mean, weighted by observations."""
+    if not found:
+        return None
+    n = sum(each.n for each in found)
+
+    def mean(rows: list[tuple[int, float]]) -> float:
+        return sum(weight * value for weight, value in rows) / sum(weight for weight, _ in rows)
+
+    errors = {name: mean([(each.n, each.errors[name]) for each in found]) for name in found[0].errors}
+    more = {
+        key: {name: mean([(each.n, each.more[key][name]) for each in found]) for name in found[0].more[key]}
+        for key in found[0].more
+    }
+    return Compared(f"{found[0].measure}, mean of {len(found)} blocks", found[0].unit, n, errors, more)

@@ -1,0 +1,194 @@
+"""A calibration of range sensors to a table of readings of another program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from realitygap.calibration import fit_range_table, look_up_readings, place_ranks, predict_range_table
+from realitygap.errors import StudyError
+from realitygap.logs import RangeTable, TableMap, load_table_map, map_beside, read_range_table
+from realitygap.platforms import JyroPlatform
+from realitygap.world import Calibration, RobotModel, load_robot, robot_names
+
+from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut
+from .one import calibration_of, measured_at
+from .parts import Parts
+
+BETWEEN = (0.03, 1.0)
+"""Readings between these are neither nothing nor full: the sensor tells a distance."""
+N_DISTANCES = 5
+"""Bands of distance by which residuals are shown."""
+N_BEARINGS = 6
+
+
+def calibrate_from_table(
+    path: str | Path,
+    *,
+    map_file: str | Path | None = None,
+    base: str | Path | None = None,
+    hold_out: HoldOut = "blocks",
+    seed: int = 0,
+) -> Calibration:
+    """Fit the range sensors of a robot to a table of readings by distance and bearing of a wall.
+
+    Args:
+        path: The table, in the `.sample` format or as text.
+        map_file: Its mapping; that next to the table if not given.
+        base: The robot that was measured, by name or file; as the mapping says if not given.
+        hold_out: What the fit does not see: blocks for every second place, like a chessboard over distances and
+            bearings, or a share of the places at random. With 0 it sees everything, and nothing is compared.
+        seed: Of draws, and of the places that are held out at random.
+
+    Raises:
+        StudyError: The table and the robot do not go together.
+        LogError: The table cannot be read.
+    """
+    table_map = _map_of(path, map_file)
+    name = str(base or table_map.robot)
+    if not name:
+        raise StudyError(
+            f"{path} does not name the robot that was measured. Give --base ROBOT, a file or one of "
+            f"{', '.join(robot_names())}."
+        )
+    robot = load_robot(name)
+    table = read_range_table(path, table_map)
+    if table.n_sensors > len(robot.range):
+        raise StudyError(
+            f"{path} has {table.n_sensors} sensors, and robot {robot.name!r} has {len(robot.range)}. Name the robot "
+            "that was measured: --base ROBOT."
+        )
+    bearing, notes = _turned(table, robot)
+    seen = _seen(table, hold_out, seed)
+    try:
+        fit = fit_range_table(
+            table.sensor[seen],
+            table.distance[seen],
+            bearing[seen],
+            table.readings[seen],
+            robot,
+            measured_from=table.measured_from,
+            hold_out=False,
+            seed=seed,
+        )
+    except ValueError as error:
+        raise StudyError(f"{path}: {error}") from None
+    notes = [*table.notes, *notes, *fit.notes]
+    numbers, draws, evidence = fit.numbers, fit.draws, dict(fit.evidence)
+    if not seen.all():
+        compared = _compare(table, bearing, seen, robot, robot.with_numbers(fit.numbers), hold_out)
+        evidence["held_out"] = compared.to_dict()
+        if not compared.is_better:
+            numbers, draws = {}, {}
+            notes.append("The robot file's numbers predict better than the fit, and stay.")
+    parts = Parts(fit.fitted, numbers, draws, fit.method, tuple(notes), evidence=evidence)
+    made = calibration_of("sensors", parts, name, str(path), table_map.label, "cells", (), "", seed)
+    return made.model_copy(update={"trials": 1, "measured": measured_at(Path(path))})
+
+
+def _map_of(path: str | Path, map_file: str | Path | None) -> TableMap:
+    file = map_beside(path) if map_file is None else Path(map_file)
+    return load_table_map(file) if map_file is not None or file.is_file() else TableMap()
+
+
+def _turned(table: RangeTable, robot: RobotModel) -> tuple[NDArray[np.float64], list[str]]:
+    """Bearings, positive to the left: by the mapping, or by the robot file, whose readings have to be more alike."""
+    if table.clockwise is not None or not np.ptp(table.bearing):
+        return table.bearing_left(clockwise=bool(table.clockwise)), []
+    errors = {}
+    for clockwise in (True, False):
+        bearing = table.bearing_left(clockwise=clockwise)
+        nominal = predict_range_table(
+            table.sensor, table.distance, bearing, robot, measured_from=table.measured_from
+        )
+        errors[clockwise] = _rms(nominal - table.readings)
+    best = errors[True] <= errors[False]
+    names = {True: "clockwise", False: "counterclockwise"}
+    note = (
+        f"Bearings are taken to grow {names[best]}: the robot file's error is {errors[best]:.3f} so, and "
+        f"{errors[not best]:.3f} {names[not best]}."
+    )
+    return table.bearing_left(clockwise=best), [note]
+
+
+def _seen(table: RangeTable, hold_out: HoldOut, seed: int) -> NDArray[np.bool_]:
+    """Whether the fit sees each reading."""
+    row, column = place_ranks(table.distance, table.bearing)
+    if hold_out == "blocks":
+        return np.asarray((row + column) % 2 == 0)
+    n_columns = int(column.max()) + 1
+    places = np.random.default_rng(seed).random((int(row.max()) + 1) * n_columns) >= hold_out
+    return np.asarray(places[row * n_columns + column])
+
+
+def _compare(
+    table: RangeTable,
+    bearing: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+    nominal: RobotModel,
+    fitted: RobotModel,
+    hold_out: HoldOut,
+) -> Compared:
+    """Errors at the places that the fit did not see."""
+    at = table.sensor, table.distance, bearing
+    off = {
+        FITTED: predict_range_table(*at, fitted, measured_from=table.measured_from) - table.readings,
+        NOMINAL: predict_range_table(*at, nominal, measured_from=table.measured_from) - table.readings,
+        TABLE: look_up_readings(*at, table.readings, seen) - table.readings,
+    }
+    between = (table.readings > BETWEEN[0]) & (table.readings < BETWEEN[1])
+
+    def errors(rows: NDArray[np.bool_]) -> dict[str, float]:
+        found = {name: _rms(values[rows & ~seen]) for name, values in off.items()}
+        noise = math.sqrt(found[NOMINAL] ** 2 + JyroPlatform.default_noise**2 / 3)
+        return {FITTED: found[FITTED], NOMINAL: found[NOMINAL], NOISE: noise, TABLE: found[TABLE]}
+
+    where = "at every second place" if hold_out == "blocks" else f"at {hold_out:.0%} of the places"
+    everywhere = np.ones(len(seen), np.bool_)
+    name = f"where {BETWEEN[0]:g} < reading < {BETWEEN[1]:g}"
+    return Compared(
+        f"root mean square error of the readings {where}",
+        "",
+        int((~seen).sum()),
+        errors(everywhere),
+        {name: errors(between)} if (between & ~seen).any() else {},
+        _by_condition(table, bearing, errors, ~seen),
+    )
+
+
+def _by_condition(
+    table: RangeTable,
+    bearing: NDArray[np.float64],
+    errors: Callable[[NDArray[np.bool_]], dict[str, float]],
+    unseen: NDArray[np.bool_],
+) -> dict[str, dict[str, dict[str, float]]]:
+    """Errors by sensor, distance and bearing."""
+    conditions: dict[str, dict[str, NDArray[np.bool_]]] = {
+        "sensor": {str(k): table.sensor == k for k in np.unique(table.sensor)}
+    }
+    edges = np.linspace(table.distance.min(), table.distance.max(), N_DISTANCES + 1)
+    if np.ptp(table.distance):
+        band = np.clip(np.searchsorted(edges, table.distance, side="right") - 1, 0, N_DISTANCES - 1)
+        conditions["distance [mm]"] = {
+            f"{1000 * edges[k]:.3g} to {1000 * edges[k + 1]:.3g}": band == k for k in range(N_DISTANCES)
+        }
+    if np.ptp(bearing):
+        around = np.degrees(bearing) % 360
+        width = 360 / N_BEARINGS
+        conditions["bearing [deg]"] = {
+            f"{k * width:.0f} to {(k + 1) * width:.0f}": (around >= k * width) & (around < (k + 1) * width)
+            for k in range(N_BEARINGS)
+        }
+    return {
+        kind: {name: errors(rows) for name, rows in each.items() if (rows & unseen).any()}
+        for kind, each in conditions.items()
+    }
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else math.nan

@@ -1,0 +1,79 @@
+"""Errors of a fit on what it did not see, next to those of simpler predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from realitygap.errors import StudyError
+
+HoldOut = float | Literal["blocks"]
+
+FITTED, NOMINAL, NOISE, TABLE = "fitted", "nominal numbers", "nominal, uniform noise", "lookup table"
+"""The predictions that are compared: the fit, and three that it has to beat."""
+
+MOST_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Errors of several predictions on the unseen part.
+
+    Attributes:
+        measure: The error, in words.
+        unit: Its unit; empty for readings.
+        n: Observations in the unseen part.
+        errors: By prediction.
+        more: Further errors in the same unit, by their name and by prediction.
+        by: Error of the fit and of the nominal numbers by condition: kind of condition, its value, prediction.
+    """
+
+    measure: str
+    unit: str
+    n: int
+    errors: Mapping[str, float]
+    more: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    by: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain values, for the evidence of a calibration."""
+        digits = 5
+        plain = {name: round(value, digits) for name, value in self.errors.items()}
+        more = {key: {name: round(v, digits) for name, v in rows.items()} for key, rows in self.more.items()}
+        by = {
+            kind: {at: {name: round(v, digits) for name, v in row.items()} for at, row in rows.items()}
+            for kind, rows in self.by.items()
+        }
+        return {
+            "measure": self.measure,
+            "unit": self.unit,
+            "n": self.n,
+            "errors": plain,
+            "more": more,
+            "by": by,
+        }
+
+    @property
+    def is_better(self) -> bool:
+        """Whether the fit predicts better than the nominal numbers."""
+        return self.errors[FITTED] < self.errors[NOMINAL]
+
+
+def hold_out_of(text: str) -> HoldOut:
+    """Return what to hold out, as a user wrote it.
+
+    Raises:
+        StudyError: It is neither blocks nor a share.
+    """
+    if text == "blocks":
+        return "blocks"
+    try:
+        share = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= MOST_SHARE:
+        raise StudyError(
+            f"--hold-out is {text!r}, expected a share from 0 to {MOST_SHARE:g}, such as 0.5 or 30%, or blocks."
+        )
+    return share

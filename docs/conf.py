@@ -22,7 +22,7 @@ author = "the realitygap authors"
 copyright = author
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_design"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "generated/parts"]
@@ -51,6 +51,7 @@ nitpick_ignore_regex = [
     (r"py:.*", r"realitygap\..*\._.*"),
     (r"py:.*", r"realitygap\.kernels.*"),
 ]
+toc_object_entries = False
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True

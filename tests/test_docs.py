@@ -386,6 +386,15 @@ def test_a_changed_output_is_noticed():
     assert make_outputs.rewrite(text, "page") == (text, [])
 
 
+def test_groups_of_the_sidebar_have_at_most_seven_pages():
+    groups = re.findall(r"```\{toctree\}\n(.*?)```", (DOCS / "index.md").read_text("utf-8"), re.DOTALL)
+    pages = [[line for line in group.splitlines() if line and not line.startswith(":")] for group in groups]
+    assert len(pages) > 5
+    assert max(map(len, pages)) <= 7
+    flat = [page for group in pages for page in group]
+    assert len(set(flat)) == len(flat)
+
+
 def test_nothing_that_is_installed_asks_for_an_address():
     for path in (ROOT / "src").rglob("*.*"):
         if path.suffix in {".py", ".toml", ".css", ".jinja"}:

@@ -17,6 +17,9 @@ from realitygap.errors import RealityGapError
 
 from ._commands import COMMANDS, root_help
 
+_COMPLETION = "_REALITYGAP_COMPLETE"
+"""Variable that the scripts of `--show-completion` set."""
+
 if TYPE_CHECKING:
     import typer
 
@@ -99,6 +102,11 @@ def _run_command() -> None:
     """
     arguments = sys.argv[1:]
     try:
+        if _COMPLETION in os.environ:  # a shell asks for completions of words that it passes in variables
+            from ._app import app_to_complete
+
+            words = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
+            app_to_complete(words.split()[1:])()
         if not arguments or arguments in (["-h"], ["--help"]):
             print(root_help(shutil.get_terminal_size().columns), end="")
             sys.exit(0 if arguments else 2)

@@ -43,16 +43,7 @@ class _GroupedCommand(TyperCommand):
 
 def make_app(commands: Sequence[Command]) -> typer.Typer:
     """Return an application of these commands; their modules are imported now."""
-    app = typer.Typer(
-        name="realitygap",
-        cls=_RootGroup,
-        no_args_is_help=True,
-        add_completion=False,
-        pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
-        rich_markup_mode=None,
-    )
-    app.callback()(_root)
+    app = _empty_app()
     for command in commands:
         item = getattr(import_module(f"{__package__}.{command.module}"), command.attribute)
         if isinstance(item, typer.Typer):
@@ -62,10 +53,36 @@ def make_app(commands: Sequence[Command]) -> typer.Typer:
     return app
 
 
+def _empty_app() -> typer.Typer:
+    app = typer.Typer(
+        name="realitygap",
+        cls=_RootGroup,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        rich_markup_mode=None,
+    )
+    app.callback()(_root)
+    return app
+
+
 def app_for(arguments: Sequence[str]) -> typer.Typer:
     """Return an application with the command that the arguments name, or with all if they name none."""
     name = next((argument for argument in arguments if not argument.startswith("-")), None)
     return make_app([command for command in COMMANDS if command.name == name] or COMMANDS)
+
+
+def app_to_complete(words: Sequence[str]) -> typer.Typer:
+    """Return an application that a shell can ask for completions of these words.
+
+    If they name no command yet, the application has only the names of commands: importing all of them takes a second.
+    """
+    if any(command.name in words for command in COMMANDS):
+        return app_for(words)
+    app = _empty_app()
+    for command in COMMANDS:
+        app.command(command.name, help=command.summary)(lambda: None)
+    return app
 
 
 def _version(wanted: bool) -> None:

@@ -12,6 +12,13 @@ PURPOSE = (
     "the two."
 )
 
+OPTIONS = {
+    "--version": "Print the version.",
+    "--install-completion": "Install completion for the current shell.",
+    "--show-completion": "Print the completion script of the current shell.",
+    "-h, --help": "Show this message and exit.",
+}
+
 
 @dataclass(frozen=True)
 class Command:
@@ -86,23 +93,24 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
 COMMANDS = tuple(command for commands in SECTIONS.values() for command in commands)
 
 
+def _entry(start: str, text: str, width: int) -> list[str]:
+    return textwrap.wrap(
+        text, width, initial_indent=start, subsequent_indent=" " * len(start), break_on_hyphens=False
+    )
+
+
 def root_help(columns: int) -> str:
     """Return the text of `realitygap --help` for a terminal of that many columns."""
     width = max(NARROWEST, min(columns, WIDEST) - 2)
     lines = ["Usage: realitygap [OPTIONS] COMMAND [ARGS]...", ""]
     lines += textwrap.wrap(PURPOSE, width, initial_indent="  ", subsequent_indent="  ")
-    lines += ["", "Options:", "  --version   Print the version.", "  -h, --help  Show this message and exit."]
+    lines += ["", "Options:"]
+    for option, meaning in OPTIONS.items():
+        lines += _entry(f"  {option:<20}  ", meaning, width)
     for title, commands in SECTIONS.items():
         lines += ["", f"{title}:"]
         for command in commands:
-            start = f"  {command.name:<15} "
-            lines += textwrap.wrap(
-                command.summary,
-                width,
-                initial_indent=start,
-                subsequent_indent=" " * len(start),
-                break_on_hyphens=False,
-            )
+            lines += _entry(f"  {command.name:<15} ", command.summary, width)
     lines += [
         "",
         "  Start with: realitygap demo --open",

@@ -29,9 +29,9 @@ STEP = 1e-3
 """Of finite differences, in standard deviations of the prior."""
 
 METHOD = (
-    "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the poses by an extended "
-    "Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder readings; intervals from "
-    "the curvature (Laplace)."
+    "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the "
+    "poses by an extended Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder "
+    "readings; intervals from the curvature (Laplace)."
 )
 
 
@@ -41,9 +41,10 @@ class Spread:
 
     Attributes:
         name: As in a calibration.
-        kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value counts.
-        spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails let
-            go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
+        kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value
+            counts.
+        spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails
+            let go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
         unit: Of its values.
         advice: What to record if it is not identified.
     """
@@ -136,8 +137,8 @@ def fit_motion_log(
 ) -> MotionLogFit:
     """Fit the drive of a robot to a log, and predict the part that the fit does not see.
 
-    The prior is narrow around the robot's own numbers and has long tails. So a short log changes them little, and a file
-    that is wrong does not hold the fit back.
+    The prior is narrow around the robot's own numbers and has long tails. So a short log changes them little, and a
+    file that is wrong does not hold the fit back.
 
     Args:
         time_s: (n,) ascending times [s].
@@ -156,8 +157,8 @@ def fit_motion_log(
     Raises:
         ValueError: The arrays do not fit together, or show too little.
 
-    Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2; Gelman, Jakulin, Pittau & Su (2008), a
-        weakly informative default prior distribution.
+    Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2; Gelman, Jakulin, Pittau & Su (2008),
+        a weakly informative default prior distribution.
     """
     log = _checked(time_s, commands, poses, encoders, hold_out)
     split = _split(log, hold_out)

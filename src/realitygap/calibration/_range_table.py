@@ -27,12 +27,21 @@ BETWEEN = (0.03, 1.0)
 IDENTIFIED = 0.5
 """A parameter is identified if its interval is narrower than this share of its prior's."""
 
+NOISE = 0.05
+"""Standard deviation of readings around the response that the prior is weighed against."""
+
+STEP = 1e-4
+"""Of finite differences, in standard deviations of the prior."""
+
+MOST_STEPS, MOST_DAMPING, ENOUGH = 200, 1e8, 1e-5
+"""Of least squares: a step that gains less than this share is the last."""
+
 LEAST_COSINE = 1e-3
 """Of the angle at which a ray meets a wall; one that is flatter meets none."""
 
 METHOD = (
-    "Least squares of readings between 0 and 1 with a normal prior, response as in `sim`; intervals from the "
-    "sandwich covariance, clustered by distance (White 1982)."
+    "Least squares of readings between 0 and 1 with a normal prior, response as in `sim`; distances that were set "
+    "together may be off together; intervals from the sandwich covariance, clustered by distance (White 1982)."
 )
 
 
@@ -56,15 +65,18 @@ class Number:
 
 
 NUMBERS = (
-    Number("amplitude", "ratio", 2.0, "", "Record nearer to the wall."),
+    Number("amplitude", "ratio", 3.0, "", "Record nearer to the wall."),
     Number("decay", "ratio", 1.0, "m", "Record at more distances at which readings are between 0 and 1."),
     Number("direction", "plus", 0.3, "rad", "Record at more bearings, to both sides of the sensor."),
     Number("cone", "ratio", 0.7, "rad", "Record at more bearings, to both sides of the sensor."),
     Number("incidence", "ratio", 1.5, "", "Record at more bearings, to both sides of the sensor."),
+    Number(
+        "compression", "ratio", 1.5, "", "Record at more distances at which readings are between 0.5 and 1."
+    ),
 )
 """Priors are wide: tables are made because little is known."""
 
-LEAST = {"cone": 0.02, "incidence": 0.3, "amplitude": 0.01, "decay": 1e-4}
+LEAST = {"cone": 0.02, "incidence": 0.3, "compression": 0.3, "amplitude": 0.01, "decay": 1e-4}
 """The middle of a prior of ratios is at least this."""
 
 
@@ -107,7 +119,8 @@ def fit_range_table(
     *,
     measured_from: MeasuredFrom = "body",
     hold_out: bool = True,
-    shared: Sequence[str] = ("cone", "incidence"),
+    shared: Sequence[str] = ("compression",),
+    distance_sd_m: float = 0.0005,
     seed: int = 0,
 ) -> RangeTableFit:
     """Fit range sensors to readings along a long, straight wall, and predict the places that the fit does not see.
@@ -123,18 +136,27 @@ def fit_range_table(
             mount. With "sensor", bearings count from the direction in which the sensor looks.
         hold_out: Whether the fit leaves out every second place, like a chessboard over distances and bearings.
         shared: Numbers that have one value for all sensors; the others differ.
+        distance_sd_m: Standard deviation of the error of each distance, which all places at that distance share [m]; 0
+            to take distances as they are written.
         seed: Seed of the draws.
+
+    Returns:
+        The fit, with the root mean square error of nominal and fitted numbers at the places that the fit did not see,
+        with distances as they are written. `held_out.more` also has the errors with distances as corrected.
 
     Raises:
         ValueError: The arrays do not fit together, a sensor is not in the robot's file, or its response is not `ir`.
     """
     table = _Table.of(sensor, distance_m, bearing_rad, readings, robot, measured_from, hold_out=hold_out)
-    problem = _Problem.of(table, robot, shared)
+    if not 0.0 <= distance_sd_m < 0.1:
+        raise ValueError(f"distance_sd_m is {distance_sd_m:g}, expected 0 to 0.1 m.")
+    problem = _Problem.of(table, robot, shared, distance_sd_m)
     best, spread = problem.solve()
     rng = np.random.default_rng(seed)
     draws = best + rng.standard_normal((N_DRAWS, len(best))) @ np.linalg.cholesky(spread).T
     numbers = problem.numbers(best)
     drawn = [problem.numbers(row) for row in draws]
+    off = 1000 * problem.off_by(best)
     held_out = _compare(problem, best) if hold_out else None
     return RangeTableFit(
         tuple(problem.fitted(best, spread)),
@@ -142,6 +164,10 @@ def fit_range_table(
         {name: tuple(each[name] for each in drawn) for name in numbers},
         held_out,
         held_out.recommended if held_out else "fitted",
+        notes=(f"Distances are off by {np.sqrt(np.mean(off**2)):.2f} mm (root mean square).",)
+        if len(off)
+        else (),
+        evidence={"distance_off_mm": np.round(off, 3).tolist()},
     )
 
 
@@ -233,9 +259,10 @@ class _Problem:
     table: _Table
     robot: RobotModel
     free: tuple[tuple[Number, tuple[int, ...]], ...]  # a number, and the sensors that have it
+    distance_sd: float
 
     @classmethod
-    def of(cls, table: _Table, robot: RobotModel, shared: Sequence[str]) -> _Problem:
+    def of(cls, table: _Table, robot: RobotModel, shared: Sequence[str], distance_sd: float) -> _Problem:
         unknown = sorted(set(shared) - {number.name for number in NUMBERS})
         if unknown:
             expected = ", ".join(number.name for number in NUMBERS)
@@ -244,7 +271,16 @@ class _Problem:
         free: list[tuple[Number, tuple[int, ...]]] = []
         for number in NUMBERS:
             free += [(number, sensors)] if number.name in shared else [(number, (k,)) for k in sensors]
-        return cls(table, robot, tuple(free))
+        return cls(table, robot, tuple(free), distance_sd)
+
+    @property
+    def n_rings(self) -> int:
+        """Distances that may be off; none if they are taken as written."""
+        return int(self.table.place[0].max()) + 1 if self.distance_sd else 0
+
+    def off_by(self, point: Floats) -> Floats:
+        """Return by how much each distance is larger than written, (r,) [m]."""
+        return np.asarray(self.distance_sd * point[len(self.free) :])
 
     def middle(self, number: Number, sensors: Sequence[int]) -> float:
         """Return where the prior is centered."""
@@ -257,7 +293,7 @@ class _Problem:
             n.name: np.array([_plain(self.robot, k, n.name) for k in range(len(self.robot.range))])
             for n in NUMBERS
         }
-        for (number, sensors), z in zip(self.free, point, strict=True):
+        for (number, sensors), z in zip(self.free, point, strict=False):  # distances follow
             middle = self.middle(number, sensors)
             value = (
                 middle * np.exp(number.spread * z) if number.kind == "ratio" else middle + number.spread * z
@@ -274,42 +310,67 @@ class _Problem:
             f"range.{k}.{number.name}": float(values[number.name][k]) for k in sensors for number in NUMBERS
         }
 
-    def expected(self, values: Mapping[str, Floats]) -> Floats:
-        """Return (n,) readings of all places."""
-        readings = np.empty(len(self.table.sensor))
-        for k in np.unique(self.table.sensor):
-            at = self.table.sensor == k
+    def expected(self, values: Mapping[str, Floats], more: Floats | float = 0.0) -> Floats:
+        """Return (n,) readings of all places, at gaps that are larger by `more` [m]."""
+        table, readings = self.table, np.empty(len(self.table.sensor))
+        gaps = table.gap + more
+        for k in np.unique(table.sensor):
+            at, sensor = table.sensor == k, self.robot.range[k]
             one = {name: float(each[k]) for name, each in values.items()}
-            readings[at] = wall_reading(
-                self.table.gap[at],
-                self.table.bearing[at],
-                one,
-                self.robot.range[k].reach,
-                self.robot.range[k].rays,
-            )
+            readings[at] = wall_reading(gaps[at], table.bearing[at], one, sensor.reach, sensor.rays)
         return readings
 
+    def at(self, point: Floats) -> Floats:
+        """Return (n,) readings of all places at a point of the standard scale."""
+        more = self.off_by(point)[self.table.place[0]] if self.n_rings else 0.0
+        return self.expected(self.values(point), more)
+
+    def slopes(self, point: Floats) -> Floats:
+        """Return (n, p) derivatives of the readings: numbers of different sensors change in one go."""
+        table, here = self.table, self.at(point)
+        slopes = np.zeros((len(here), len(point)))
+        for number in NUMBERS:
+            columns = [k for k, (each, _) in enumerate(self.free) if each.name == number.name]
+            moved = point.copy()
+            moved[columns] += STEP
+            change = (self.at(moved) - here) / STEP
+            for column in columns:
+                rows = np.isin(table.sensor, self.free[column][1])
+                slopes[rows, column] = change[rows]
+        if self.n_rings:
+            moved = point.copy()
+            moved[len(self.free) :] += STEP
+            slopes[np.arange(len(here)), len(self.free) + table.place[0]] = (self.at(moved) - here) / STEP
+        return slopes
+
     def solve(self) -> tuple[Floats, Floats]:
-        """Return the best point, (p,), and its covariance, (p, p)."""
-        from scipy.optimize import least_squares
-
-        table, p = self.table, len(self.free)
-        noise = 0.03
-
-        def off(point: Floats) -> Floats:
-            left = (self.expected(self.values(point)) - table.readings)[table.seen]
-            return np.concatenate([left / noise, point])
-
-        found = least_squares(off, np.zeros(p), x_scale="jac")
-        best, slopes = np.asarray(found.x), np.asarray(found.jac)
-        inverse = np.linalg.inv(slopes.T @ slopes)
-        cluster = table.place[0][table.seen]
-        left = off(best)[: len(cluster)]
-        pulls = np.array(
-            [slopes[: len(cluster)][cluster == k].T @ left[cluster == k] for k in np.unique(cluster)]
-        )
-        spread = inverse @ (pulls.T @ pulls + np.eye(p)) @ inverse
-        return best, (spread + spread.T) / 2 + 1e-12 * np.eye(p)
+        """Return the best point, (p,), and its covariance, (p, p): Levenberg-Marquardt."""
+        table, seen = self.table, self.table.seen
+        point, damping = np.zeros(len(self.free) + self.n_rings), 1e-2
+        left = (self.at(point) - table.readings)[seen] / NOISE
+        for _ in range(MOST_STEPS):
+            slopes = self.slopes(point)[seen] / NOISE
+            curvature = slopes.T @ slopes + np.eye(len(point))
+            slope = slopes.T @ left + point
+            gained = 0.0
+            while damping < MOST_DAMPING:
+                new = point - np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slope)
+                then = (self.at(new) - table.readings)[seen] / NOISE
+                gained = left @ left + point @ point - then @ then - new @ new
+                if gained > 0:
+                    break
+                damping *= 4.0
+            if gained <= 0:
+                break
+            point, left, damping = new, then, max(damping / 8.0, 1e-9)
+            if gained < ENOUGH * (left @ left):
+                break
+        slopes = self.slopes(point)[seen] / NOISE
+        inverse = np.linalg.inv(slopes.T @ slopes + np.eye(len(point)))
+        cluster = table.place[0][seen]
+        pulls = np.array([slopes[cluster == k].T @ left[cluster == k] for k in np.unique(cluster)])
+        spread = inverse @ (pulls.T @ pulls + np.eye(len(point))) @ inverse
+        return point, (spread + spread.T) / 2 + 1e-12 * np.eye(len(point))
 
     def fitted(self, best: Floats, spread: Floats) -> list[Fitted]:
         """Return the parameters with intervals."""
@@ -347,7 +408,7 @@ def wall_reading(
     Args:
         gap: (n,) distance from the mount to the wall [m].
         bearing: (n,) of the wall, from the body's heading [rad].
-        numbers: `direction`, `cone`, `amplitude`, `decay` and `incidence`.
+        numbers: Those of `NUMBERS` by name.
         reach: [m].
         rays: How many.
     """
@@ -359,7 +420,9 @@ def wall_reading(
     distance = np.maximum(gap[:, None], 0.0) / cosine
     back = np.exp(-distance / numbers["decay"]) * (meets & (distance < reach))
     back = back * cosine / (cosine + numbers["incidence"] * (1.0 - cosine))
-    return np.asarray(np.clip(numbers["amplitude"] * (back @ (weights / weights.sum())), 0.0, 1.0))
+    light = numbers["amplitude"] * (back @ (weights / weights.sum()))
+    c = numbers["compression"]
+    return np.asarray(np.clip(np.log1p(c * light) / c if c else light, 0.0, 1.0))
 
 
 def _plain(robot: RobotModel, k: int, name: str) -> float:
@@ -374,20 +437,30 @@ def _compare(problem: _Problem, best: Floats) -> HeldOut:
         n.name: np.array([_plain(problem.robot, k, n.name) for k in range(len(problem.robot.range))])
         for n in NUMBERS
     }
-    left = [problem.expected(values) - table.readings for values in (own, problem.values(best))]
+    predicted = {
+        "own": problem.expected(own),
+        "fitted": problem.expected(problem.values(best)),
+        "at": problem.at(best),
+    }
+    left = {name: values - table.readings for name, values in predicted.items()}
     unseen = ~table.seen
     between = unseen & (table.readings > BETWEEN[0]) & (table.readings < BETWEEN[1])
     more = {}
+    where = f"where {BETWEEN[0]:g} < reading < {BETWEEN[1]:g}"
     if between.any():
-        more[f"where {BETWEEN[0]:g} < reading < {BETWEEN[1]:g}"] = (
-            _rms(left[0][between]),
-            _rms(left[1][between]),
-        )
+        more[where] = (_rms(left["own"][between]), _rms(left["fitted"][between]))
+    if problem.n_rings:
+        more["with corrected distances"] = (_rms(left["own"][unseen]), _rms(left["at"][unseen]))
+        if between.any():
+            more[f"with corrected distances, {where}"] = (
+                _rms(left["own"][between]),
+                _rms(left["at"][between]),
+            )
     return HeldOut(
         "root mean square error of the readings at every second place",
         "",
-        _rms(left[0][unseen]),
-        _rms(left[1][unseen]),
+        _rms(left["own"][unseen]),
+        _rms(left["fitted"][unseen]),
         n=int(unseen.sum()),
         more=more,
         floor=_floor(table),

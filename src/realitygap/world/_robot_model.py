@@ -100,8 +100,8 @@ class Drive(Settings):
     )
     soft_dead_band: Share = Field(
         0.0,
-        description="A wheel stands at commands up to this share d of full speed, and starts from 0 there: "
-        "(|u| - d) / (1 - d) of full speed, in both directions.",
+        description="A wheel stands at commands u up to this share d. Beyond, its speed is (|u| - d) / (1 - d) of full "
+        "speed, in both directions.",
     )
 
     @model_validator(mode="after")

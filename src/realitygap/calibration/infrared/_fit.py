@@ -157,5 +157,7 @@ def _curve(model: SensorModel, cone: float, rays: int, direction: float, values:
     angles = direction + (np.linspace(-cone, cone, rays) if rays > 1 else np.zeros(1))
     cosines = np.maximum(np.cos(angles), 1e-3)
     distances = np.minimum(ahead[:, None] / cosines, model.places.reach)
-    mean, (low, high) = model.quantiles(values, distances, np.array(ENDS))
+    mean, (low, high) = model.quantiles(
+        values, distances, np.broadcast_to(cosines, distances.shape), np.array(ENDS)
+    )
     return {"distances_m": ahead, "mean": mean, "low": low, "high": high}

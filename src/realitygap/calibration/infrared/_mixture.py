@@ -58,9 +58,10 @@ class MixtureReadings:
         self.places = Places.of(placements, reach)
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER)
-        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
         if sensor is not None:
             self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
+        self._incidence = 0.0 if sensor is None else sensor.incidence
         self._compression = 0.0 if sensor is None else sensor.compression
         self.step = step_of(np.concatenate([placement.readings for placement in placements]))
         self._edges = _inner_edges(self.step)
@@ -100,12 +101,12 @@ class MixtureReadings:
         return self._at(self.places, values)
 
     def _light(self, readings: Array) -> Array:
-        """What has to come back for readings: noise is on the light, before it is compressed."""
+        """Return the light of readings: noise is on it, before it is compressed."""
         c = self._compression
         return np.asarray(np.expm1(c * readings) / c) if c else readings
 
     def _at(self, places: Places, values: Array) -> Array:
-        back, spread, drop, out = _parts(places, self.scales, values)
+        back, spread, drop, out = _parts(places, self.scales, values, self._incidence)
         edges = self._light(self._edges)
         below = special.ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
@@ -119,7 +120,9 @@ class MixtureReadings:
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
         """(m,) of (m, d) parameters, with a probability of any reading at all."""
         which, readings, counts = self._rows
-        back, spread, drop, out = (part[:, which] for part in _parts(self.places, self.scales, values))
+        back, spread, drop, out = (
+            part[:, which] for part in _parts(self.places, self.scales, values, self._incidence)
+        )
         half = self.step / 2
         upper = np.where(readings >= 1.0, np.inf, self._light(readings + half))
         lower = np.where(readings <= 0.0, -np.inf, self._light(readings - half))
@@ -130,19 +133,24 @@ class MixtureReadings:
         chance = (1.0 - stray) * chance + stray * self.step
         return np.asarray(self.weight * (np.log(chance) @ counts))
 
-    def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
+    def quantiles(
+        self, values: Array, distances: Array, cosines: Array, shares: Array
+    ) -> tuple[Array, Array]:
         """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
-        blank = [Placement(each, np.empty(0)) for each in distances]
+        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
         chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
         summed = np.cumsum(chances, axis=1)
         place = np.array([(summed < share).sum(axis=1) for share in shares])
         return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
 
 
-def _parts(places: Places, scales: tuple[Scale, ...], values: Array) -> tuple[Array, Array, Array, Array]:
+def _parts(
+    places: Places, scales: tuple[Scale, ...], values: Array, own_incidence: float
+) -> tuple[Array, Array, Array, Array]:
     """(m, p) each: response, standard deviation, and probability of nothing and of anything."""
     amplitude, decay, gain = values[:, :3].T
-    per_volt, incidence = (column(scales, values, scale) for scale in (BATTERY, INCIDENCE))
+    per_volt = column(scales, values, BATTERY)
+    incidence = column(scales, values, INCIDENCE, own_incidence)
     back, dim = places.response(amplitude, decay, per_volt, incidence)
     spread = np.maximum(gain[:, None] * back, 1e-9)
     drop = logistic(dim, *values[:, 3:6].T)

@@ -8,11 +8,11 @@ sensor. A sensor that sees less than 18 in far is placed relative to its reach, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from realitygap.calibration._rays import rays_of
 from realitygap.records import ObservedTrial
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, Pose, RobotModel
@@ -36,9 +36,6 @@ PLACEMENTS = 3
 
 SENSORS = "sensors"
 """The purpose of these trials."""
-
-Rays = Callable[[Pose], Sequence[NDArray[np.float64]]]
-"""Distances along the rays of each range sensor at a pose, to what is nearest [m]."""
 
 
 def sensor_distances(robot: RobotModel) -> list[float]:
@@ -105,19 +102,17 @@ def distance_of(plan: TrialPlan, arena: Arena, robot: RobotModel) -> float:
     return right - start.x - max(sensor.x for sensor in robot.range)
 
 
-def placements_of(trials: Sequence[ObservedTrial], rays: Rays) -> list[list[Placement]]:
+def placements_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> list[list[Placement]]:
     """(s,) the placements of each range sensor, of all trials in which the robot stood."""
-    placements: list[list[Placement]] = []
+    placements: list[list[Placement]] = [[] for _ in robot.range]
     for trial in trials:
         if not len(trial.readings) or np.any(trial.commands != 0):
             continue
-        x, y, heading = trial.poses[0] if len(trial.poses) else trial.start
-        distances = rays(Pose(float(x), float(y), float(heading)))
-        if not placements:
-            placements = [[] for _ in distances]
-        for k, each in enumerate(distances):
+        pose = np.array([trial.poses[0] if len(trial.poses) else trial.start], np.float64)
+        for k, sensor in enumerate(robot.range):
+            (distances,), (cosines,) = rays_of(sensor, pose, arena)
             readings = trial.readings[:, k]
             placements[k].append(
-                Placement(np.asarray(each), readings, trial.battery_v, place=tuple(trial.start))
+                Placement(distances, readings, trial.battery_v, cosines, place=tuple(trial.start))
             )
     return placements

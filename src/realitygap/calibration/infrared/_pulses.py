@@ -41,7 +41,8 @@ class PulseReadings:
         self.pulses = pulses
         self.weight = weight
         self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
-        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slanted
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
+        self._incidence = 0.0 if sensor is None else sensor.incidence
         if sensor is not None:
             self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
@@ -73,7 +74,8 @@ class PulseReadings:
     def _pulses(self, places: Places, values: Array) -> tuple[NDArray[np.int64], Array]:
         """(m, p) each: pulses that come back if none is missed, and the probability that one is missed."""
         amplitude, decay, most, at, width = values[:, :5].T
-        per_volt, incidence = (column(self.scales, values, scale) for scale in (BATTERY, INCIDENCE))
+        per_volt = column(self.scales, values, BATTERY)
+        incidence = column(self.scales, values, INCIDENCE, self._incidence)
         back, dim = places.response(amplitude, decay, per_volt, incidence)
         back = np.clip(back, 0.0, 1.0)
         missed = np.clip(logistic(dim, most, at, width), 1e-12, 1.0 - 1e-12)
@@ -110,9 +112,11 @@ class PulseReadings:
             logs[part] = np.einsum("mr,r->m", np.log(chances), self.counts[which, counts])
         return np.asarray(self.weight * logs)
 
-    def quantiles(self, values: Array, distances: Array, shares: Array) -> tuple[Array, Array]:
+    def quantiles(
+        self, values: Array, distances: Array, cosines: Array, shares: Array
+    ) -> tuple[Array, Array]:
         """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
-        blank = [Placement(each, np.empty(0)) for each in distances]
+        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
         chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
         summed = np.cumsum(chances, axis=1)
         place = [(summed < share).sum(axis=1) for share in shares]

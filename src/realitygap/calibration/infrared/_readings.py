@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 SAME_V = 0.05
 """Voltages that differ by less say nothing of a battery [V]."""
 
+VARIED = 0.05
+"""Difference of mean cosines between placements from which on angles varied."""
+
 SLANTED = 0.9
 """Cosine of the angle to its normal from which on a wall counts as slanted."""
 
@@ -99,6 +102,11 @@ class Places:
     def slanted(self) -> bool:
         """Whether walls were met at such angles that what they send back at a slant shows."""
         return float(self.cosines.min()) < SLANTED
+
+    @property
+    def slants_varied(self) -> bool:
+        """Whether incidence can be told from amplitude: walls were met at several angles, some of them slanted."""
+        return self.slanted and float(np.ptp(self.cosines.mean(axis=1))) > VARIED
 
     def response(
         self, amplitude: Array, decay: Array, per_volt: Array, incidence: Array

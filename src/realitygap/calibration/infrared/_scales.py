@@ -105,7 +105,7 @@ def scaled(scale: Scale, sensor: RangeSensor) -> Scale:
     return replace(scale, low=low, high=high)
 
 
-def column(scales: tuple[Scale, ...], values: Array, scale: Scale) -> Array:
-    """(m,) the values of one parameter among (m, d) of all; 0 where it is none of them."""
+def column(scales: tuple[Scale, ...], values: Array, scale: Scale, own: float = 0.0) -> Array:
+    """(m,) the values of one parameter among (m, d) of all; the sensor's own number if it is none of them."""
     names = [each.name for each in scales]
-    return values[:, names.index(scale.name)] if scale.name in names else np.zeros(len(values))
+    return values[:, names.index(scale.name)] if scale.name in names else np.full(len(values), own)

@@ -1,9 +1,9 @@
 """Noise of range sensors: the zero-inflated mixture of infrared ones, and the paper's uniform noise.
 
 A reading is made in this order: the response; times 1 + gain * N; compressed; limited to 0..1; then with some
-probability nothing (0), or else with some probability anything (uniform); then the paper's a * U added. Each draws its
-own words, so that switching one off leaves the others as they are. A reading is one reading: nothing here depends on how
-long a step lasts.
+probability nothing (0), or else with some probability anything (uniform); then the paper's a * U added. Each draws
+its own words, so that switching one off leaves the others as they are. A reading is one reading: nothing here depends
+on how long a step lasts.
 """
 
 from __future__ import annotations

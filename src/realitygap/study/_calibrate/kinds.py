@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
@@ -225,7 +224,7 @@ def _fit_sensors(
             "robot that it was (--base ROBOT)."
         )
     rng = np.random.default_rng(seed)
-    placements = placements_of(standing, _rays_in(robot, arena))
+    placements = placements_of(standing, robot, arena)
     fits = [fit_sensor(robot, k, each, rng) for k, each in enumerate(placements)]
     p = min(1.0, len(fits) * min(fit.p for fit in fits))
     farthest = max(fit.misfit for fit in fits)
@@ -239,18 +238,6 @@ def _fit_sensors(
         misspecification_p=p,
         evidence={"sensors": [_drawn_of(fit, each) for fit, each in zip(fits, placements, strict=True)]},
     )
-
-
-def _rays_in(robot: RobotModel, arena: Arena) -> Callable[[Pose], list[NDArray[np.float64]]]:
-    """Distances along each sensor's rays at a pose, as the simulated robot sees them."""
-    simulated = SimRobot(SimPlatform(robot=robot, precision="double"), arena)
-    ends = np.cumsum([sensor.rays for sensor in robot.range])
-
-    def rays(pose: Pose) -> list[NDArray[np.float64]]:
-        simulated.reset(pose)
-        return [np.array(each) for each in np.split(simulated.distances[: ends[-1]], ends[:-1])]
-
-    return rays
 
 
 def _said_of(fit: SensorFit) -> str:

@@ -576,3 +576,16 @@ def test_the_figure_of_sensors_is_drawn_from_readings_of_the_kernels():
     noisy = make_sensors.read(load_robot("scribbler-s2-fluke1"), distances, 20)
     assert (noisy == 0).any()
     assert ((noisy >= 0) & (noisy <= 1)).all()
+
+
+def test_page_on_robots_of_other_people_shows_missed_goals_first():
+    make_real_data = _load("make_real_data")
+    found = json.loads((DOCS / "data/real-data.json").read_text("utf-8"))
+    results = [row[0] for row in make_real_data.verdicts(found)]
+    assert results == sorted(results)
+    assert len(results) == len(found["goals"]) + 1
+    page = (DOCS / "explanations/real-data.md").read_text("utf-8")
+    for name, text in make_real_data.page_parts().items():
+        assert f"../generated/{name}" in page
+        assert "nan" not in text
+    assert "REAL (others' robots)" in make_real_data.page_parts()["parts/real-goals.md"]

@@ -79,6 +79,15 @@ def calibrate(
             "table]",
         ),
     ] = None,
+    radius_mm: Annotated[
+        float | None,
+        typer.Option(
+            "--radius-mm",
+            min=1.0,
+            metavar="MM",
+            help="Radius of a round robot without a file: a table of readings places its sensors.",
+        ),
+    ] = None,
     drop_bad_rows: Annotated[
         bool,
         typer.Option(
@@ -146,6 +155,8 @@ def calibrate(
 
     Example: realitygap calibrate sensors --from wall.sample --base khepera -o wall.toml
 
+    Example: realitygap calibrate sensors --from wall.sample --radius-mm 27.5 -o wall.toml
+
     In Python: realitygap.study.calibrate_from_log("drive.csv", base="pioneer")
 
     In Python: realitygap.study.calibrate_from_table("wall.sample", base="khepera")
@@ -156,14 +167,16 @@ def calibrate(
 
     out = _checked(what, robot, out, observe, data, witness, camera, figure, choose=choose)
     foreign = _is_foreign(data)
-    if not foreign and (map_file is not None or hold_out is not None or drop_bad_rows):
+    if not foreign and any((map_file, hold_out, radius_mm, drop_bad_rows)):
         raise StudyError(
-            "--map, --hold-out and --drop-bad-rows go with --from and a log or a table of another program."
+            "--map, --hold-out, --radius-mm and --drop-bad-rows go with --from and a log or a table of another program."
         )
     if foreign and data is not None:
         if figure is not None:
             raise StudyError("--figure draws the readings of trials, and this is a table. Leave it out.")
-        made = _from_foreign(what, data, map_file, base, hold_out, seed, drop_bad_rows=drop_bad_rows)
+        made = _from_foreign(
+            what, data, out, map_file, base, hold_out, seed, radius_mm, drop_bad_rows=drop_bad_rows
+        )
     elif data is not None:
         made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
     else:
@@ -252,16 +265,20 @@ def _is_foreign(data: Path | None) -> bool:
 def _from_foreign(
     what: str,
     data: Path,
+    out: Path,
     map_file: Path | None,
     base: str | None,
     hold_out: str | None,
     seed: int,
+    radius_mm: float | None,
     *,
     drop_bad_rows: bool,
 ) -> Calibration:
     """Fit a log or a table of another program."""
     from realitygap.study import calibrate_from_log, calibrate_from_table, hold_out_of
 
+    if radius_mm is not None and (what != "sensors" or base is not None):
+        raise StudyError("--radius-mm goes with sensors, in place of --base.")
     if what == "motion":
         share = hold_out_of(hold_out or "0.5")
         return calibrate_from_log(
@@ -269,7 +286,13 @@ def _from_foreign(
         )
     if what == "sensors":
         return calibrate_from_table(
-            data, map_file=map_file, base=base, hold_out=hold_out_of(hold_out or "blocks"), seed=seed
+            data,
+            map_file=map_file,
+            base=base,
+            hold_out=hold_out_of(hold_out or "blocks"),
+            seed=seed,
+            radius=None if radius_mm is None else radius_mm / 1000,
+            robot_file=out.with_suffix(".robot.toml"),
         )
     raise StudyError(
         f"{data} is no file of observed trials. Of a log, motion can be fitted; of a table of readings, sensors. "

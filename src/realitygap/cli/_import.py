@@ -111,10 +111,7 @@ def _print(log: Path, out: Path, log_map: LogMap, origin: str, report: ImportRep
         typer.echo(note)
     offset = report.offset
     if offset is not None:
-        typer.echo(
-            f"Poses follow commands by {offset.seconds:.2f} s ({offset.low:.2f} to {offset.high:.2f}), a robot's lag "
-            "and delay included."
-        )
+        typer.echo(f"Poses follow commands by {offset}, a robot's lag and delay included.")
     for mistake in report.mistakes:
         typer.echo(f"Check ({mistake.kind}): {mistake.message}")
     typer.echo(

@@ -15,6 +15,7 @@ from ._mistakes import Diagnosis, Mistake, diagnose
 from ._open import KINDS, open_source
 from ._range_table import RangeTable, read_range_table
 from ._read import Log, read_logs
+from ._round_robot import round_robot
 from ._source import Batch, Source
 from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
 
@@ -55,5 +56,6 @@ __all__ = [
     "read_logs",
     "read_range_table",
     "robot_of",
+    "round_robot",
     "trials_of",
 ]

@@ -33,6 +33,11 @@ class ClockOffset:
     high: float
     correlation: float
 
+    def __str__(self) -> str:
+        """The offset with its interval."""
+        at, low, high = (round(value, 2) + 0.0 for value in (self.seconds, self.low, self.high))
+        return f"{at:.2f} s ({low:.2f} to {high:.2f})"
+
 
 def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) -> ClockOffset | None:
     """Return the time by which one set of signals follows another; None if they do not show it.

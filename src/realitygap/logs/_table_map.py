@@ -47,9 +47,6 @@ class TableMap(Settings):
     robot: str = Field(
         "", description="The robot that was measured: a name or a file. `--base` takes precedence."
     )
-    radius_mm: float = Field(
-        0.0, ge=0, description="Radius of a round robot without a file: its sensors are placed by the table."
-    )
     measured_from: MeasuredFrom | None = Field(
         None,
         description="Point that distances are measured from: the body's outline, its origin, or the sensor. "

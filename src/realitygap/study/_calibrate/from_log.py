@@ -115,10 +115,7 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
     notes = [f"Check ({mistake.kind}): {mistake.message}" for mistake in diagnosis.mistakes]
     offset = diagnosis.offset
     if offset is not None:
-        notes.append(
-            f"Poses follow commands by {offset.seconds:.2f} s ({offset.low:.2f} to {offset.high:.2f}), a robot's lag "
-            "and delay included."
-        )
+        notes.append(f"Poses follow commands by {offset}, a robot's lag and delay included.")
     return notes
 
 

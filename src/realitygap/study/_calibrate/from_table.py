@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from realitygap.calibration import fit_range_table, look_up_readings, place_ranks, predict_range_table
 from realitygap.errors import StudyError
-from realitygap.logs import RangeTable, TableMap, load_table_map, map_beside, read_range_table
+from realitygap.logs import RangeTable, TableMap, load_table_map, map_beside, read_range_table, round_robot
 from realitygap.platforms import JyroPlatform
+from realitygap.records import write_whole
 from realitygap.world import Calibration, RobotModel, load_robot, robot_names
 
 from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut
@@ -33,6 +34,8 @@ def calibrate_from_table(
     base: str | Path | None = None,
     hold_out: HoldOut = "blocks",
     seed: int = 0,
+    radius: float | None = None,
+    robot_file: Path | None = None,
 ) -> Calibration:
     """Fit the range sensors of a robot to a table of readings by distance and bearing of a wall.
 
@@ -43,12 +46,17 @@ def calibrate_from_table(
         hold_out: What the fit does not see: blocks for every second place, like a chessboard over distances and
             bearings, or a share of the places at random. With 0 it sees everything, and nothing is compared.
         seed: Of draws, and of the places that are held out at random.
+        radius: Of a round robot that has no file [m]: one is written, with the sensors where the table has them.
+        robot_file: Where it is written.
 
     Raises:
         StudyError: The table and the robot do not go together.
         LogError: The table cannot be read.
     """
     table_map = _map_of(path, map_file)
+    table = read_range_table(path, table_map)
+    if radius is not None and robot_file is not None:
+        base = _write_robot(table, radius, robot_file)
     name = str(base or table_map.robot)
     if not name:
         raise StudyError(
@@ -56,11 +64,10 @@ def calibrate_from_table(
             f"{', '.join(robot_names())}."
         )
     robot = load_robot(name)
-    table = read_range_table(path, table_map)
     if table.n_sensors > len(robot.range):
         raise StudyError(
             f"{path} has {table.n_sensors} sensors, and robot {robot.name!r} has {len(robot.range)}. Name the robot "
-            "that was measured: --base ROBOT."
+            "that was measured: --base ROBOT. For a round robot without a file, give --radius-mm."
         )
     bearing, notes = _turned(table, robot)
     seen = _seen(table, hold_out, seed)
@@ -93,6 +100,13 @@ def calibrate_from_table(
 def _map_of(path: str | Path, map_file: str | Path | None) -> TableMap:
     file = map_beside(path) if map_file is None else Path(map_file)
     return load_table_map(file) if map_file is not None or file.is_file() else TableMap()
+
+
+def _write_robot(table: RangeTable, radius: float, file: Path) -> Path:
+    """Write the file of a round robot with the sensors of a table, clockwise if nobody says how bearings grow."""
+    text = round_robot(table, radius, file.name.split(".")[0], clockwise=table.clockwise is not False)
+    write_whole(file, text.encode())
+    return file
 
 
 def _turned(table: RangeTable, robot: RobotModel) -> tuple[NDArray[np.float64], list[str]]:

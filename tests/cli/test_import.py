@@ -1,0 +1,155 @@
+"""`realitygap import`, and fits to logs and tables of other programs."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.errors import RealityGapError
+from realitygap.evolution import NeatSettings, Population
+from realitygap.platforms import open_target
+from realitygap.records import read_observations
+from realitygap.world import load_calibration, load_robot, paper_arena
+from tests.logs.made import SPEED, TRACK, drive, rows, wall_table, write, write_sample
+
+MAP = f"""\
+robot = "pioneer"
+speed = {SPEED}
+track = {TRACK}
+commands = {{ time = "t", left = "left", right = "right" }}
+poses = {{ time = "t", x = "x", y = "y", heading = "heading" }}
+"""
+
+
+def run(*arguments):
+    done = CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+def refused(*arguments):
+    done = CliRunner().invoke(app, [*map(str, arguments)])
+    assert isinstance(done.exception, RealityGapError), done.output
+    message = str(done.exception)
+    assert "\n" not in message
+    return message
+
+
+@pytest.fixture
+def log(tmp_path):
+    (tmp_path / "drive.map.toml").write_text(MAP, "utf-8")
+    return write(tmp_path / "drive.csv", rows(*drive(80)))
+
+
+def test_import_writes_trials_and_reports_what_it_did(log, tmp_path):
+    out = tmp_path / "trials.jsonl"
+    printed = run("import", log, "-o", out)
+    assert "(REAL): 1 trial, 80 steps, 8 s; commands, poses" in printed
+    assert "Poses follow commands by 0.00 s" in printed
+    assert "Check" not in printed
+    kept = read_observations(out)
+    assert (kept.head.label, kept.head.observe, kept.head.robot) == ("REAL", "track", "pioneer")
+    commands, poses = drive(80)
+    (trial,) = kept.trials
+    assert trial.poses == pytest.approx(poses)
+    assert trial.commands == pytest.approx(
+        np.stack([commands.mean(1), (commands[:, 1] - commands[:, 0]) / 2], 1), abs=1e-9
+    )
+    report = json.loads(run("import", log, "-o", out, "--step", "0.2", "--json"))
+    assert (report["n_steps"], report["step_s"]) == (40, 0.2)
+
+
+def test_import_names_mistakes(log, tmp_path):
+    commands, poses = drive(300)
+    write(log, rows(commands[:, ::-1], poses))
+    assert "Check (swapped)" in run("import", log, "-o", tmp_path / "trials.jsonl")
+
+
+def test_shown_mapping_is_a_mapping(log, tmp_path):
+    log.with_name("drive.map.toml").unlink()
+    shown = run("import", log, "--show-map")
+    (tmp_path / "shown.toml").write_text('robot = "pioneer"\nspeed = 1.0\n' + shown, "utf-8")
+    run("import", log, "--map", tmp_path / "shown.toml", "-o", tmp_path / "trials.jsonl")
+    assert "does not name the robot that drove" in refused("import", log, "-o", tmp_path / "trials.jsonl")
+
+
+def test_wrong_inputs_have_one_message(log, tmp_path):
+    out = tmp_path / "trials.jsonl"
+    assert "Name the file that the trials go to" in refused("import", log)
+    assert "does not end in .jsonl" in refused("import", log, "-o", tmp_path / "trials.csv")
+    assert "There is no file" in refused("import", tmp_path / "none.csv", "-o", out)
+    assert "Cannot read the mapping" in refused("import", log, "--map", tmp_path / "none.toml", "-o", out)
+    assert "Set speed in the mapping" in refused(
+        "import", write(log, rows(2 * drive(80)[0], drive(80)[1])), "-o", out
+    )
+    assert not out.exists()
+    fit = tmp_path / "fit.toml"
+    calibrate = ("calibrate", "motion", "--from", log, "-o", fit)
+    assert "--hold-out is '2', expected a share" in refused(*calibrate, "--hold-out", 2)
+    assert "go with --from and a log" in refused(
+        "calibrate", "path", "--robot", "sim", "-o", fit, "--map", log
+    )
+    assert "is no file of observed trials" in refused("calibrate", "contact", "--from", log, "-o", fit)
+    assert "--radius-mm goes with sensors" in refused(*calibrate, "--radius-mm", 20)
+    write(log, rows(-drive(300)[0], drive(300)[1]))
+    assert "Both wheels are reversed" in refused(*calibrate)
+    write(log, rows(*drive(80))[:, :3], "t,left,right")
+    log.with_name("drive.map.toml").write_text(MAP.split("poses")[0], "utf-8")
+    assert "has commands alone" in refused(*calibrate)
+
+
+def test_log_of_a_known_controller_is_a_target(log, tmp_path):
+    genome = Population(NeatSettings(population=2), 3, 2, seed=1).ask()[0]
+    genome.save(tmp_path / "controller.json")
+    mapping = log.with_name("drive.map.toml")
+    with pytest.raises(RealityGapError, match="controller = FILE in its mapping"):
+        open_target(f"recorded:{log}", paper_arena())
+    mapping.write_text(f'controller = "{tmp_path / "controller.json"}"\n' + MAP, "utf-8")
+    with open_target(f"recorded:{log}", paper_arena()) as target:
+        assert (target.label, target.observes, target.steps) == ("REAL", "track", 80)
+        assert target.controllers[0][0].to_json() == genome.to_json()
+
+
+@pytest.mark.slow
+def test_motion_is_fitted_to_a_log_and_compared(log, tmp_path):
+    commands, poses = drive(400, noise=0.002)
+    wrong = SPEED / 1.1  # the wheels are 10 % faster than the mapping says
+    log.with_name("drive.map.toml").write_text(MAP.replace(f"speed = {SPEED}", f"speed = {SPEED}"), "utf-8")
+    write(log, rows(commands * wrong / SPEED, poses))
+    fit = tmp_path / "fit.toml"
+    printed = run("calibrate", "motion", "--from", log, "-o", fit)
+    assert "Not seen by the fit (REAL" in printed
+    made = load_calibration(fit)
+    errors = made.evidence["held_out"]["errors"]
+    assert list(errors) == ["fitted", "nominal numbers", "nominal, uniform noise", "lookup table"]
+    assert errors["fitted"] < 0.02 < errors["nominal numbers"]
+    assert load_robot(fit).drive.gain_left == pytest.approx(1.1, abs=0.02)
+    assert load_robot(fit).drive.speed == SPEED
+    blocks = run("calibrate", "motion", "--from", log, "-o", fit, "--hold-out", "blocks", "--json")
+    assert "mean of 4 blocks" in json.loads(blocks)["method"] + str(load_calibration(fit).evidence)
+
+
+@pytest.mark.slow
+def test_sensors_are_fitted_to_a_table_and_compared(tmp_path):
+    robot = load_robot("khepera")
+    true = robot.with_numbers({f"range.{k}.decay": 0.012 for k in range(8)})
+    cells = wall_table(true, 5 + 4 * np.arange(6), 36)
+    noisy = np.clip(cells + np.random.default_rng(0).normal(0, 0.01, cells.shape), 0, 1)
+    table = write_sample(tmp_path / "wall.sample", np.round(noisy * 1023), 5, 4, "{:.0f}")
+    fit = tmp_path / "fit.toml"
+    printed = run("calibrate", "sensors", "--from", table, "--base", "khepera", "-o", fit)
+    assert "Bearings are taken to grow clockwise" in printed
+    assert "1023 is taken for the full scale" in printed
+    errors = load_calibration(fit).evidence["held_out"]["errors"]
+    assert errors["fitted"] < 0.02 < errors["nominal numbers"]
+    assert load_robot(fit).range[2].decay == pytest.approx(0.012, rel=0.2)
+    made = run("calibrate", "sensors", "--from", table, "--radius-mm", 27.5, "-o", fit, "--hold-out", 0.3)
+    assert "at 30% of the places" in " ".join(made.split())
+    assert load_calibration(fit).evidence["held_out"]["errors"]["fitted"] < 0.05
+    directions = [sensor.direction for sensor in load_robot(tmp_path / "fit.robot.toml").range]
+    assert directions[:6] == pytest.approx([sensor.direction for sensor in robot.range[:6]], abs=0.3)
+    assert "has 8 sensors" in refused(
+        "calibrate", "sensors", "--from", table, "--base", "scribbler-s2-fluke2", "-o", fit
+    )

@@ -36,7 +36,7 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 DESKTOP, PHONE = (1280, 900), (390, 844)
-PATIENCE_MS = 120_000
+PATIENCE_MS = 30_000
 OUTAGE = ("net::ERR", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 
@@ -98,13 +98,13 @@ class RunningLab:
         (folder / "sitecustomize.py").write_text(ENDLESS_CHECKS)
 
     def kill(self) -> None:
-        """End it as a power cut does."""
+        """End drive as a power cut does."""
         assert self._process is not None
         self._process.kill()
         self._process.join()
 
     def stop(self) -> None:
-        """End it as Ctrl-C does."""
+        """End drive as Ctrl-C does."""
         process = self._process
         assert process is not None
         assert process.pid is not None

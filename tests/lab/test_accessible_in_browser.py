@@ -53,9 +53,9 @@ def faults(page) -> list[str]:
 
 def test_pages_without_a_study(lab, look):
     for path, text in (
-        ("", "No study is here yet."),
-        ("new", "Start"),
-        ("calibrate", "What is seen of it"),
+        ("", "No studies yet."),
+        ("new", "Start study"),
+        ("calibrate", "What to calibrate"),
         ("gap", "Measure"),
         ("robot", "Connect"),
         ("trials/nobody", "There is no study"),
@@ -67,9 +67,10 @@ def test_pages_without_a_study(lab, look):
 
 def test_a_study_that_is_watched_and_played(lab, look):
     run_study(parse_study(TEXT, "study.toml"), lab.root / "seen")
-    page = look("watch/seen")
+    page = look("study/seen")
     page.locator(".lab-figure img").nth(4).wait_for()
-    page.get_by_role("button", name="Show", exact=True).click()
+    page.get_by_role("tab", name="Replay").click()
+    page.get_by_role("button", name="Show trials").click()
     page.locator(".rg-player").wait_for()
     assert faults(page) == []
     home = look("")
@@ -79,35 +80,36 @@ def test_a_study_that_is_watched_and_played(lab, look):
 
 def test_trials_that_are_counted_from_a_photo(lab, look):
     lines = drive_sheet(lab.root)
-    page = look("trials/by-robot")
+    page = look("study/by-robot/trials")
     page.get_by_label("Your name").fill("anna")
     photo = {"name": "sheet.jpg", "mimeType": "image/jpeg", "buffer": photo_of(lines)}
     page.get_by_label("Choose a photo").set_input_files(photo)
     page.get_by_text("it goes on.").wait_for()
     assert faults(page) == []
     page.locator("[data-counting] image").wait_for()
-    page.get_by_text("Cells from a video of the camera").click()
+    page.get_by_text("Score from a video").click()
     page.get_by_label("What to look for").wait_for()
     assert faults(page) == []
 
 
 def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
     make_study(lab.root)
-    page = look("trials/by-robot")
+    page = look("study/by-robot/trials")
     begin_sitting(page)
-    page.get_by_role("button", name="Start the trial").wait_for()
+    page.get_by_role("button", name="Start trial").wait_for()
     assert faults(page) == []
-    page.get_by_role("button", name="End the sitting").click()
-    page.get_by_role("button", name="Begin a sitting").wait_for()
+    page.get_by_role("button", name="Disconnect").click()
+    page.get_by_role("button", name="Connect robot").wait_for()
     robot = look("robot")
-    robot.get_by_role("button", name="Connect").click()
-    robot.get_by_text("Battery: ").wait_for()
+    robot.get_by_role("button", name="Use an emulated robot").click()
+    robot.get_by_text("Battery").wait_for()
     assert faults(robot) == []
 
 
 def test_a_calibration_whose_plot_grows(lab, look):
     page = look("calibrate")
-    page.get_by_label("Trials in all").fill("4")
+    page.get_by_text("Advanced", exact=True).click()
+    page.get_by_label("Number of trials").fill("4")
     page.get_by_role("button", name="Calibrate", exact=True).click()
     page.locator(".lab-plot").wait_for()
     assert faults(page) == []

@@ -20,8 +20,8 @@ def measure(page, **fields: str) -> None:
 
 def test_the_report_of_a_gap_grows_until_all_trials_are_done(lab, visit):
     page = visit("gap")
-    measure(page, Name="first", Simulator="sim", Target="jyro", Trials_of_each="3")
-    page.get_by_text("Done.", exact=True).wait_for(timeout=180_000)
+    measure(page, Name="first", Simulator="sim", Target="jyro", Trials_per_controller="3")
+    page.get_by_text("Complete.", exact=True).wait_for(timeout=180_000)
     report = page.frame_locator("iframe")
     report.get_by_text("jyro").first.wait_for()
     assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30

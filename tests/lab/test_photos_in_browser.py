@@ -16,7 +16,7 @@ from .sheets import drive_sheet, photo_of, true_cells
 
 pytestmark = pytest.mark.slow
 
-PAGE = "trials/by-robot"
+PAGE = "study/by-robot/trials"
 
 
 def send(page, data: bytes, name: str = "sheet.jpg") -> None:
@@ -26,7 +26,7 @@ def send(page, data: bytes, name: str = "sheet.jpg") -> None:
 
 def name_oneself(page, who: str) -> None:
     page.get_by_label("Your name").fill(who)
-    page.get_by_text("To be counted: ").wait_for()
+    page.get_by_text("To score: ").wait_for()
     page.wait_for_function("() => document.cookie.includes('realitygap_who')")
 
 
@@ -56,8 +56,8 @@ def test_a_photo_proposes_cells_that_are_corrected_by_tapping_and_entered(lab, v
     wrong = next(cell for cell in range(60, 72) if cell not in marked(card))
     tap(page, wrong)
     card.get_by_text(f"{n_proposed + 1} of 72 cells").wait_for()
-    card.get_by_role("button", name="Enter this count").click()
-    page.locator('[data-counting="2"]').get_by_role("button", name="Enter this count").click()
+    card.get_by_role("button", name="Save count").click()
+    page.locator('[data-counting="2"]').get_by_role("button", name="Save count").click()
     page.get_by_text("All trials on it are counted.").wait_for()
     with ledger_of(lab.root) as ledger:
         first, second = list(ledger.trials())[:2]
@@ -86,8 +86,8 @@ def test_a_photo_is_read_on_when_the_lab_was_killed_and_all_are_entered_at_once(
     lab.start()
     page = visit(PAGE)
     name_oneself(page, "ben")
-    page.get_by_role("button", name="I looked at all: enter 2 trials").click()
-    page.get_by_text("2 trials are in the ledger.").wait_for()
+    page.get_by_role("button", name="Save 2 trials").click()
+    page.get_by_text("2 trials saved.").wait_for()
     with ledger_of(lab.root) as ledger:
         found = list(ledger.trials())
     for trial, line in zip(found, lines, strict=True):
@@ -100,7 +100,7 @@ def test_a_file_that_is_no_photo_of_the_sheet_gets_one_message_and_changes_nothi
     page = visit(PAGE)
     send(page, b"no picture at all", "notes.jpg")
     page.get_by_text("The file is no picture that can be read: expected JPEG, PNG, TIFF or WebP.").wait_for()
-    page.get_by_role("button", name="Leave it out").click()
+    page.get_by_role("button", name="Remove photo").click()
     page.locator("[data-photo]").wait_for(state="detached")
     assert list((lab.root / "by-robot" / "lab" / "photos").iterdir()) == []
     large = HTTPConnection(urlsplit(lab.address).netloc)
@@ -122,8 +122,8 @@ def test_a_second_count_does_not_begin_with_the_photo_by_itself(lab, visit):
     page = visit(PAGE)
     name_oneself(page, "anna")
     send(page, photo_of(lines))
-    page.get_by_role("button", name="I looked at all: enter 2 trials").click()
-    page.get_by_text("2 trials are in the ledger.").wait_for()
+    page.get_by_role("button", name="Save 2 trials").click()
+    page.get_by_text("2 trials saved.").wait_for()
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
     other.get_by_role("button", name="1, red").last.click()

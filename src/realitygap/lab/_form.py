@@ -143,7 +143,7 @@ def entered(field: Field, text: str) -> Any:
 
 
 def written_form(data: Mapping[str, Any]) -> str:
-    """The study file with these values; a section without any is left out, and what is no section is kept as it is."""
+    """Study file with these values; a section without any is left out, and what is no section is kept as it is."""
     conditions = _conditions(data)
     plain = {
         key: value

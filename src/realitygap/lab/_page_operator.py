@@ -213,7 +213,7 @@ class PageOperator(Operator):
         return "driven" if answer.get("verdict") == "driven" else "void"
 
     def place(self, card: Card) -> None:
-        """Ask for the robot at its start, with the pen."""
+        """Request control at its start, with the pen."""
         self._channel.ask("place", card=card_values(card), is_placed=self._witness is not None)
         super().place(card)
         self._page.begun(card, self._witness)

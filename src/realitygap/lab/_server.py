@@ -176,6 +176,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
         tailwind=False,
         show_welcome_message=False,
         language="en-US",
+        dark=None,
         reconnect_timeout=LOST_S,
     )
     logging.getLogger("uvicorn.error").addFilter(_is_news)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
 import re
 import socket
@@ -38,7 +39,8 @@ class StudyState:
         n_driven_runs, n_driven_done: Runs of conditions that a robot drives, and those complete.
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
-        problem: Why nothing more is known of it; empty otherwise.
+        labels: Labels of its conditions, such as SIM.
+        problem: Why it cannot be read; empty otherwise.
     """
 
     name: str
@@ -50,17 +52,13 @@ class StudyState:
     n_driven_done: int = 0
     trials: dict[str, int] = field(default_factory=dict)
     used_by: str = ""
+    labels: tuple[str, ...] = ()
     problem: str = ""
 
     @property
     def is_complete(self) -> bool:
         """Whether nothing is missing."""
         return not self.problem and (self.n_done, self.n_driven_done) == (self.n_runs, self.n_driven_runs)
-
-    @property
-    def share(self) -> float:
-        """Of its runs that are there, 0 to 1."""
-        return (self.n_done + self.n_driven_done) / max(self.n_runs + self.n_driven_runs, 1)
 
     @property
     def has_robot(self) -> bool:
@@ -95,18 +93,21 @@ class Studies:
             return [entry.name for entry in sorted(found, key=_changed, reverse=True)]
         return []
 
+    def has(self, name: str) -> bool:
+        """Return whether there is a study of this name."""
+        path = self.root / name
+        is_name = re.fullmatch(NAME_PATTERN, name) is not None
+        return is_name and (path / "study.json").is_file() and self._is_within(path)
+
     def path(self, name: str) -> Path:
         """The folder of a study.
 
         Raises:
             StudyError: There is none of this name.
         """
-        path = self.root / name
-        if not (
-            re.fullmatch(NAME_PATTERN, name) and (path / "study.json").is_file() and self._is_within(path)
-        ):
-            raise StudyError(f"There is no study {shown(name)} in {self.root}.")
-        return path
+        if not self.has(name):
+            raise StudyError(f"There is no study named {shown(name)} in this folder.")
+        return self.root / name
 
     def new_path(self, name: str) -> Path:
         """Where a study of this name is to be.
@@ -154,6 +155,15 @@ class Studies:
                 self._seen[name] = (time.monotonic(), state)
             return state
 
+    def forget(self, name: str) -> None:
+        """Have the next look at a study read its folder again."""
+        with self._looking:
+            self._seen.pop(name, None)
+
+    def nearest(self, name: str) -> list[str]:
+        """Return the names that are most like a name, at most three."""
+        return difflib.get_close_matches(name, self.names(), n=3, cutoff=0.0)
+
     def _is_within(self, path: Path) -> bool:
         return path.resolve().parent == self.root
 
@@ -179,6 +189,7 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
         n_driven_done=n_complete,
         trials=trials,
         used_by=used_by(folder.path),
+        labels=tuple(sorted({str(each["label"]) for each in described["conditions"] if each.get("label")})),
     )
 
 

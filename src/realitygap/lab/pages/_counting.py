@@ -113,16 +113,16 @@ class Counting:
         listed = self._counts.trials()
         shown = self._chosen_now()
         number = None if shown is None else shown[0]
-        self._list("To be counted", [each for each in listed if each.role_of(who) == "score"], number)
+        self._list("To score", [each for each in listed if each.role_of(who) == "score"], number)
         if who:
             second = [each for each in listed if each.role_of(who) == "second"]
-            self._list("To be counted a second time", second, number)
+            self._list("To score a second time", second, number)
         self._show_counted(listed)
         self._corrections(listed)
 
     def _show_card(self) -> None:
         if self._shown is None:
-            ui.label("No line waits to be counted.")
+            ui.label("No trials to score. Drive a trial first.")
         elif self._loaded is not None and self._loaded[0] == self._shown:
             number, role, who = self._shown
             self._show_trial(self._counts.trial(number), role, who, self._loaded[1])
@@ -150,12 +150,12 @@ class Counting:
         counted = [each for each in listed if each.trial.state == "scored" and not each.trial.is_closed]
         if not counted:
             return
-        with ui.expansion(f"Counted, and not closed: {len(counted)}").classes("lab-expansion"):
+        with ui.expansion(f"Scored, not closed: {len(counted)}").classes("lab-expansion"):
             for each in counted:
                 with ui.row().classes("lab-row"):
                     ui.label(f"Trial {each.number}, {each.pen}, by {each.first}")
-                    ui.button("Take back", on_click=lambda number=each.number: self._undo(number)).props(
-                        f'flat dense no-caps aria-label="Take back the count of trial {each.number}"'
+                    ui.button("Undo", on_click=lambda number=each.number: self._undo(number)).props(
+                        f'flat dense no-caps aria-label="Undo the score of trial {each.number}"'
                     )
 
     async def _undo(self, number: int) -> None:
@@ -218,9 +218,7 @@ class Counting:
             )
             hint(_HOW + (_FRAMED if chosen and chosen.doubtful else ""))
             with ui.row().classes("lab-row"):
-                ui.button("Enter this count", on_click=lambda: self._enter(each, role)).props(
-                    "unelevated no-caps"
-                )
+                ui.button("Save count", on_click=lambda: self._enter(each, role)).props("unelevated no-caps")
 
                 async def clear() -> None:
                     put(Draft([]))
@@ -274,7 +272,7 @@ class Counting:
                 raise LedgerError(f"Somebody else has just changed trial {each.number}. Look again.")
             self._counts.score(each.number, draft, self._who(), role)
 
-        said = f"Trial {each.number}: {len(draft.cells)} cells are in the ledger."
+        said = f"Trial {each.number}: {len(draft.cells)} cells saved."
         if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()
@@ -282,8 +280,8 @@ class Counting:
 
     def _more(self, each: CountedTrial) -> None:
         """A note, and the ways to say that it does not count."""
-        with ui.expansion("Note, or void").classes("lab-expansion"):
-            text = ui.input("What is to be said of this trial").props("outlined dense").classes("lab-wide")
+        with ui.expansion("Note or void").classes("lab-expansion"):
+            text = ui.input("Note or reason").props("outlined dense").classes("lab-wide")
 
             async def note() -> None:
                 said, who = text_of(text), self._who()
@@ -296,7 +294,7 @@ class Counting:
                     self._lab.changed()
 
             with ui.row().classes("lab-row"):
-                ui.button("Keep as a note", on_click=note).props("outline no-caps")
-                ui.button("Void, with this reason", on_click=void).props("outline no-caps").set_enabled(
+                ui.button("Save note", on_click=note).props("outline no-caps")
+                ui.button("Void trial", on_click=void).props("outline no-caps").set_enabled(
                     not each.trial.is_closed
                 )

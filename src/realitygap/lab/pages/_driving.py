@@ -40,7 +40,7 @@ class Driving:
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
             self._said = ui.label("")
             self._grid = CellGrid(arena, ink=card["pen"], name="Where the robot is").classes("lab-sketch")
-            ui.button("Abort this trial", on_click=self._job.stop_robot, color="negative").props(
+            ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
                 "unelevated no-caps"
             )
         ui.timer(LIVE_S, self._look)

@@ -44,6 +44,11 @@ class Part(Generic[T]):
             self._is_due = True
             self._refreshable.refresh()
 
+    def refresh(self) -> None:
+        """Show it again, although what it shows is the same."""
+        self._is_due = True
+        self._refreshable.refresh()
+
     def _draw(self) -> None:
         self._is_due = False
         now = self._stand()

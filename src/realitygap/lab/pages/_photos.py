@@ -167,7 +167,7 @@ class SheetPhotos:
             elif photo.state == "refused":
                 ui.label(photo.said).classes("lab-problem").props('role="alert"')
                 ui.button(
-                    "Leave it out", on_click=lambda: attempt(lambda: self._photos.forget(photo.mark))
+                    "Remove photo", on_click=lambda: attempt(lambda: self._photos.forget(photo.mark))
                 ).props("outline no-caps")
             else:
                 self._show_read(photo)
@@ -182,15 +182,15 @@ class SheetPhotos:
         for each in waiting:
             with ui.row().classes("lab-row"):
                 ui.button(
-                    f"Look at trial {each.number}, {each.pen}",
+                    f"Check trial {each.number}, {each.pen}",
                     on_click=lambda number=each.number: self._jump(number),
                 ).props("outline no-caps")
                 ui.label(self._told(each, photo))
         ready = [each for each in waiting if self._draft(each, photo) is not None]
         if len(ready) > 1:
-            ui.button(
-                f"I looked at all: enter {len(ready)} trials", on_click=lambda: self._enter(photo)
-            ).props("unelevated no-caps")
+            ui.button(f"Save {len(ready)} trials", on_click=lambda: self._enter(photo)).props(
+                "unelevated no-caps"
+            )
 
     def _seen(self, each: CountedTrial, photo: SheetPhoto) -> bool:
         return any(found.mark == photo.mark for found in self._counts.proposals(each.number))
@@ -210,6 +210,6 @@ class SheetPhotos:
             await self.load()
             found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
             drafts = {number: draft for number, draft in found.items() if draft is not None}
-            said = f"{len(drafts)} trials are in the ledger."
+            said = f"{len(drafts)} trials saved."
             await attempt(lambda: self._counts.score_all(drafts, self._who()), said, type="positive")
         self._lab.changed()

@@ -47,7 +47,7 @@ class Videos:
         if job is not None:
             self._show_outcome(job)
         if self._waiting():
-            with ui.expansion("Cells from a video of the camera").classes("lab-expansion"):
+            with ui.expansion("Score from a video").classes("lab-expansion"):
                 self._show_form()
 
     # inside
@@ -73,7 +73,7 @@ class Videos:
             for number in job.found:
                 if number in waiting:
                     ui.button(
-                        f"Look at trial {number}", on_click=lambda number=number: self._jump(number)
+                        f"Check trial {number}", on_click=lambda number=number: self._jump(number)
                     ).props("outline no-caps")
 
     def _show_form(self) -> None:
@@ -96,4 +96,4 @@ class Videos:
             spec = f"{text_of(video)}?{text_of(options)}"
             self._lab.track(self._counts.name, spec, [trial.value] if trial.value else self._waiting())
 
-        ui.button("Track it", on_click=lambda: attempt(track)).props("unelevated no-caps")
+        ui.button("Track video", on_click=lambda: attempt(track)).props("unelevated no-caps")

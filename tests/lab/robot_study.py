@@ -62,7 +62,7 @@ def count(page: Any, number: int, *cells: int) -> None:
     card.wait_for()
     tap(page, *cells)
     card.get_by_text(f"{len(cells)} of 72 cells").wait_for()
-    card.get_by_role("button", name="Save count").click()
+    card.get_by_role("button", name="Save score").click()
     card.wait_for(state="detached")
 
 

@@ -29,9 +29,9 @@ def choose(page, label: str, option: str) -> None:
 def measure(page, ahead: str, left: str, turned: str) -> None:
     """Enter what a ruler says; of a turn on the spot it is asked how far alone."""
     for label, value in (
-        ("How far ahead", ahead),
-        ("How far to the left", left),
-        ("How far did it turn", turned),
+        ("Distance ahead", ahead),
+        ("Distance to the left", left),
+        ("Turn to the left", turned),
     ):
         if page.get_by_label(label).count():
             page.get_by_label(label).fill(value)
@@ -73,7 +73,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         for number in (1, 2):
             page.get_by_text(f"Trial {number} of").wait_for()
             page.get_by_role("button", name="Robot is in place").click()
-            page.get_by_label("How far did it turn").wait_for()
+            page.get_by_label("Turn to the left").wait_for()
             if number == 1:
                 measure(page, "far", "0", "0")
                 page.get_by_text("Expected numbers such as 13.75").wait_for()

@@ -52,7 +52,7 @@ def test_ledger_that_another_program_writes_blocks_no_page(lab, visit):
         assert other.request.post(f"{lab.address}stop").text() == "no robot"
         assert lab.lag() < LATE_S
         writer.execute("COMMIT")
-    page.get_by_text("Noted.").wait_for()
+    page.get_by_text("Note saved.").wait_for()
 
 
 def test_folder_of_many_studies_and_long_ledgers_blocks_no_page(lab):

@@ -25,7 +25,8 @@ STOP_S = 0.2
 VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390, 400)}
 
 NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Notify.create({
-  type, message: `What happened, in a sentence that needs two lines on a phone: ${type}.`, position: "top", timeout: 0 }))"""
+  type, message: `What happened, in a sentence that needs two lines on a phone: ${type}.`,
+  position: "top", timeout: 0 }))"""
 
 UNCOVERED = """() => {
   const stop = document.querySelector(".lab-stop"), box = stop.getBoundingClientRect();

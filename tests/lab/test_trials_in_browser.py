@@ -69,7 +69,7 @@ def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
     page = visit(PAGE)
     page.get_by_label("Your name").fill("anna")
     page.get_by_text("4 of 72 cells").wait_for()
-    page.get_by_role("button", name="Save count").click()
+    page.get_by_role("button", name="Save score").click()
     page.get_by_text("Trial 1: 4 cells saved").wait_for()
     assert states(lab) == ["scored", "driven"]
 
@@ -187,7 +187,7 @@ def test_the_arena_is_drawn_where_cells_are(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
-    page.get_by_role("button", name="Save count").scroll_into_view_if_needed()
+    page.get_by_role("button", name="Save score").scroll_into_view_if_needed()
     first, last = (page.locator(f'[data-counting] [data-cell="{cell}"]').bounding_box() for cell in (0, 71))
     assert first["x"] < last["x"]
     assert first["y"] > last["y"]

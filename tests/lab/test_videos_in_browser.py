@@ -27,7 +27,7 @@ def test_a_trial_is_found_in_a_video_and_its_cells_are_corrected_and_entered(lab
     n_seen = card.locator(".lab-marked").count()
     tap(page, 71)
     card.get_by_text(f"{n_seen + 1} of 72 cells").wait_for()
-    card.get_by_role("button", name="Save count").click()
+    card.get_by_role("button", name="Save score").click()
     card.wait_for(state="detached")
     with ledger_of(lab.root) as ledger:
         (row,), (note,) = list(ledger.scores()), list(ledger.notes(number))

@@ -1,4 +1,4 @@
-"""A gap measured, or planned, in a process of its own; its report grows as trials come in."""
+"""A gap that is measured or planned in its own process; the report grows with each round of trials."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class _Telling:
         self._last = 0.0
 
     def show(self, name: str, done: int, total: int) -> None:
-        """So many trials are done on a platform."""
+        """Report the number of trials on a platform."""
         now = time.monotonic()
         if now - self._last > _TOLD_S or done == total:
             self._last = now

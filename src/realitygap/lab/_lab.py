@@ -1,4 +1,4 @@
-"""What the pages of the lab share: the studies, what goes on, and who has the robot."""
+"""State that all pages share: studies, running work, and the operator of the robot."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from ._watcher import Watcher
 
 @dataclass(frozen=True)
 class Visitor:
-    """Somebody at a page.
+    """A visitor at a page.
 
     Attributes:
         key: Of their browser.
@@ -153,14 +153,14 @@ class Lab:
         folder, video = self.studies.path(name), spec.partition("?")[0]
         refuse_camera(self.root, spec)
         if not trials:
-            raise StudyError("No trial waits to be counted: there is nothing to look for in a video.")
+            raise StudyError("There are no trials to score from a video. Drive a trial first.")
         if video not in videos_in(self.root):
             raise StudyError(
                 f"There is no video {video!r} in {self.root}. Put it there; its name ends in {', '.join(ENDINGS)}."
             )
         with self._lock:
             if any(not each.is_over for each in self.videos.values()):
-                raise StudyError("A video is being tracked already. Wait until that is done, or stop it.")
+                raise StudyError("A video is being tracked. Wait until it is complete, or stop it.")
             self.videos[name] = VideoJob(folder, self.root, spec, trials, self.changed)
         self.changed()
 
@@ -208,12 +208,12 @@ class Lab:
         """
         with self._lock:
             if self.job(name) is not None:
-                raise StudyError(f"The study {name!r} is running already. Give this one another name.")
+                raise StudyError(f"The study {name!r} is running. Choose another name.")
             folder = self.studies.new_path(name)
             self._begin(name, {"work": "study", "folder": str(folder), "text": text})
 
     def go_on(self, name: str, **options: Any) -> StudyJob:
-        """Have a study go on where it stopped.
+        """Resume a study.
 
         Args:
             name: Of the study.
@@ -225,7 +225,7 @@ class Lab:
         folder = self.studies.path(name)
         with self._lock:
             if self.job(name) is not None:
-                raise StudyError(f"The study {name!r} goes on already.")
+                raise StudyError(f"The study {name!r} is running.")
             if said := used_by(folder):
                 raise StudyError(f"{name!r} is in use: {said} writes to it. Wait until it ends, or stop it.")
             if options.get("port"):
@@ -263,7 +263,7 @@ class Lab:
         return [self.standing(name) for name in self.studies.names()]
 
     def job(self, name: str) -> StudyJob | None:
-        """The job of a study, while it goes on."""
+        """Return the job of a study while it runs."""
         job = self.jobs.get(name)
         return None if job is None or job.is_over else job
 

@@ -30,7 +30,7 @@ _LONGEST_HOLDER = 1000
 
 @dataclass(frozen=True)
 class StudyState:
-    """How far a study is.
+    """A study's folder at one moment.
 
     Attributes:
         name: Of its folder.
@@ -81,7 +81,7 @@ class Studies:
         self._looking = threading.Lock()
 
     def names(self) -> list[str]:
-        """Of the studies that are there, the last one changed first."""
+        """Return the names of all studies, the last one changed first."""
         with contextlib.suppress(OSError):
             found = [
                 entry
@@ -110,7 +110,7 @@ class Studies:
         return self.root / name
 
     def new_path(self, name: str) -> Path:
-        """Where a study of this name is to be.
+        """Return the folder for a new study of this name.
 
         Raises:
             StudyError: The name cannot be had.
@@ -122,7 +122,7 @@ class Studies:
             )
         if path.exists():
             raise StudyError(
-                f"There is a folder {name!r} already. Give the study another name, or go on with that one."
+                f"There is a folder {name!r} already. Choose another name, or resume that study."
             )
         return path
 
@@ -136,18 +136,18 @@ class Studies:
             return known
 
     def state(self, name: str) -> StudyState:
-        """How far a study is."""
+        """Read the state of a study."""
         try:
             return _state(name, self.results(name))
         except (RealityGapError, OSError, KeyError, TypeError, ValueError) as error:
             return StudyState(name, title=name, problem=str(error) or repr(error))
 
     def states(self) -> list[StudyState]:
-        """How far all of them were a moment ago."""
+        """Return the recent states of all studies."""
         return [self.lately(name) for name in self.names()]
 
     def lately(self, name: str) -> StudyState:
-        """How far a study was a moment ago: however many watch it, its folder is looked at once."""
+        """Return the recent state of a study; all pages share one look at its folder."""
         with self._looking:
             when, state = self._seen.get(name, (-LATELY_S, None))
             if state is None or time.monotonic() - when >= LATELY_S:

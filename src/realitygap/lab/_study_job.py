@@ -1,4 +1,4 @@
-"""A study that goes on in a process of its own, as the pages see it."""
+"""A study that runs in its own process, as the pages see it."""
 
 from __future__ import annotations
 

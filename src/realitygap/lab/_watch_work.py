@@ -1,4 +1,4 @@
-"""Figures and replays of a study for those who watch it, drawn in a process of their own."""
+"""Figures and replays of a study, drawn in a separate process."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ MOST_REPLAYS = 64
 
 
 class Watcher:
-    """What a study looks like now; one process draws for all who watch.
+    """Figures of a study; one process draws for all pages.
 
     Attributes:
         figures: Figures by name: caption, alt, and the two drawings (SVG, gzip); or why there is none.

@@ -218,7 +218,7 @@ def _ask_cells(answer: Callable[..., None]) -> None:
     CellGrid(
         load_arena("paper"), name="Cells crossed", change=lambda cells: found.__setitem__(slice(None), cells)
     )
-    ui.button("Save count", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
+    ui.button("Save score", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
 
 
 def _grow(chart: ui.echart, job: CalibrationJob) -> None:

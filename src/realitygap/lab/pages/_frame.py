@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
@@ -89,35 +88,9 @@ def _show_mistake(error: Exception) -> None:
 
 
 def text_of(field: Any) -> str:
-    """What was entered, without space around it; empty where it is no text."""
+    """Return the entered text without space around it; empty for other values."""
     value = field.value
     return value.strip() if isinstance(value, str) else ""
-
-
-def number_of(field: Any) -> float | None:
-    """What was entered; None where nothing was.
-
-    Raises:
-        ValueError: It is no number.
-    """
-    value = field.value
-    if value is None or value == "":
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{field.label}: expected a number, came {shown(value)}.")
-    return value
-
-
-def whole_of(field: Any) -> int | None:
-    """What was entered; None where nothing was.
-
-    Raises:
-        ValueError: It is no whole number.
-    """
-    value = number_of(field)
-    if value is not None and value != int(value):
-        raise ValueError(f"{field.label}: expected a whole number, came {shown(value)}.")
-    return None if value is None else int(value)
 
 
 def visitor_of(request: Request) -> Visitor:

@@ -97,6 +97,7 @@ class _Page:
         self._draft = draft
         self._check: Check | None = None
         self._boxes: list[tuple[str, ui.element]] = []
+        self._is_open = False
 
     def show(self) -> None:
         with ui.row().classes("lab-row"):
@@ -200,7 +201,9 @@ class _Page:
             for field in condition_fields():
                 hint(f"{_COLUMNS[field.place.partition('.')[2]]}: {field.description}")
         self._show_conditions()
-        with ui.expansion("Advanced").classes("lab-expansion"):
+        with ui.expansion("Advanced", value=self._is_open, on_value_change=self._open).classes(
+            "lab-expansion"
+        ):
             ui.input(placeholder="Filter settings by name or meaning", on_change=self._search).props(
                 'outlined dense clearable debounce=200 aria-label="Filter settings"'
             ).classes("lab-wide")
@@ -214,6 +217,10 @@ class _Page:
                             self._input(field, field.place, label, value, self._putter(field))
                         self._boxes.append((f"{field.place} {label} {field.description}".lower(), one))
                 self._boxes.append((" ".join(f"{f.place} {f.description}" for f in rest).lower(), box))
+
+    def _open(self, event: events.ValueChangeEventArguments[bool]) -> None:
+        """Remember whether advanced settings are shown, for the next time that the form is drawn."""
+        self._is_open = event.value
 
     def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
         wanted = (event.value or "").lower()

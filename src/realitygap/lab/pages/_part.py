@@ -1,4 +1,4 @@
-"""A part of a page that is shown anew when what it shows has changed, and only then."""
+"""A part of a page that is drawn again only when its content has changed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Part(Generic[T]):
         self._refreshable()
 
     def look(self) -> None:
-        """Have it shown anew where it has changed."""
+        """Draw it again if its content has changed."""
         if not self._is_due and self._stand() != self._shown:
             self._is_due = True
             self._refreshable.refresh()

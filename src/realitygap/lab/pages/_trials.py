@@ -1,4 +1,4 @@
-"""Trials: the page of the operator beside the robot, and of those who count what it drew."""
+"""Trials: the page for the operator of the robot, and for scoring."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _WHEN = {"sheet": "When a sheet is full", "trial": "After each trial"}
 _NUMBER = """
 <q-td :props="props">
   <q-btn v-if="props.row.counts" outline dense no-caps padding="4px 12px" :label="String(props.value)"
-         :aria-label="`Count trial ${props.value}`" @click="$parent.$emit('choose', props.value)" />
+         :aria-label="`Score trial ${props.value}`" @click="$parent.$emit('choose', props.value)" />
   <template v-else>{{ props.value }}</template>
 </q-td>
 """
@@ -117,7 +117,7 @@ class _Page:
         self._filmed = ui.refreshable(self._videos.show)
         with ui.element("section").props('aria-label="Video"'):
             self._filmed()
-        with ui.element("section").props('aria-label="Counting"').classes("lab-part"):
+        with ui.element("section").props('aria-label="Score"').classes("lab-part"):
             await self._counting.show()
         self._table = ui.refreshable(self._show_table)
         with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
@@ -137,7 +137,7 @@ class _Page:
             self._agreement = await run.io_bound(self._agree) or ""
 
     async def _look(self) -> None:
-        """Show anew what has changed; what somebody is tapping stays as it is."""
+        """Update the parts that have changed; a grid in use stays."""
         if self._is_looking:  # the disk takes its time
             return
         self._is_looking = True
@@ -239,7 +239,7 @@ class _Page:
         return "Score" if any(each.trial.state == "driven" for each in self._counts.trials()) else ""
 
     def _show_asked(self, now: _AskedStand) -> None:
-        """What it waits for; else the trial that goes on."""
+        """Show the question, or the trial that is being driven."""
         if now.job is None:
             return
         if now.ask is not None:
@@ -257,7 +257,7 @@ class _Page:
             ui.button("Disconnect", on_click=now.job.ask_to_end).props("flat no-caps").set_enabled(now.may)
 
     def _show_beginning(self) -> None:
-        """What to say before a robot drives."""
+        """Show the form that connects a robot."""
         if self._can_begin is None:
             return
         if self._can_begin.is_complete:
@@ -372,14 +372,14 @@ class _Page:
         hint("Press Enter to save the note.")
 
     def _n_cells(self, each: Any) -> str:
-        """How many cells, hidden from who might still count them a second time."""
+        """Return the number of cells; hidden from a visitor who can still score a second time."""
         if each.trial.cells is None:
             return ""
         is_seen = each.trial.is_closed or each.second or each.first == self._visitor.who
         return str(len(each.trial.cells)) if is_seen else "counted"
 
     async def _note(self, field: Any) -> None:
-        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Noted."):
+        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Note saved."):
             field.value = ""
 
 
@@ -393,7 +393,7 @@ class _Beginning:
 
 @dataclass(frozen=True)
 class _RobotStand:
-    """What is to be said of a robot, or of the last sitting."""
+    """The robot of a study, or the outcome of the last session."""
 
     job: StudyJob | None
     outcome: str
@@ -406,7 +406,7 @@ class _RobotStand:
 
 @dataclass(frozen=True)
 class _AskedStand:
-    """What a study asks, or the trial that goes on, and whether this visitor may answer."""
+    """A question of a study, or the trial that is driven, and whether this visitor may answer."""
 
     job: StudyJob | None
     ask: dict[str, Any] | None = None

@@ -1,4 +1,4 @@
-"""A video of a sitting, tracked: the cells of its trials, to be looked at."""
+"""A video of trials is tracked; a person checks the cells."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Videos:
 
     def _show_tracking(self, job: VideoJob) -> None:
         bar = ui.linear_progress(job.share, show_value=False).props('aria-label="Of the video gone through"')
-        ui.label(f"Tracking {job.spec} ... You may leave this page; it goes on.").props('role="status"')
+        ui.label(f"Tracking {job.spec}… You can leave this page.").props('role="status"')
         ui.timer(0.3, lambda: bar.set_value(round(job.share, 3)))
         ui.button("Stop tracking", on_click=job.ask_to_end).props("outline no-caps")
 
@@ -80,10 +80,10 @@ class Videos:
         found, waiting = self._files, self._waiting()
         hint(
             "Film the arena with its corner tags and the robot with its tag, from before a trial until the robot "
-            "stands. One video may show several trials. Put it into the lab's folder."
+            "stands still. Put the video into the lab's folder."
         )
         video = ui.input("Video", value=found[-1] if found else "", autocomplete=found)
-        options = ui.input("What to look for", value="tag=10&tag-height=0.1")
+        options = ui.input("Tags", value="tag=10&tag-height=0.1")
         which: dict[int, str] = {0: f"All {len(waiting)} that wait"} | {
             each: f"Trial {each}" for each in waiting
         }

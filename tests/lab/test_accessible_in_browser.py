@@ -1,4 +1,4 @@
-"""Every page of the lab, on a desktop and a phone: axe-core finds no serious or critical fault, nothing is cut off."""
+"""Every page of the lab, on a desktop and a phone: axe-core finds no fault, and nothing is cut off."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from .sheets import drive_sheet, photo_of
 
 pytestmark = pytest.mark.slow
 
+CUT = """() => [...document.querySelectorAll("body *")].filter((it) => it.checkVisibility() && it.textContent.trim()
+  && it.scrollWidth > it.clientWidth + 1 && getComputedStyle(it).textOverflow === "ellipsis")
+  .map((it) => it.textContent)"""
+"""Texts that end in an ellipsis because their place is too narrow."""
+
 SIZES = {"desktop": DESKTOP, "phone": PHONE}
-GRAVE = ("serious", "critical")
 TEXT = """
 [study]
 name = "seen"
@@ -33,7 +37,7 @@ def look(visit):
 
 
 def faults(page) -> list[str]:
-    """Return what axe-core finds that keeps people out, and where the page is wider than the screen.
+    """Return what axe-core finds, texts that are cut, and where the page is wider than the screen.
 
     The page has the size of a phone from then on.
     """
@@ -44,10 +48,10 @@ def faults(page) -> list[str]:
         found += [
             f"{size}: {fault['impact']}: {fault['id']}: {[node['target'] for node in fault['nodes']][:3]}"
             for fault in Axe().run(page).response["violations"]
-            if fault["impact"] in GRAVE
         ]
         over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
         found += [f"{size}: {over} px wider than the screen"] if over > 0 else []
+        found += [f"{size}: cut: {text}" for text in page.evaluate(CUT)]
     return found
 
 
@@ -58,7 +62,6 @@ def test_pages_without_a_study(lab, look):
         ("calibrate", "What to calibrate"),
         ("gap", "Measure"),
         ("robot", "Connect"),
-        ("trials/nobody", "There is no study"),
     ):
         page = look(path)
         page.get_by_text(text).first.wait_for()

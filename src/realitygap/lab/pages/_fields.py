@@ -127,7 +127,7 @@ class Form:
         kind = "a whole number" if is_whole else "a number"
         with self._around(label):
             element = ui.number(value=value)
-            element.props(f'step="{1 if is_whole else "any"}" min="{low:g}" max="{high:g}"')
+            element.props(f'step="{1 if is_whole else "any"}"')
             self._add(key, label, element, explanation, check)
         return element
 

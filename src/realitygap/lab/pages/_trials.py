@@ -21,7 +21,7 @@ from realitygap.robots.scribbler import PortGuess, find_ports
 from ._counting import Counting
 from ._driving import Driving
 from ._fields import Form
-from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
+from ._frame import LONGEST_NAME, framed, remember_who, section, text_of, visitor_of
 from ._handover import show_holder
 from ._notices import WRONG, attempt
 from ._part import Part, watching
@@ -96,12 +96,14 @@ class _Page:
         self._steps.show()
         with ui.element("section").props('aria-label="Current step"'):
             self._asked.show()
-        ui.input(
+        name = Form().text(
+            "who",
             "Your name",
-            value=self._visitor.who,
-            on_change=lambda event: self._named(text_of(event)),
-        ).props(f"outlined dense debounce=400 maxlength={LONGEST_NAME}").classes("lab-wide")
-        hint("Your name is saved with each score. Two people who score the same trials need two names.")
+            self._visitor.who,
+            explanation="Your name is saved with each score. Two people who score the same trials need two names.",
+        )
+        name.props(f"debounce=400 maxlength={LONGEST_NAME}")
+        name.on_value_change(lambda event: self._named(text_of(event)))
         with ui.element("section").props('aria-label="Robot"').classes("lab-part"):
             section("Robot")
             for part in (self._robot, self._ending):
@@ -366,10 +368,8 @@ class _Page:
                 )
 
     def _show_note(self) -> None:
-        ui.input("Note on the study").props("outlined dense").classes("lab-wide").on(
-            "keydown.enter", lambda event: self._note(event.sender)
-        )
-        hint("Press Enter to save the note.")
+        note = Form().text("note", "Note on the study", explanation="Press Enter to save the note.")
+        note.on("keydown.enter", lambda event: self._note(event.sender))
 
     def _n_cells(self, each: Any) -> str:
         """Return the number of cells; hidden from a visitor who can still score a second time."""

@@ -11,8 +11,8 @@ from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in
 
-from ._frame import hint, text_of
-from ._notices import attempt
+from ._fields import Form
+from ._frame import hint
 
 
 class Videos:
@@ -82,18 +82,20 @@ class Videos:
             "Film the arena with its corner tags and the robot with its tag, from before a trial until the robot "
             "stands still. Put the video into the lab's folder."
         )
-        video = ui.input("Video", value=found[-1] if found else "", autocomplete=found)
-        options = ui.input("Tags", value="tag=10&tag-height=0.1")
-        which: dict[int, str] = {0: f"All {len(waiting)} that wait"} | {
-            each: f"Trial {each}" for each in waiting
-        }
-        trial = ui.select(which, value=0, label="Trials in it")
-        for each in (video, options, trial):
-            each.props("outlined dense").classes("lab-wide")
-        hint("As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.")
+        form = Form()
+        form.summary()
+        form.text("video", "Video", found[-1] if found else "", options=found, is_needed=True)
+        form.text(
+            "tags",
+            "Tags",
+            "tag=10&tag-height=0.1",
+            explanation="As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.",
+        )
+        which = {0: f"All {len(waiting)} trials to score"} | {number: f"Trial {number}" for number in waiting}
+        form.choice("trial", "Trials in the video", which, 0)
 
-        def track() -> None:
-            spec = f"{text_of(video)}?{text_of(options)}"
-            self._lab.track(self._counts.name, spec, [trial.value] if trial.value else self._waiting())
+        def track(values: dict[str, Any]) -> None:
+            spec, trial = f"{values['video']}?{values['tags']}", values["trial"]
+            self._lab.track(self._counts.name, spec, [trial] if trial else self._waiting())
 
-        ui.button("Track video", on_click=lambda: attempt(track)).props("unelevated no-caps")
+        ui.button("Track video", on_click=lambda: form.submit(track)).props("unelevated no-caps")

@@ -68,7 +68,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
     """The emulator is at a socket, of which nobody says that it is one with a witness: somebody has to place it."""
     with serve_tcp(Emulator("s2"), speed=20) as server:
         page = visit("calibrate")
-        choose(page, "What to calibrate", "Path: the paper's")
+        choose(page, "What to calibrate", "Path")
         begin(page, Robot=f"scribbler:{server.name}", Name="led")
         for number in (1, 2):
             page.get_by_text(f"Trial {number} of").wait_for()

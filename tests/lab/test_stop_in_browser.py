@@ -165,7 +165,7 @@ def make_busy(lab: Any, visit: Any) -> None:
     start(checking, TINY.replace("tiny", "endless"))
     checking.get_by_role("button", name="Cancel").wait_for()
     calibrating.get_by_role("combobox", name="What to calibrate").click()
-    calibrating.get_by_role("option", name="All: motion").click()
+    calibrating.get_by_role("option", name="All", exact=True).click()
     calibrating.get_by_role("button", name="Calibrate", exact=True).click()
     calibrating.get_by_role("button", name="Stop calibration").wait_for()
     reporting.get_by_role("tab", name="Report").click()

@@ -21,12 +21,13 @@ from ._notices import notify
 from ._part import Part, watching
 
 _KINDS = {
-    "path": "Path: the paper's five full steps ahead and five turning",
-    "sensors": "Sensors: fifty readings at each distance from a wall",
-    "motion": "Motion: motors and drift",
-    "contact": "Contact: effect of walls on motion",
-    "all": "All: motion, sensors, and contact together",
+    "path": ("Path", "The paper's method: five full steps ahead, and five that turn."),
+    "sensors": ("Sensors", "The paper's method: fifty readings at each distance from a wall."),
+    "motion": ("Motion", "Motors and drift."),
+    "contact": ("Contact", "Effect of walls on the motion."),
+    "all": ("All", "Motion, sensors, and contact together."),
 }
+"""Name and meaning of each kind of calibration."""
 EMULATED = "scribbler:emulator://s2?fluke=2"
 _INKS = ("#0072b2", "#c94f00", "#00805c", "#b0508c")
 
@@ -97,7 +98,10 @@ class _Page:
     def _show_form(self) -> None:
         form = Form()
         form.summary()
-        form.choice("kind", "What to calibrate", _KINDS, "sensors")
+        kinds = {kind: name for kind, (name, _) in _KINDS.items()}
+        kind = form.choice("kind", "What to calibrate", kinds, "sensors")
+        meaning = hint(_KINDS["sensors"][1])
+        kind.on_value_change(lambda event: meaning.set_text(_KINDS[event.value][1]))
         form.text(
             "platform",
             "Robot",

@@ -6,7 +6,7 @@ import secrets
 from dataclasses import dataclass
 from typing import Any
 
-from nicegui import app, run, ui
+from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
@@ -160,7 +160,7 @@ class _Page:
         self._is_writing = False
         self._is_looking = False
         self._key = secrets.token_hex(8)
-        self._asked = False
+        self._asked = self._has_played = False
         self._report_stamp = self._watcher.report_stamp
 
     def show(self) -> None:
@@ -170,7 +170,8 @@ class _Page:
         self._state.show()
         with ui.tabs().props("no-caps align=left") as tabs:
             overview, replay, report = ui.tab("Overview"), ui.tab("Replay"), ui.tab("Report")
-        with ui.tab_panels(tabs, value=overview).classes("lab-panels").props("keep-alive"):
+        panels = ui.tab_panels(tabs, value=overview, on_change=self._turn).classes("lab-panels")
+        with panels.props("keep-alive"):
             with ui.tab_panel(overview):
                 self._show_overview()
             with ui.tab_panel(replay):
@@ -179,6 +180,11 @@ class _Page:
                 self._show_reporting()
         watching(self._lab, self._look)
         ui.timer(LOOK_S, self._look_at_disk)
+
+    async def _turn(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        """Play the typical run when the replays are opened for the first time."""
+        if event.value == "Replay" and not self._has_played and self._standing.n_done:
+            await self._replay()
 
     def _show_overview(self) -> None:
         self._drive = Part(self._driven, self._show_driving)
@@ -356,12 +362,14 @@ class _Page:
             self._lab.drive_live(self._name, {**chosen, **given(values)})
 
         async def show() -> None:
-            self._asked = True
+            self._has_played = self._asked = True
+            self._key = secrets.token_hex(8)  # what was asked for before comes too late
             self._stage.refresh()
             if not await form.submit(ask):
                 self._asked = False
                 self._stage.refresh()
 
+        self._replay = show
         ui.button("Show trials", on_click=show).props("unelevated no-caps")
         self._stage = ui.refreshable(self._show_stage)
         self._stage()

@@ -18,7 +18,22 @@ CUT = """() => [...document.querySelectorAll("body *")].filter((it) => it.checkV
   .map((it) => it.textContent)"""
 """Texts that end in an ellipsis because their place is too narrow."""
 
-SIZES = {"desktop": DESKTOP, "phone": PHONE}
+SIZES = {"desktop": DESKTOP, "tablet": (768, 1024), "twice as large": (720, 450), "phone": PHONE}
+AXE = ("desktop", "phone")
+"""Sizes at which axe-core runs, which takes seconds."""
+
+CONTROLS = """() => [...document.querySelectorAll(
+  "a[href], button, input, textarea, select, [tabindex='0']")].filter((it) => it.checkVisibility() && !it.disabled
+  && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file").length"""
+FOCUSED = """() => {
+  const it = document.activeElement, style = getComputedStyle(it);
+  if (it === document.body || it.dataset.reached) return "all";
+  it.dataset.reached = "yes";
+  const border = it.closest(".q-field") && getComputedStyle(it.closest(".q-field__control"), "::after").borderTopWidth;
+  return style.outlineStyle !== "none" || border === "2px" ? "seen" : it.outerHTML.slice(0, 200);
+}"""
+"""Whether the control with the focus shows it; all once every one has had it."""
+
 TEXT = """
 [study]
 name = "seen"
@@ -45,14 +60,31 @@ def faults(page) -> list[str]:
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(300)  # until nothing fades in any more
+        violations = Axe().run(page).response["violations"] if size in AXE else []
         found += [
             f"{size}: {fault['impact']}: {fault['id']}: {[node['target'] for node in fault['nodes']][:3]}"
-            for fault in Axe().run(page).response["violations"]
+            for fault in violations
         ]
         over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
         found += [f"{size}: {over} px wider than the screen"] if over > 0 else []
         found += [f"{size}: cut: {text}" for text in page.evaluate(CUT)]
     return found
+
+
+def check_keyboard(page) -> None:
+    """Tab reaches each control, and the focus is visible there."""
+    page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+    page.evaluate("document.activeElement.blur()")
+    n, reached = page.evaluate(CONTROLS), 0
+    for _ in range(n + 5):
+        page.keyboard.press("Tab")
+        page.wait_for_timeout(60)  # until the border has its width
+        found = page.evaluate(FOCUSED)
+        if found == "all":
+            break
+        assert found == "seen"
+        reached += 1
+    assert reached >= n
 
 
 def test_pages_without_a_study(lab, look):
@@ -66,6 +98,7 @@ def test_pages_without_a_study(lab, look):
         page = look(path)
         page.get_by_text(text).first.wait_for()
         assert faults(page) == [], path
+        check_keyboard(page)
 
 
 def test_a_study_that_is_watched_and_played(lab, look):

@@ -93,7 +93,7 @@ def test_pages_without_a_study(lab, look):
         ("new", "Start study"),
         ("calibrate", "What to calibrate"),
         ("gap", "Measure"),
-        ("robot", "Connect"),
+        ("robot", "No robot connected."),
     ):
         page = look(path)
         page.get_by_text(text).first.wait_for()

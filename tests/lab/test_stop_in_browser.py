@@ -14,7 +14,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PATIENCE_MS, PHONE
+from .conftest import PATIENCE_MS, PHONE, check_uncovered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
 
@@ -27,19 +27,6 @@ VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390
 NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Notify.create({
   type, message: `What happened, in a sentence that needs two lines on a phone: ${type}.`,
   position: "top", timeout: 0 }))"""
-
-UNCOVERED = """() => {
-  const stop = document.querySelector(".lab-stop"), box = stop.getBoundingClientRect();
-  const across = [box.left + 4, box.right - 4], down = [box.top + 4, box.bottom - 4];
-  const points = across.flatMap((x) => down.map((y) => [x, y]));
-  points.push([(box.left + box.right) / 2, (box.top + box.bottom) / 2]);
-  return points.map(([x, y]) => document.elementFromPoint(x, y)).map(
-    (found) => stop.contains(found) ? "stop" : found ? found.outerHTML.slice(0, 200) : "out of sight");
-}"""
-
-
-def check_uncovered(page: Any) -> None:
-    assert page.evaluate(UNCOVERED) == ["stop"] * 5
 
 
 def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, tmp_path):
@@ -54,21 +41,21 @@ def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, t
         stop = page.get_by_role("button", name="Stop robot")
         stop.wait_for()
         assert stop.bounding_box()["height"] >= 44
-        check_uncovered(page)
+        check_uncovered(page.locator(".lab-stop"))
 
         page.evaluate(NOTICES)
         page.locator(".q-notification").nth(2).wait_for()
-        check_uncovered(page)
+        check_uncovered(page.locator(".lab-stop"))
         page.screenshot(path=tmp_path / f"{view}-notices.png")
 
         page.get_by_text("Advanced", exact=True).click()
         page.get_by_role("combobox", name="Observation level").click()
         page.get_by_role("option", name="encoders").wait_for()
         page.wait_for_timeout(400)  # until it has moved in
-        check_uncovered(page)
+        check_uncovered(page.locator(".lab-stop"))
 
         page.evaluate("document.getElementById('too_long_message_popup').ariaHidden = false")
-        check_uncovered(page)
+        check_uncovered(page.locator(".lab-stop"))
         page.screenshot(path=tmp_path / f"{view}-choice.png")
         stop.click()
         page.get_by_role("button", name="Robot stopped").wait_for()
@@ -208,7 +195,7 @@ def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit)
     page.get_by_text("Reconnecting…").wait_for()
     lost = page.get_by_role("button", name="Connection lost. Use the robot's power switch.")
     lost.wait_for()  # whether a robot is connected is unknown
-    check_uncovered(page)
+    check_uncovered(page.locator(".lab-stop"))
     page.get_by_role("button", name="Measure the gap").click()
     page.context.set_offline(False)
     page.get_by_text("Reconnecting…").wait_for(state="hidden")

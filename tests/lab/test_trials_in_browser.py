@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import OUTAGE, PHONE
+from .conftest import OUTAGE, PHONE, check_uncovered
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
 
 pytestmark = pytest.mark.slow
@@ -32,6 +32,10 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     make_study(lab.root)
     page = visit(PAGE, size=PHONE, has_touch=True)
     begin_sitting(page)
+    page.get_by_role("button", name="Start trial").wait_for()
+    page.evaluate("scrollTo(0, 0)")
+    for action in ("Start trial", "Stop robot"):
+        check_uncovered(page.get_by_role("button", name=action))
     for first in (1, 3):
         start_trial(page, first)
         start_trial(page, first + 1)

@@ -26,6 +26,7 @@ class Standing:
         n_driven_runs, n_driven_done: Runs of conditions that a robot drives: total, and complete.
         trials: Number of trials of the ledger in each state.
         labels: Labels of its platforms, such as SIM.
+        medians: Median best coverage of each condition; empty before its figures were drawn.
         rate: Runs per second; 0 if unknown.
         is_asking: Whether it waits for an answer from a visitor.
     """
@@ -41,6 +42,7 @@ class Standing:
     n_driven_done: int = 0
     trials: dict[str, int] = field(default_factory=dict)
     labels: tuple[str, ...] = ()
+    medians: tuple[float, ...] = ()
     rate: float = 0.0
     is_asking: bool = False
 
@@ -103,6 +105,7 @@ def standing_of(state: StudyState, job: StudyJob | None) -> Standing:
         n_driven_done=state.n_driven_done,
         trials=state.trials,
         labels=state.labels,
+        medians=state.medians,
         rate=rate,
         is_asking=job is not None and job.ask is not None,
     )

@@ -21,6 +21,9 @@ from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 
+from ._figure_cache import read_rows
+
+LABELS = ("SIM", "TWIN", "EMULATED", "REAL")
 LATELY_S = 0.8
 """How old what those who watch are told may be [s]."""
 _HOLDER = re.compile(r"process (\d{1,9}) on (.+)")
@@ -40,6 +43,8 @@ class StudyState:
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
         labels: Labels of its conditions, such as SIM.
+        medians: Median best coverage of each condition, in the order of the study, as its figures show it; empty
+            before they were drawn.
         problem: Why it cannot be read; empty otherwise.
     """
 
@@ -53,6 +58,7 @@ class StudyState:
     trials: dict[str, int] = field(default_factory=dict)
     used_by: str = ""
     labels: tuple[str, ...] = ()
+    medians: tuple[float, ...] = ()
     problem: str = ""
 
     @property
@@ -179,17 +185,22 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
     simulated = [each["name"] for each in described["conditions"] if not _is_driven(each)]
     missing = sum(len(gap) for each in simulated for gap in folder.missing(each, replicates))
     n_complete, trials = _of_ledger(folder.path / LEDGER_NAME, driven, replicates)
+    n_done = replicates * len(simulated) - missing
+    rows = read_rows(folder.path, (n_done, n_complete))
     return StudyState(
         name=name,
         title=str(described.get("title") or name),
         note=str(described.get("note") or ""),
         n_runs=replicates * len(simulated),
-        n_done=replicates * len(simulated) - missing,
+        n_done=n_done,
         n_driven_runs=replicates * len(driven),
         n_driven_done=n_complete,
         trials=trials,
         used_by=used_by(folder.path),
-        labels=tuple(sorted({str(each["label"]) for each in described["conditions"] if each.get("label")})),
+        labels=tuple(
+            sorted({each["label"] for each in described["conditions"] if each.get("label") in LABELS})
+        ),
+        medians=tuple(float(row["line_median"]) for row in rows or () if row["line_median"] is not None),
     )
 
 

@@ -155,6 +155,8 @@ def _card(lab: Lab, standing: Standing) -> None:
             ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
         if standing.progress:
             ui.label(standing.progress)
+        if standing.medians:
+            _show_medians(standing.medians)
         if standing.message:
             ui.label(standing.message).classes("lab-problem")
         with ui.row().classes("lab-row"):
@@ -168,6 +170,23 @@ def _card(lab: Lab, standing: Standing) -> None:
                     "outline no-caps"
                 )
             show_control(lab, standing)
+
+
+def _show_medians(medians: tuple[float, ...]) -> None:
+    """Show the median of each condition as a bar."""
+    highest = max(max(medians), 1e-9)
+    bars = "".join(
+        f'<rect x="{8 * k}" y="{24 - 24 * value / highest:.1f}" width="6" height="{24 * value / highest:.1f}"/>'
+        for k, value in enumerate(medians)
+    )
+    words = f"Median best coverage by condition: {min(medians):.3f} to {highest:.3f}"
+    with ui.row().classes("lab-row"):
+        ui.html(
+            f'<svg viewBox="0 0 {8 * len(medians)} 24" width="{8 * len(medians)}" height="24" aria-hidden="true" '
+            f'class="lab-bars">{bars}</svg>',
+            sanitize=False,
+        )
+        hint(words)
 
 
 def show_state(standing: Standing) -> None:

@@ -36,7 +36,11 @@ class Stop:
 
     def show(self) -> None:
         """Show it."""
-        with ui.element("div").classes("lab-stop-bar").props('role="region" aria-label="Robot"') as self._bar:
+        with (
+            ui.element("div")
+            .classes("lab-stop-bar")
+            .props('role="region" aria-label="Robot in use"') as self._bar
+        ):
             self._chip = ui.label("").classes("lab-chip").props('role="status"')
             # One button for the whole life of the page: a press is never lost because the button was drawn again.
             with ui.button("Stop robot", on_click=self._press, color=None) as self._button:

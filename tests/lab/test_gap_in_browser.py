@@ -20,29 +20,27 @@ def measure(page, **fields: str) -> None:
     page.get_by_role("button", name="Measure the gap").click()
 
 
-def test_the_report_of_a_gap_grows_until_all_trials_are_done(lab, visit):
+def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_fields(lab, visit):
     page = visit("gap")
-    measure(page, Name="first", Simulator="sim", Target="jyro", Trials_per_controller="3")
+    for fields, problem in (
+        ({"Name": "../first"}, "You entered '../first'."),
+        ({"Name": "first", "Simulator": "sim:/etc/passwd"}, "would be a file outside"),
+        ({"Simulator": "sim", "Target": "nowhere"}, "'nowhere' is no platform"),
+        ({"Target": "jyro", "Trials_per_controller": "0"}, "Enter a whole number from 1 to 4096."),
+    ):
+        measure(page, **fields)
+        page.locator(".lab-field .lab-problem", has_text=problem).wait_for()
+        page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
+    assert list(lab.root.iterdir()) == []
+    measure(page, Trials_per_controller="3")
+    page.get_by_text(re.compile(r"\d+ of 30 trials")).wait_for()
+    assert not page.get_by_role("button", name="Measure the gap").is_visible()
     page.get_by_text("Complete.", exact=True).wait_for(timeout=180_000)
-    report = page.frame_locator("iframe")
-    report.get_by_text("jyro").first.wait_for()
+    page.reload()
+    page.get_by_text("Rank correlation", exact=True).wait_for()
+    page.frame_locator("iframe").get_by_text("jyro").first.wait_for()
     assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30
     assert (lab.root / "gaps" / "first.html").is_file()
-
-
-def test_a_platform_that_cannot_be_is_told_in_words(lab, visit):
-    page = visit("gap")
-    measure(page, Name="second", Target="nowhere")
-    page.locator(".lab-problem", has_text="nowhere").wait_for()
-
-
-def test_no_platform_is_read_from_outside_the_folder(lab, visit):
-    page = visit("gap")
-    measure(page, Name="third", Simulator="sim:/etc/passwd")
-    page.locator(".lab-problem", has_text="would be a file outside").wait_for()
-    measure(page, Name="../third", Simulator="sim")
-    page.locator(".lab-problem", has_text="You entered '../third'.").wait_for()
-    assert list(lab.root.iterdir()) == []
 
 
 def test_the_number_of_trials_is_planned(lab, visit):

@@ -210,15 +210,12 @@ def test_codes_alone_are_shown_while_counting_is_blind(lab, visit):
     assert "coverage-robot" not in page.content()
 
 
-def test_an_unknown_study_is_told_in_words(visit):
-    visit("trials/nobody").get_by_text("There is no study 'nobody'").wait_for()
-
-
 def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
     make_study(lab.root)
     page = visit(PAGE)
-    page.get_by_label("Who counts cells").click()
-    page.get_by_text("The emulator itself").click()
+    page.get_by_text("Advanced", exact=True).click()
+    page.get_by_role("combobox", name="Scored by").click()
+    page.get_by_role("option", name="The emulator").click()
     begin_sitting(page)
     page.get_by_text("All robot runs are complete.").wait_for()
     with ledger_of(lab.root) as ledger:
@@ -233,14 +230,14 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
     page.get_by_label("Note on the study").fill("half a note")
-    page.get_by_role("button", name="Count trial 2").click()
+    page.get_by_role("button", name="Score trial 2").click()
     page.locator('[data-counting="2"]').wait_for()
-    page.get_by_role("button", name="Count trial 1").focus()
+    page.get_by_role("button", name="Score trial 1").focus()
     page.keyboard.press("Enter")
     page.locator('[data-counting="1"]').wait_for()
     count(page, 1, 0)
     page.locator('[data-counting="2"]').wait_for()
-    page.get_by_role("button", name="Count trial 1").wait_for(state="detached")  # anna has
+    page.get_by_role("button", name="Score trial 1").wait_for(state="detached")  # anna has
     assert page.get_by_label("Note on the study").input_value() == "half a note"
 
 
@@ -249,7 +246,7 @@ def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(
     page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource", "Failed to fetch"])
     page.get_by_label("Your name").fill("anna")
     lab.kill()
-    page.locator("#popup").get_by_text("Connection lost").wait_for()
+    page.get_by_text("Reconnecting…").wait_for()
     lab.start()
     page.get_by_label("Or paste the address or the token here").fill(lab.token)
     page.get_by_role("button", name="Open the lab").click()

@@ -27,7 +27,7 @@ _ROLES: dict[ScoreRole, str] = {
     "correction": "Reports use this correction. The generation is closed.",
 }
 
-_HOW = "Tap a cell, or draw along the line. Each tap is saved."
+_HOW = "Tap a cell, or draw along the line. Each tap is saved. Keys: arrows, Space to mark, Enter to save the score."
 _FRAMED = " Check the framed cells: they are less than 90 % certain."
 
 
@@ -216,6 +216,7 @@ class Counting:
                 name=f"Cells crossed in trial {each.number}",
                 change=lambda cells: put(Draft(cells, self._draft.proposal)),
             )
+            grid.on("save", lambda: self._enter(each, role))
             hint(_HOW + (_FRAMED if chosen and chosen.doubtful else ""))
             with ui.row().classes("lab-row"):
                 ui.button("Save score", on_click=lambda: self._enter(each, role)).props("unelevated no-caps")

@@ -104,7 +104,7 @@ async def watch(address: str, pages: int, presses: bool) -> dict[str, Any]:
 
 
 async def _press(client: PageClient, answers: list[float]) -> None:
-    button = client.find(label="Stop the robot")
+    button = client.find(label="Stop robot")
     while True:
         await asyncio.sleep(random.uniform(0.0, 2 * PAUSE_S))
         began = time.perf_counter()
@@ -125,7 +125,7 @@ class Served:
         listener = _server._listen("127.0.0.1", 0)
         port = listener.getsockname()[1]
         self.lab, self._server = _server._prepare(root, "token", port, is_local=True, allow_code=False)
-        self.address = f"http://127.0.0.1:{port}/watch/watched?token=token"
+        self.address = f"http://127.0.0.1:{port}/study/watched?token=token"
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [listener]}, daemon=True)
         self._thread.start()
 
@@ -195,7 +195,7 @@ class Served:
         return (int(fields[11]) + int(fields[12])) / TICKS
 
     def close(self) -> None:
-        """End it."""
+        """End drive."""
         self._server.should_exit = True
         self._thread.join(10)
         self.lab.close()

@@ -36,7 +36,7 @@ ARGUMENTS = [
     "--disable-sync",
 ]
 DESKTOP, PHONE = (1280, 900), (390, 844)
-PATIENCE_MS = 120_000
+PATIENCE_MS = 30_000
 OUTAGE = ("net::ERR", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 
@@ -51,6 +51,21 @@ if "realitygap.lab._work" in sys.orig_argv:
         return check(root, text, **options)
     _check_work._check = slow
 """
+
+
+UNCOVERED = """(it) => {
+  const box = it.getBoundingClientRect();
+  const across = [box.left + 4, box.right - 4], down = [box.top + 4, box.bottom - 4];
+  const points = across.flatMap((x) => down.map((y) => [x, y]));
+  points.push([(box.left + box.right) / 2, (box.top + box.bottom) / 2]);
+  return points.map(([x, y]) => document.elementFromPoint(x, y)).map(
+    (found) => it.contains(found) ? "itself" : found ? found.outerHTML.slice(0, 200) : "out of sight");
+}"""
+
+
+def check_uncovered(locator: Any) -> None:
+    """Its center and its corners are in view, and nothing lies above them."""
+    assert locator.evaluate(UNCOVERED) == ["itself"] * 5
 
 
 class RunningLab:
@@ -98,13 +113,13 @@ class RunningLab:
         (folder / "sitecustomize.py").write_text(ENDLESS_CHECKS)
 
     def kill(self) -> None:
-        """End it as a power cut does."""
+        """End drive as a power cut does."""
         assert self._process is not None
         self._process.kill()
         self._process.join()
 
     def stop(self) -> None:
-        """End it as Ctrl-C does."""
+        """End drive as Ctrl-C does."""
         process = self._process
         assert process is not None
         assert process.pid is not None

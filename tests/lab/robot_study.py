@@ -43,12 +43,12 @@ def make_study(root: Path, *, steps: int = 12, blind: bool = True) -> Path:
 def begin_sitting(page: Any, port: str = FAST, who: str = "anna") -> None:
     page.get_by_label("Your name").fill(who)
     page.get_by_label("Port", exact=True).fill(port)
-    page.get_by_role("button", name="Begin a sitting").click()
+    page.get_by_role("button", name="Connect robot").click()
 
 
 def start_trial(page: Any, number: int) -> None:
     page.locator(f'.lab-question [data-trial="{number}"]').wait_for()
-    page.get_by_role("button", name="Start the trial").click()
+    page.get_by_role("button", name="Start trial").click()
 
 
 def tap(page: Any, *cells: int) -> None:
@@ -62,7 +62,7 @@ def count(page: Any, number: int, *cells: int) -> None:
     card.wait_for()
     tap(page, *cells)
     card.get_by_text(f"{len(cells)} of 72 cells").wait_for()
-    card.get_by_role("button", name="Enter this count").click()
+    card.get_by_role("button", name="Save score").click()
     card.wait_for(state="detached")
 
 

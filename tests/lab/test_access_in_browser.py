@@ -27,7 +27,7 @@ def newcomer(browser: Any) -> Iterator[Any]:
 
 
 def check_is_in(page: Any) -> None:
-    page.get_by_role("button", name="Stop the robot").wait_for()
+    page.get_by_role("link", name="realitygap lab").wait_for()
     assert "token" not in page.url
 
 

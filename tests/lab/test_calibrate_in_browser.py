@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 def begin(page, **fields: str) -> None:
     for label, value in fields.items():
-        page.get_by_label(label, exact=False).first.fill(value)
+        page.get_by_label(label, exact=True).first.fill(value)
     page.get_by_role("button", name="Calibrate", exact=True).click()
 
 
@@ -29,13 +29,13 @@ def choose(page, label: str, option: str) -> None:
 def measure(page, ahead: str, left: str, turned: str) -> None:
     """Enter what a ruler says; of a turn on the spot it is asked how far alone."""
     for label, value in (
-        ("How far ahead", ahead),
-        ("How far to the left", left),
-        ("How far did it turn", turned),
+        ("Distance ahead", ahead),
+        ("Distance to the left", left),
+        ("Turn to the left", turned),
     ):
         if page.get_by_label(label).count():
             page.get_by_label(label).fill(value)
-    page.get_by_role("button", name="Enter", exact=True).click()
+    page.get_by_role("button", name="Save", exact=True).click()
 
 
 def n_plotted(page) -> int:
@@ -46,10 +46,10 @@ def n_plotted(page) -> int:
 
 def test_sensors_of_an_emulated_robot_are_calibrated_with_a_plot(lab, visit):
     page = visit("calibrate", size=PHONE)
-    begin(page, Platform="scribbler:emulator://s2?fluke=2&speed=off", Name="mine")
-    page.get_by_text("Written: mine.toml").wait_for(timeout=180_000)
+    begin(page, Robot="scribbler:emulator://s2?fluke=2&speed=off", Name="mine")
+    page.get_by_text("Saved as mine.toml").wait_for(timeout=180_000)
     page.locator(".lab-plot canvas, .lab-plot svg").first.wait_for()
-    assert page.locator(".lab-plain tr").count() > 0
+    assert page.locator(".lab-fitted tr").count() > 0
     made = read_calibration(lab.root / "mine.toml")
     assert made.kind == "sensors"
     assert n_plotted(page) == len(read_observations(lab.root / "mine.trials.jsonl").trials)
@@ -57,23 +57,23 @@ def test_sensors_of_an_emulated_robot_are_calibrated_with_a_plot(lab, visit):
 
 def test_a_simulation_is_calibrated_too_and_others_see_it(lab, visit):
     page = visit("calibrate")
-    begin(page, Platform="sim", Name="of-sim")
+    begin(page, Robot="sim", Name="of-sim")
     other = visit("calibrate")
     other.get_by_text("of-sim: sensors").wait_for()
     for each in (page, other):
-        each.get_by_text("Written: of-sim.toml").wait_for(timeout=180_000)
+        each.get_by_text("Saved as of-sim.toml").wait_for(timeout=180_000)
 
 
 def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visit):
     """The emulator is at a socket, of which nobody says that it is one with a witness: somebody has to place it."""
     with serve_tcp(Emulator("s2"), speed=20) as server:
         page = visit("calibrate")
-        choose(page, "What", "path: the paper's")
-        begin(page, Platform=f"scribbler:{server.name}", Name="led")
+        choose(page, "What to calibrate", "Path")
+        begin(page, Robot=f"scribbler:{server.name}", Name="led")
         for number in (1, 2):
             page.get_by_text(f"Trial {number} of").wait_for()
-            page.get_by_role("button", name="It stands there").click()
-            page.get_by_label("How far did it turn").wait_for()
+            page.get_by_role("button", name="Robot is in place").click()
+            page.get_by_label("Turn to the left").wait_for()
             if number == 1:
                 measure(page, "far", "0", "0")
                 page.get_by_text("Expected numbers such as 13.75").wait_for()
@@ -83,21 +83,21 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
                 arg=number,
             )
         other = visit("calibrate")
-        other.get_by_text("has the robot; you are watching").wait_for()
+        other.get_by_text("is operating the robot. You are watching").wait_for()
         assert n_plotted(other) == 2
-        assert other.get_by_role("button", name="It stands there").count() == 0
-        assert other.get_by_role("button", name="Stop for now").is_disabled()
+        assert other.get_by_role("button", name="Robot is in place").count() == 0
+        assert other.get_by_role("button", name="Stop calibration").is_disabled()
         page.reload()
         page.get_by_text("Trial 3 of").wait_for()
-        page.get_by_role("button", name="Stop for now").click()
-        page.get_by_text("What was recorded is kept").wait_for()
+        page.get_by_role("button", name="Stop calibration").click()
+        page.get_by_text("Recorded trials are saved").wait_for()
     assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2
 
 
 def test_no_calibration_is_written_or_read_outside_the_folder(lab, visit):
     page = visit("calibrate")
     begin(page, Name="../mine")
-    page.get_by_text("A calibration cannot be named").wait_for()
-    begin(page, Name="mine", Platform="twin:/etc/passwd")
-    page.get_by_text("would be a file outside").wait_for()
+    page.get_by_text("You entered '../mine'.").last.wait_for()
+    begin(page, Name="mine", Robot="twin:/etc/passwd")
+    page.get_by_text("would be a file outside").last.wait_for()
     assert list(lab.root.iterdir()) == []

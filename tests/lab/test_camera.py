@@ -61,7 +61,7 @@ def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebod
         off = np.array(row["path"])[:, :2] - np.array(true[row["trial"]]["path"])[:, :2]
         assert np.hypot(*off.T).max() < 0.01
     assert [note["text"] for note in notes] == 3 * [
-        "Cells and path by camera 2, looked at by who entered them."
+        "Cells and path by camera 2, checked by the person who saved them."
     ]
 
 

@@ -27,11 +27,10 @@ def test_check_that_does_not_end_blocks_no_page(lab, visit):
     page, other = visit("new"), visit("new")
     start(page, TINY.replace("tiny", "endless"))
     page.get_by_role("button", name="Cancel").wait_for()
-    for path in ("new", "trials/by-robot"):
+    for path in ("new", "study/by-robot/trials"):
         lab.lag()
         other.goto(lab.address + path)
-        other.get_by_role("button", name="Stop the robot").click()
-        other.get_by_text("No robot is in use here.").wait_for()
+        assert other.request.post(f"{lab.address}stop").text() == "no robot"
         assert lab.lag() < LATE_S, path
     page.get_by_role("button", name="Cancel").click()
     page.get_by_text("The check was canceled.").wait_for()
@@ -42,19 +41,18 @@ def test_ledger_that_another_program_writes_blocks_no_page(lab, visit):
     folder = make_study(lab.root)
     with begin(folder) as ledger:
         plan(ledger)
-    page, other = visit("trials/by-robot"), visit("gap")
+    page, other = visit("study/by-robot/trials"), visit("gap")
     page.get_by_label("Your name").fill("anna")
-    page.get_by_label("A note on the whole").fill("it rains")
+    page.get_by_label("Note on the study").fill("it rains")
     with closing(sqlite3.connect(folder / LEDGER_NAME, isolation_level=None)) as writer:
         writer.execute("BEGIN IMMEDIATE")
         lab.lag()
-        page.get_by_label("A note on the whole").press("Enter")
+        page.get_by_label("Note on the study").press("Enter")
         other.wait_for_timeout(3000)
-        other.get_by_role("button", name="Stop the robot").click()
-        other.get_by_text("No robot is in use here.").wait_for()
+        assert other.request.post(f"{lab.address}stop").text() == "no robot"
         assert lab.lag() < LATE_S
         writer.execute("COMMIT")
-    page.get_by_text("Noted.").wait_for()
+    page.get_by_text("Note saved.").wait_for()
 
 
 def test_folder_of_many_studies_and_long_ledgers_blocks_no_page(lab):
@@ -70,8 +68,8 @@ def test_folder_of_many_studies_and_long_ledgers_blocks_no_page(lab):
         client = page_client()
         async with (
             client(lab.entry()),
-            client(lab.entry("trials/by-robot")),
-            client(lab.entry("watch/study-1")),
+            client(lab.entry("study/by-robot/trials")),
+            client(lab.entry("study/study-1")),
         ):
             await asyncio.sleep(5.0)
 

@@ -26,7 +26,7 @@ from realitygap.lab._frames import REFUSED, is_of_page
 
 from .robot_study import make_study
 
-PAGES = ("", "new", "robot", "calibrate", "gap", "trials/by-robot", "watch/by-robot")
+PAGES = ("", "new", "robot", "calibrate", "gap", "study/by-robot/trials", "study/by-robot")
 PATHS = (
     "../../etc/passwd",
     "..",
@@ -69,7 +69,7 @@ def carried_out(work: Coroutine[Any, Any, Any]) -> Any:
 async def answers(page: Any) -> None:
     """It does still: a tap on the stop is told."""
     now = time.perf_counter()
-    await page.happen(page.find(label="Stop the robot"), "click", {})
+    await page.happen(page.find(label="Stop robot"), "click", {})
     assert (await page.hear("notify", now))[1]
 
 
@@ -185,7 +185,7 @@ def test_paths_that_lead_elsewhere_lead_nowhere(lab):
                 status, body = _asked(lab, "GET", "/" + place + written)
                 assert status in (400, 404, 405), (place, name, status)
                 assert b"root:" not in body
-    for place in ("trials/", "watch/"):
+    for place in ("trials/", "study/"):
         for name in PATHS:
             status, body = _asked(lab, "GET", f"/{place}{quote(name, safe='')}")
             assert status in (200, 404), (place, name, status)  # a page that says so

@@ -1,4 +1,4 @@
-"""A robot that somebody has is handed over with their consent, or if they do not answer."""
+"""Control of a robot is handed over with consent, or taken from an operator who does not answer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def lab(tmp_path):
     """Return a lab in which anna drives a robot by hand."""
     lab = Lab(tmp_path)
     lab.stops = []
-    lab.hand = SimpleNamespace(is_over=False, stop=lambda: lab.stops.append("stop"))
+    lab.hand = SimpleNamespace(is_over=False, senses=None, stop=lambda: lab.stops.append("stop"))
     lab.take_robot(ANNA)
     return lab
 
@@ -28,14 +28,14 @@ def test_robot_stays_with_its_operator_until_they_answer(lab):
     lab.ask_for_robot(BEN)
     assert lab.operator is ANNA
     assert not lab.may_operate(BEN)
-    with pytest.raises(StudyError, match="ben asks for the robot already"):
+    with pytest.raises(StudyError, match="ben has requested control"):
         lab.ask_for_robot(CARL)
-    with pytest.raises(StudyError, match="Nobody asks you"):
+    with pytest.raises(StudyError, match="The request for control has ended"):
         lab.answer_request(BEN, yes=True)
     lab.answer_request(ANNA, yes=False)
     assert lab.operator is ANNA
-    assert lab.request.is_refused
-    with pytest.raises(StudyError, match="Nobody asks you"):
+    assert lab.request.state == "kept"
+    with pytest.raises(StudyError, match="The request for control has ended"):
         lab.answer_request(ANNA, yes=True)
 
 
@@ -46,21 +46,33 @@ def test_robot_driven_by_hand_stops_as_it_is_handed_over(lab):
     assert not lab.may_operate(ANNA)
 
 
-def test_robot_is_handed_over_without_an_answer(lab, monkeypatch):
+def test_robot_is_taken_without_an_answer_only_while_it_stands_still(lab, monkeypatch):
     monkeypatch.setattr(module, "HANDOVER_S", 0.05)
     lab.ask_for_robot(BEN)
+    with pytest.raises(StudyError, match="Request control first"):
+        lab.take_over(BEN)
     until = time.monotonic() + 10
-    while lab.operator is ANNA:
+    while lab.request.state == "asked":
         assert time.monotonic() < until
         time.sleep(0.01)
+    assert lab.operator is ANNA
+    lab.hand.senses = {"moves": True}
+    with pytest.raises(StudyError, match="The robot is moving"):
+        lab.take_over(BEN)
+    with pytest.raises(StudyError, match="Request control first"):
+        lab.take_over(CARL)
+    lab.hand.senses = {"moves": False}
+    lab.take_over(BEN)
     assert (lab.operator, lab.stops) == (BEN, ["stop"])
 
 
-def test_request_ends_when_somebody_else_begins_with_the_robot(lab, monkeypatch):
+def test_request_ends_when_another_visitor_takes_the_robot(lab):
     lab.ask_for_robot(BEN)
     request = lab.request
     lab.take_robot(CARL)
-    assert not lab._answer(request, yes=True)
+    lab._end_request(request, "unanswered")
+    with pytest.raises(StudyError, match="has ended"):
+        lab.answer_request(ANNA, yes=True)
     assert lab.operator is CARL
 
 

@@ -43,9 +43,10 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
     run_study(parse_study(TEXT, "study.toml"), lab.root / "seen")
     (lab.root / "worn.toml").write_text(sample_twin("worn", 1).to_toml())
     for platform, label in PLATFORMS.items():
-        page = visit("watch/seen", size=PHONE)
-        page.get_by_label("Live on").fill(platform)
-        page.get_by_role("button", name="Drive it live").click()
+        page = visit("study/seen", size=PHONE)
+        page.get_by_role("tab", name="Replay").click()
+        page.get_by_label("Platform", exact=True).fill(platform)
+        page.get_by_role("button", name="Drive live").click()
         live = page.locator(".rg-live")
         live.wait_for()
         assert live.locator(".rg-label").text_content() == label
@@ -53,11 +54,11 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
         assert live.locator(".rg-ray").count() == 3
         rate = page.evaluate(FRAMES, 2)
         assert rate >= 20, f"{rate} places a second on {platform!r}"
-        later = visit("watch/seen")  # who comes later sees the line from its beginning
+        later = visit("study/seen")  # who comes later sees the line from its beginning
         later.locator(".rg-live .rg-trail").wait_for()
         first = later.locator(".rg-trail").get_attribute("points").split()[0]
         assert first == page.locator(".rg-trail").get_attribute("points").split()[0]
-        page.get_by_role("button", name="End it").click()
+        page.get_by_role("button", name="End drive").click()
         page.get_by_text("Stopped.").wait_for()
         for shown in (later, page):
             shown.context.close()

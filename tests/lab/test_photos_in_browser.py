@@ -16,7 +16,7 @@ from .sheets import drive_sheet, photo_of, true_cells
 
 pytestmark = pytest.mark.slow
 
-PAGE = "trials/by-robot"
+PAGE = "study/by-robot/trials"
 
 
 def send(page, data: bytes, name: str = "sheet.jpg") -> None:
@@ -26,7 +26,7 @@ def send(page, data: bytes, name: str = "sheet.jpg") -> None:
 
 def name_oneself(page, who: str) -> None:
     page.get_by_label("Your name").fill(who)
-    page.get_by_text("To be counted: ").wait_for()
+    page.get_by_text("To score: ").wait_for()
     page.wait_for_function("() => document.cookie.includes('realitygap_who')")
 
 
@@ -45,7 +45,7 @@ def test_a_photo_proposes_cells_that_are_corrected_by_tapping_and_entered(lab, v
     page = visit(PAGE, size=PHONE, has_touch=True)
     name_oneself(page, "anna")
     send(page, photo)
-    page.get_by_text("it goes on.").wait_for()
+    page.get_by_text("You can leave this page.").wait_for()
     page.reload()  # in the middle
     page.locator('[data-photo="read"]').wait_for()
     card = page.locator('[data-counting="1"]')
@@ -56,9 +56,9 @@ def test_a_photo_proposes_cells_that_are_corrected_by_tapping_and_entered(lab, v
     wrong = next(cell for cell in range(60, 72) if cell not in marked(card))
     tap(page, wrong)
     card.get_by_text(f"{n_proposed + 1} of 72 cells").wait_for()
-    card.get_by_role("button", name="Enter this count").click()
-    page.locator('[data-counting="2"]').get_by_role("button", name="Enter this count").click()
-    page.get_by_text("All trials on it are counted.").wait_for()
+    card.get_by_role("button", name="Save score").click()
+    page.locator('[data-counting="2"]').get_by_role("button", name="Save score").click()
+    page.get_by_text("All trials of this sheet are scored.").wait_for()
     with ledger_of(lab.root) as ledger:
         first, second = list(ledger.trials())[:2]
     assert wrong in first.cells
@@ -81,13 +81,13 @@ def test_a_photo_is_read_on_when_the_lab_was_killed_and_all_are_entered_at_once(
     page = visit(PAGE, forgive=OUTAGE)
     name_oneself(page, "anna")
     send(page, photo_of(lines))
-    page.get_by_text("it goes on.").wait_for()
+    page.get_by_text("You can leave this page.").wait_for()
     lab.kill()
     lab.start()
     page = visit(PAGE)
     name_oneself(page, "ben")
-    page.get_by_role("button", name="I looked at all: enter 2 trials").click()
-    page.get_by_text("2 trials are in the ledger.").wait_for()
+    page.get_by_role("button", name="Save 2 trials").click()
+    page.get_by_text("2 trials saved.").wait_for()
     with ledger_of(lab.root) as ledger:
         found = list(ledger.trials())
     for trial, line in zip(found, lines, strict=True):
@@ -100,7 +100,7 @@ def test_a_file_that_is_no_photo_of_the_sheet_gets_one_message_and_changes_nothi
     page = visit(PAGE)
     send(page, b"no picture at all", "notes.jpg")
     page.get_by_text("The file is no picture that can be read: expected JPEG, PNG, TIFF or WebP.").wait_for()
-    page.get_by_role("button", name="Leave it out").click()
+    page.get_by_role("button", name="Remove photo").click()
     page.locator("[data-photo]").wait_for(state="detached")
     assert list((lab.root / "by-robot" / "lab" / "photos").iterdir()) == []
     large = HTTPConnection(urlsplit(lab.address).netloc)
@@ -122,12 +122,12 @@ def test_a_second_count_does_not_begin_with_the_photo_by_itself(lab, visit):
     page = visit(PAGE)
     name_oneself(page, "anna")
     send(page, photo_of(lines))
-    page.get_by_role("button", name="I looked at all: enter 2 trials").click()
-    page.get_by_text("2 trials are in the ledger.").wait_for()
+    page.get_by_role("button", name="Save 2 trials").click()
+    page.get_by_text("2 trials saved.").wait_for()
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
     other.get_by_role("button", name="1, red").last.click()
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0
-    other.get_by_role("button", name="Begin with its cells (photo)").click()
+    other.get_by_role("button", name="Use its cells (photo)").click()
     other.locator("[data-counting] .lab-marked").first.wait_for()

@@ -14,9 +14,8 @@ PORT = "emulator://s2?fluke=2"
 
 
 def connect(page) -> None:
-    page.get_by_label("Port", exact=True).fill(PORT)
-    page.get_by_role("button", name="Connect").click()
-    page.get_by_text(f"EMULATED at {PORT}").wait_for()
+    page.get_by_role("button", name="Use an emulated robot").click()
+    page.get_by_text(f"Connected to {PORT}").wait_for()
 
 
 def hold(page) -> None:
@@ -42,7 +41,7 @@ def test_it_stands_when_the_page_goes_away(visit):
     connect(page)
     hold(page)
     watcher = visit("robot")
-    watcher.get_by_text(re.compile("has the robot; you are watching")).wait_for()
+    watcher.get_by_text(re.compile("is operating the robot. You are watching")).wait_for()
     page.context.close()
     watcher.get_by_text("Standing", exact=True).wait_for()
 
@@ -54,7 +53,7 @@ def test_arrow_keys_drive_and_escape_stops(visit):
     page.keyboard.down("ArrowUp")
     page.get_by_text("Driving", exact=True).wait_for()
     page.keyboard.press("Escape")
-    page.get_by_text("The robot was told to stop.").wait_for()
+    page.get_by_role("button", name="Robot stopped").wait_for()
     page.get_by_text("Standing", exact=True).wait_for()  # though the key is still down
     page.keyboard.up("ArrowUp")
     page.locator('.lab-pad[data-stops="2"]').wait_for()
@@ -69,23 +68,24 @@ def test_who_watches_can_stop_it_and_cannot_drive_it(visit):
     connect(page)
     watcher = visit("robot")
     watcher.locator('.lab-pad[aria-disabled="true"]').wait_for()
-    watcher.get_by_role("button", name="Stop the robot").click()
-    watcher.get_by_text("The robot was told to stop.").wait_for()
+    watcher.get_by_role("button", name="Stop robot").click()
+    watcher.get_by_role("button", name="Robot stopped").wait_for()
 
 
 def test_its_preflight_and_its_picture_are_shown(visit):
     page = visit("robot")
     connect(page)
-    page.get_by_role("button", name="Pre-flight").click()
-    page.get_by_text("Nothing speaks against driving.").wait_for()
-    page.get_by_role("button", name="Take a picture").click()
-    page.get_by_alt_text("What the robot sees").wait_for()
-    page.get_by_text(re.compile(r"Battery: \d\.\d\d V")).wait_for()
+    page.get_by_role("button", name="Run pre-flight").click()
+    page.get_by_text("Pre-flight check passed.").wait_for()
+    page.get_by_role("button", name="Take picture").click()
+    page.get_by_alt_text("Picture of the robot's camera").wait_for()
+    page.get_by_text(re.compile(r"^\d\.\d\d V$")).first.wait_for()
 
 
 def test_a_port_without_a_robot_is_told_in_words(visit):
     page = visit("robot")
+    page.get_by_text("Another port").click()
     page.get_by_label("Port", exact=True).fill("/dev/nothing")
-    page.get_by_role("button", name="Connect").click()
-    page.get_by_text("/dev/nothing").first.wait_for()
-    page.get_by_role("button", name="Connect").wait_for()
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.locator(".lab-problem", has_text="/dev/nothing").wait_for()
+    page.get_by_role("button", name="Retry").wait_for()

@@ -60,15 +60,16 @@ def test_studies_and_one_that_is_watched(lab, visit):
     page.locator('[data-study="first-look"]').wait_for()
     page.locator('[data-study="by-robot"]').wait_for()
     keep(page, "studies")
-    page = visit("watch/first-look", size=WIDE)
+    page = visit("study/first-look", size=WIDE)
     page.locator(".lab-figure img").nth(4).wait_for()
     page.wait_for_function(
         "() => [...document.querySelectorAll('.lab-figure img')].every((it) => it.naturalWidth)"
     )
     keep(page, "watch")
-    page.get_by_label("What", exact=True).click()
+    page.get_by_role("tab", name="Replay").click()
+    page.get_by_label("Trials", exact=True).click()
     page.get_by_text("The best of each generation").click()
-    page.get_by_role("button", name="Show", exact=True).click()
+    page.get_by_role("button", name="Show trials").click()
     player = page.locator(".rg-player")
     player.wait_for()
     player.get_by_role("slider", name="Step").fill("40")
@@ -80,8 +81,8 @@ def test_studies_and_one_that_is_watched(lab, visit):
 
 def test_a_robot_driven_by_hand(lab, visit):
     page = visit("robot", size=PHONE, has_touch=True, **FINE)
-    page.get_by_role("button", name="Connect").click()
-    page.get_by_text("Battery: ").wait_for()
+    page.get_by_role("button", name="Use an emulated robot").click()
+    page.get_by_text("Battery").wait_for()
     for _ in range(3):
         page.locator(".lab-pad").press("ArrowUp")
     page.locator(".lab-pad").blur()
@@ -90,9 +91,9 @@ def test_a_robot_driven_by_hand(lab, visit):
 
 def test_a_sitting_on_a_phone(lab, visit):
     make_study(lab.root, steps=60)
-    page = visit("trials/by-robot", size=PHONE, has_touch=True, **FINE)
+    page = visit("study/by-robot/trials", size=PHONE, has_touch=True, **FINE)
     begin_sitting(page, "emulator://s2?fluke=2&speed=1")
-    page.get_by_role("button", name="Start the trial").scroll_into_view_if_needed()
+    page.get_by_role("button", name="Start trial").scroll_into_view_if_needed()
     page.locator(".lab-question").evaluate("it => it.scrollIntoView({block: 'center'})")
     keep(page, "place")
     start_trial(page, 1)
@@ -103,7 +104,7 @@ def test_a_sitting_on_a_phone(lab, visit):
 
 def test_a_sheet_counted_from_its_photo(lab, visit):
     lines = drive_sheet(lab.root)
-    page = visit("trials/by-robot", size=TALL)
+    page = visit("study/by-robot/trials", size=TALL)
     page.get_by_label("Your name").fill("anna")
     photo = {"name": "sheet.jpg", "mimeType": "image/jpeg", "buffer": photo_of(lines)}
     page.get_by_label("Choose a photo").set_input_files(photo)

@@ -14,7 +14,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PATIENCE_MS, PHONE
+from .conftest import PATIENCE_MS, PHONE, check_uncovered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
 
@@ -24,47 +24,45 @@ STOP_S = 0.2
 """Within which the motors stand after a press [s]."""
 VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390, 400)}
 
-UNCOVERED = """() => {
-  const stop = document.querySelector(".lab-stop"), box = stop.getBoundingClientRect();
-  const across = [box.left + 4, box.right - 4], down = [box.top + 4, box.bottom - 4];
-  const points = across.flatMap((x) => down.map((y) => [x, y]));
-  points.push([(box.left + box.right) / 2, (box.top + box.bottom) / 2]);
-  return points.map(([x, y]) => document.elementFromPoint(x, y)).map(
-    (found) => stop.contains(found) ? "stop" : found ? found.outerHTML.slice(0, 200) : "out of sight");
-}"""
+NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Notify.create({
+  type, message: `What happened, in a sentence that needs two lines on a phone: ${type}.`,
+  position: "top", timeout: 0 }))"""
 
 
-def check_uncovered(page: Any) -> None:
-    assert page.evaluate(UNCOVERED) == ["stop"] * 5
+def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, tmp_path):
+    """In one lab, with each kind of thing that lies above a page."""
+    robot = visit("robot")
+    assert not robot.get_by_role("button", name="Stop robot").is_visible()
+    robot.get_by_role("button", name="Use an emulated robot").click()
+    robot.locator(".lab-stop").wait_for()
+    for view, size in VIEWS.items():
+        page = visit("gap", size=size, has_touch=view != "desktop", user_agent=agent(view))
+        page.get_by_text("Emulated robot", exact=False).first.wait_for()
+        stop = page.get_by_role("button", name="Stop robot")
+        stop.wait_for()
+        assert stop.bounding_box()["height"] >= 44
+        check_uncovered(page.locator(".lab-stop"))
 
+        page.evaluate(NOTICES)
+        page.locator(".q-notification").nth(2).wait_for()
+        check_uncovered(page.locator(".lab-stop"))
+        page.screenshot(path=tmp_path / f"{view}-notices.png")
 
-@pytest.mark.parametrize("view", VIEWS)
-def test_nothing_covers_the_stop(visit, view, tmp_path):
-    page = visit("gap", size=VIEWS[view], has_touch=view != "desktop", user_agent=agent(view))
-    stop = page.get_by_role("button", name="Stop the robot")
-    stop.wait_for()
-    check_uncovered(page)
+        page.get_by_text("Advanced", exact=True).click()
+        page.get_by_role("combobox", name="Observation level").click()
+        page.get_by_role("option", name="encoders").wait_for()
+        page.wait_for_timeout(400)  # until it has moved in
+        check_uncovered(page.locator(".lab-stop"))
 
-    page.get_by_label("Name", exact=True).fill("no / name")
-    page.get_by_role("button", name="Measure the gap").click()
-    notice = page.locator(".q-notification", has_text="cannot be named")
-    notice.wait_for()
-    check_uncovered(page)
-    page.screenshot(path=tmp_path / "notice.png")
-
-    page.locator(".q-field", has_text="What is seen of the target").last.click()
-    page.get_by_role("option", name="encoders").wait_for()
-    page.wait_for_timeout(400)  # it comes in by and by
-    check_uncovered(page)
-    page.screenshot(path=tmp_path / "choice.png")
-    stop.click()
-    page.get_by_text("No robot is in use here.").wait_for()
-
-    for popup in ("popup", "too_long_message_popup"):
-        page.evaluate(f"document.getElementById('{popup}').ariaHidden = false")
-    page.wait_for_timeout(2600)  # after which the first one is shown
-    check_uncovered(page)
-    page.screenshot(path=tmp_path / "popup.png")
+        page.evaluate("document.getElementById('too_long_message_popup').ariaHidden = false")
+        check_uncovered(page.locator(".lab-stop"))
+        page.screenshot(path=tmp_path / f"{view}-choice.png")
+        stop.click()
+        page.get_by_role("button", name="Robot stopped").wait_for()
+        page.get_by_role("button", name="Stop robot").wait_for(timeout=20_000)  # after 5 s
+        page.context.close()
+    robot.get_by_role("button", name="Disconnect").click()
+    robot.locator(".lab-stop").wait_for(state="hidden")
 
 
 def agent(view: str) -> str | None:
@@ -134,13 +132,14 @@ def motors(emulated: tuple[str, str]) -> Iterator[Motors]:
 
 
 def connect(page: Any, port: str) -> None:
+    page.get_by_text("Another port").click()
     page.get_by_label("Port", exact=True).fill(port)
-    page.get_by_role("button", name="Connect").click()
-    page.get_by_text(f"at {port}").wait_for()
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.get_by_text(f"Connected to {port}").wait_for()
 
 
 def point_at_stop(page: Any) -> None:
-    button = page.get_by_role("button", name="Stop the robot").bounding_box()
+    button = page.get_by_role("button", name="Stop robot").bounding_box()
     page.mouse.move(button["x"] + button["width"] / 2, button["y"] + button["height"] / 2)
 
 
@@ -148,22 +147,23 @@ def make_busy(lab: Any, visit: Any) -> None:
     """Have a check that never ends, a report and a calibration go on."""
     run_study(parse_study(TINY, "study.toml"), lab.root / "tiny")
     lab.make_checks_endless()
-    checking, calibrating, reporting = visit("new"), visit("calibrate"), visit("watch/tiny")
-    reporting.get_by_text("4 of 4 simulated runs").wait_for()
+    checking, calibrating, reporting = visit("new"), visit("calibrate"), visit("study/tiny")
+    reporting.get_by_text("4 runs", exact=True).wait_for()
     start(checking, TINY.replace("tiny", "endless"))
     checking.get_by_role("button", name="Cancel").wait_for()
-    calibrating.get_by_role("combobox", name="What", exact=True).click()
-    calibrating.get_by_role("option", name="all: everything at once").click()
-    calibrating.get_by_role("button", name="Calibrate").click()
-    calibrating.get_by_role("button", name="Stop for now").wait_for()
-    reporting.get_by_role("button", name="Write the report").click()
+    calibrating.get_by_role("combobox", name="What to calibrate").click()
+    calibrating.get_by_role("option", name="All", exact=True).click()
+    calibrating.get_by_role("button", name="Calibrate", exact=True).click()
+    calibrating.get_by_role("button", name="Stop calibration").wait_for()
+    reporting.get_by_role("tab", name="Report").click()
+    reporting.get_by_role("button", name="Write report").click()
 
 
 def test_stop_is_at_once_while_a_check_a_report_and_a_calibration_run(lab, visit, emulated, motors):
     """Measured from the press of the mouse to the witness's last sight of turning motors: all the way there."""
     driving, pressing = visit("robot"), visit("robot")
     connect(driving, emulated[0])
-    pressing.get_by_role("button", name="Ask for the robot").wait_for()
+    pressing.get_by_role("button", name="Request control").wait_for()
     make_busy(lab, visit)
     point_at_stop(pressing)
     motors.check_stop(driving, pressing.mouse.down, pressing.mouse.up)
@@ -180,21 +180,25 @@ def test_stop_needs_no_websocket(visit, emulated, motors):
 def test_escape_stops_from_any_page_whatever_has_the_focus(visit, emulated, motors):
     driving, pressing = visit("robot"), visit("new")
     connect(driving, emulated[0])
-    pressing.get_by_label("name", exact=True).first.focus()
+    pressing.get_by_label("Name", exact=True).first.focus()
     motors.check_stop(
         driving, lambda: pressing.keyboard.down("Escape"), lambda: pressing.keyboard.up("Escape")
     )
 
 
-def test_stop_tells_when_the_lab_cannot_be_reached(lab, visit):
+def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit):
     page = visit("gap", forgive=["net::ERR", "WebSocket", "reloading", "Failed to load"])
-    warning = page.get_by_text("Connection lost. Use the robot's power switch.")
-    page.get_by_role("button", name="Stop the robot").wait_for()
-    assert not warning.is_visible()
+    page.get_by_label("Target").fill("twin:mine.toml")
+    assert not page.locator(".lab-stop").is_visible()
     page.context.set_offline(True)
-    page.get_by_role("button", name="Stop the robot").click()
-    warning.wait_for()
-    check_uncovered(page)
+    page.evaluate("window.socket.io.engine.close()")
+    page.get_by_text("Reconnecting…").wait_for()
+    lost = page.get_by_role("button", name="Connection lost. Use the robot's power switch.")
+    lost.wait_for()  # whether a robot is connected is unknown
+    check_uncovered(page.locator(".lab-stop"))
+    page.get_by_role("button", name="Measure the gap").click()
     page.context.set_offline(False)
-    page.get_by_role("button", name="Stop the robot").click()
-    warning.wait_for(state="hidden")
+    page.get_by_text("Reconnecting…").wait_for(state="hidden")
+    page.locator(".lab-stop").wait_for(state="hidden")
+    assert page.get_by_label("Target").input_value() == "twin:mine.toml"
+    assert page.get_by_text("No gaps measured yet.").is_visible()

@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import OUTAGE, PHONE
+from .conftest import OUTAGE, PHONE, check_uncovered
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
 
 pytestmark = pytest.mark.slow
 
-PAGE = "trials/by-robot"
+PAGE = "study/by-robot/trials"
 
 
 def wait_for(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
@@ -32,14 +32,18 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     make_study(lab.root)
     page = visit(PAGE, size=PHONE, has_touch=True)
     begin_sitting(page)
+    page.get_by_role("button", name="Start trial").wait_for()
+    page.evaluate("scrollTo(0, 0)")
+    for action in ("Start trial", "Stop robot"):
+        check_uncovered(page.get_by_role("button", name=action))
     for first in (1, 3):
         start_trial(page, first)
         start_trial(page, first + 1)
         page.get_by_text("is full").wait_for()
         count(page, first, 0, 1, 13)
         count(page, first + 1, 0, 12)
-        page.get_by_role("button", name="Close the generation").click()
-    page.get_by_text("All runs on a robot are complete.").wait_for()
+        page.get_by_role("button", name="Close generation").click()
+    page.get_by_text("All robot runs are complete.").wait_for()
     with ledger_of(lab.root) as ledger:
         assert [(each.cells, each.is_closed) for each in ledger.trials()] == 2 * [
             ((0, 1, 13), True),
@@ -69,8 +73,8 @@ def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
     page = visit(PAGE)
     page.get_by_label("Your name").fill("anna")
     page.get_by_text("4 of 72 cells").wait_for()
-    page.get_by_role("button", name="Enter this count").click()
-    page.get_by_text("Trial 1: 4 cells are in the ledger").wait_for()
+    page.get_by_role("button", name="Save score").click()
+    page.get_by_text("Trial 1: 4 cells saved").wait_for()
     assert states(lab) == ["scored", "driven"]
 
 
@@ -88,8 +92,8 @@ def test_a_lab_killed_in_the_middle_of_a_trial_loses_nothing(lab, visit):
     lab.start()
     page = visit(PAGE)
     begin_sitting(page, FAST)
-    page.get_by_text("It was cut off").wait_for()
-    page.get_by_role("button", name="Void, drive it again").click()
+    page.get_by_text("The trial was interrupted").wait_for()
+    page.get_by_role("button", name="Void and repeat").click()
     start_trial(page, 3)
     wait_for(lambda: states(lab)[:2] == ["void", "driven"])
 
@@ -100,9 +104,9 @@ def test_an_aborted_trial_stops_the_robot_and_is_asked_about(lab, visit):
     begin_sitting(page, SLOW)
     start_trial(page, 1)
     page.get_by_text(re.compile(r"Step [3-9] of 200")).wait_for()
-    page.get_by_role("button", name="Stop the robot").click()
-    page.get_by_text("It was cut off: aborted by the operator").wait_for()
-    page.get_by_role("button", name="Driven, count it").click()
+    page.get_by_role("button", name="Stop robot").click()
+    page.get_by_text("The trial was interrupted: aborted by the operator").wait_for()
+    page.get_by_role("button", name="Count as driven").click()
     wait_for(lambda: states(lab)[0] == "driven")
     with ledger_of(lab.root) as ledger:
         assert ledger.trial(1).end == "aborted"
@@ -126,24 +130,21 @@ def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(l
     make_study(lab.root)
     page = visit(PAGE)
     begin_sitting(page)
-    page.get_by_role("button", name="Start the trial").wait_for()
+    page.get_by_role("button", name="Start trial").wait_for()
     other = visit(PAGE)
-    other.get_by_text("anna has the robot; you are watching.").wait_for()
-    assert other.get_by_role("button", name="Start the trial").is_disabled()
-    other.get_by_role("button", name="Ask for the robot").click()
-    other.get_by_role("button", name="Cancel").click()
-    for answer in ("Keep it", "Hand it over"):
-        other.get_by_role("button", name="Ask for the robot").click()
-        other.get_by_role("button", name="Ask now").click()
-        other.get_by_text("You asked for it.").wait_for()
-        page.get_by_text("asks for the robot.").wait_for()
-        page.get_by_role("button", name=answer).click()
-        if answer == "Keep it":
-            other.get_by_text("anna keeps the robot for now.").wait_for()
-    page.get_by_text("has the robot; you are watching.").wait_for()
+    other.get_by_text("anna is operating the robot. You are watching.").wait_for()
+    assert other.get_by_role("button", name="Start trial").is_disabled()
+    for answer in ("Keep", "Hand over"):
+        other.get_by_role("button", name="Request control").click()
+        other.get_by_text("You requested control.").wait_for()
+        page.get_by_text("requests control of the robot.").wait_for()
+        page.get_by_role("button", name=answer, exact=True).click()
+        if answer == "Keep":
+            other.get_by_text("anna keeps the robot.").wait_for()
+    page.get_by_text("is operating the robot. You are watching.").wait_for()
     start_trial(other, 1)
-    page.get_by_role("button", name="Stop the robot").click()
-    page.get_by_text("The robot was told to stop.").wait_for()
+    page.get_by_role("button", name="Stop robot").click()
+    page.get_by_role("button", name="Robot stopped").wait_for()
 
 
 def test_two_people_count_and_their_agreement_is_told(lab, visit):
@@ -156,7 +157,7 @@ def test_two_people_count_and_their_agreement_is_told(lab, visit):
     count(page, 1, 0, 1)
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
-    other.get_by_text("To be counted a second time: 1").wait_for()
+    other.get_by_text("To score a second time: 1").wait_for()
     other.get_by_role("button", name="1, red").last.click()
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0
@@ -171,11 +172,11 @@ def test_a_void_trial_needs_a_reason_and_is_driven_again(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
-    page.get_by_text("Note, or void").click()
-    page.get_by_role("button", name="Void, with this reason").click()
+    page.get_by_text("Note or void").click()
+    page.get_by_role("button", name="Void trial").click()
     page.get_by_text("Give a reason.").wait_for()
-    page.get_by_label("What is to be said of this trial").fill("the pen fell out")
-    page.get_by_role("button", name="Void, with this reason").click()
+    page.get_by_label("Note or reason").fill("the pen fell out")
+    page.get_by_role("button", name="Void trial").click()
     wait_for(lambda: states(lab) == ["void", "planned", "driven"])
     count(page, 2, 0, 1)
     start_trial(page, 3)
@@ -190,7 +191,7 @@ def test_the_arena_is_drawn_where_cells_are(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
-    page.get_by_role("button", name="Enter this count").scroll_into_view_if_needed()
+    page.get_by_role("button", name="Save score").scroll_into_view_if_needed()
     first, last = (page.locator(f'[data-counting] [data-cell="{cell}"]').bounding_box() for cell in (0, 71))
     assert first["x"] < last["x"]
     assert first["y"] > last["y"]
@@ -205,21 +206,18 @@ def test_codes_alone_are_shown_while_counting_is_blind(lab, visit):
     make_study(lab.root)
     page = visit(PAGE)
     begin_sitting(page)
-    page.get_by_role("button", name="Start the trial").wait_for()
+    page.get_by_role("button", name="Start trial").wait_for()
     assert "coverage-robot" not in page.content()
-
-
-def test_an_unknown_study_is_told_in_words(visit):
-    visit("trials/nobody").get_by_text("There is no study 'nobody'").wait_for()
 
 
 def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
     make_study(lab.root)
     page = visit(PAGE)
-    page.get_by_label("Who counts cells").click()
-    page.get_by_text("The emulator itself").click()
+    page.get_by_text("Advanced", exact=True).click()
+    page.get_by_role("combobox", name="Scored by").click()
+    page.get_by_role("option", name="The emulator").click()
     begin_sitting(page)
-    page.get_by_text("All runs on a robot are complete.").wait_for()
+    page.get_by_text("All robot runs are complete.").wait_for()
     with ledger_of(lab.root) as ledger:
         assert {row["who"] for row in ledger.scores()} == {"witness"}
 
@@ -231,16 +229,16 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
-    page.get_by_label("A note on the whole").fill("half a note")
-    page.get_by_role("button", name="Count trial 2").click()
+    page.get_by_label("Note on the study").fill("half a note")
+    page.get_by_role("button", name="Score trial 2").click()
     page.locator('[data-counting="2"]').wait_for()
-    page.get_by_role("button", name="Count trial 1").focus()
+    page.get_by_role("button", name="Score trial 1").focus()
     page.keyboard.press("Enter")
     page.locator('[data-counting="1"]').wait_for()
     count(page, 1, 0)
     page.locator('[data-counting="2"]').wait_for()
-    page.get_by_role("button", name="Count trial 1").wait_for(state="detached")  # anna has
-    assert page.get_by_label("A note on the whole").input_value() == "half a note"
+    page.get_by_role("button", name="Score trial 1").wait_for(state="detached")  # anna has
+    assert page.get_by_label("Note on the study").input_value() == "half a note"
 
 
 def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(lab, visit):
@@ -248,10 +246,10 @@ def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(
     page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource", "Failed to fetch"])
     page.get_by_label("Your name").fill("anna")
     lab.kill()
-    page.locator("#popup").get_by_text("Connection lost").wait_for()
+    page.get_by_text("Reconnecting…").wait_for()
     lab.start()
     page.get_by_label("Or paste the address or the token here").fill(lab.token)
     page.get_by_role("button", name="Open the lab").click()
     page.wait_for_url(lab.address + PAGE)
     begin_sitting(page)
-    page.get_by_role("button", name="Start the trial").wait_for()
+    page.get_by_role("button", name="Start trial").wait_for()

@@ -33,17 +33,16 @@ def carry_out(root: Path) -> None:
 
 def test_a_study_is_shown_in_figures_and_its_trials_are_played(lab, visit):
     carry_out(lab.root)
-    page = visit("watch/seen", size=PHONE)
-    page.get_by_text("12 of 12 simulated runs").wait_for()
+    page = visit("study/seen", size=PHONE)
+    page.get_by_text("12 runs", exact=True).wait_for()
     page.locator(".lab-figure img").nth(3).wait_for()
     for image in page.locator(".lab-figure img").all():
         image.scroll_into_view_if_needed()
         page.wait_for_function("image => image.naturalWidth > 0", arg=image.element_handle())
         assert "narrow" in image.evaluate("image => image.currentSrc")
-    page.get_by_role("button", name="Show").click()
+    page.get_by_role("tab", name="Replay").click()  # the typical run plays without a wish
     player = page.locator(".rg-player")
     player.wait_for()
-    player.get_by_role("button", name="Play").click()
     page.wait_for_function("() => document.querySelector('.rg-clock').textContent.match(/step [1-9]/)")
     slider = player.get_by_role("slider", name="Step")
     slider.fill("87")
@@ -52,23 +51,25 @@ def test_a_study_is_shown_in_figures_and_its_trials_are_played(lab, visit):
 
 def test_several_trials_are_played_together_and_a_wish_that_cannot_be_is_told(lab, visit):
     carry_out(lab.root)
-    page = visit("watch/seen")
-    page.get_by_label("What", exact=True).click()
+    page = visit("study/seen")
+    page.get_by_role("tab", name="Replay").click()
+    page.get_by_label("Trials", exact=True).click()
     page.get_by_text("The best of each condition").click()
-    page.get_by_role("button", name="Show").click()
-    page.locator(".rg-player").wait_for()
+    page.get_by_role("button", name="Show trials").click()
+    page.locator(".rg-names > *").nth(1).wait_for()
     assert page.locator(".rg-names > *").count() == 2
     page.get_by_label("Run", exact=True).fill("99")
     page.get_by_label("Run", exact=True).press("Tab")
-    page.get_by_role("button", name="Show").click()
+    page.get_by_role("button", name="Show trials").click()
     page.locator(".lab-problem", has_text="99").wait_for()
 
 
 def test_report_is_written_and_works_in_its_sandbox(lab, visit):
     carry_out(lab.root)
-    page = visit("watch/seen")
-    page.get_by_role("button", name="Write the report").click()
-    link = page.get_by_role("link", name="The report")
+    page = visit("study/seen")
+    page.get_by_role("tab", name="Report").click()
+    page.get_by_role("button", name="Write report").click()
+    link = page.get_by_role("link", name="Open report")
     link.wait_for()
     with page.context.expect_page() as opened:
         link.click()
@@ -92,10 +93,10 @@ def test_report_is_written_and_works_in_its_sandbox(lab, visit):
 
 def test_whoever_watches_sees_a_trial_while_it_is_driven(lab, visit):
     make_study(lab.root, steps=60)
-    page = visit("trials/by-robot")
+    page = visit("study/by-robot/trials")
     begin_sitting(page, SLOW)
     start_trial(page, 1)
-    watcher = visit("watch/by-robot", size=PHONE)
+    watcher = visit("study/by-robot", size=PHONE)
     watcher.get_by_text("Trial 1 is being driven").wait_for()
     line = watcher.locator(".lab-line")
     line.wait_for()

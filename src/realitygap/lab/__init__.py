@@ -1,4 +1,4 @@
-"""The lab: a web page to run, watch and score studies, for people beside a robot with a phone or a laptop.
+"""The lab: a web page to run, watch, and score studies with a phone or a laptop next to a robot.
 
 `open_lab` serves the studies of a folder. The robot and every study are driven by processes of their own, never by a
 page; what the page is told goes into the study's folder and its ledger at once. Needs the extra `lab` (NiceGUI).

@@ -1,4 +1,4 @@
-"""Who may see the lab: whoever has its token; and pages load nothing but the lab's own."""
+"""Access to the lab: visitors need its token, and pages load only the lab's own files."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ _ENTRY = """<!doctype html>
 
 
 class Access:
-    """Admits whoever has the token: in front of pages, their websockets, files and uploads.
+    """Checks the token before each page, websocket, file, and upload.
 
     The token comes in the address once. From then on the browser sends it in a cookie.
 
@@ -197,7 +197,7 @@ def _announced(scope: Scope) -> int:
 
 
 def _bounded(receive: Receive) -> Receive:
-    """What is sent, up to the limit: a body that announced no length is cut off there."""
+    """Pass on a request's body up to the limit; a body without a length is cut off there."""
     left = LARGEST_BODY
 
     async def limited() -> MutableMapping[str, Any]:

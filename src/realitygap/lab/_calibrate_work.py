@@ -1,4 +1,4 @@
-"""A calibration, in a process of its own: unattended, or led through at a page."""
+"""A calibration in its own process: unattended, or with an operator at a page."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, l
 from ._channel import Channel, Message
 
 _QUESTIONS = {
-    "ahead": "How far ahead of its start does it stand [in]?",
-    "left": "How far to the left of it [in]?",
-    "turned": "How far did it turn to the left, with all full turns [degrees]?",
+    "ahead": "Distance ahead of the start [in]",
+    "left": "Distance to the left of the start [in]",
+    "turned": "Turn to the left, with all full turns [degrees]",
 }
 
 
 def work(channel: Channel, order: Message) -> None:
-    """Carry out what is missing of a calibration's trials, fit, and write the calibration.
+    """Drive the missing trials of a calibration, fit, and write the calibration.
 
     Args:
         channel: To the server.
@@ -88,14 +88,14 @@ class _Growing:
         self._channel, self._kept, self._arena, self._robot = channel, kept, arena, robot
 
     def tell(self, done: int, n: int) -> None:
-        """So many of so many trials are there."""
+        """Report the number of recorded trials."""
         trials = those_that_count(read_observations(self._kept).trials) if self._kept.exists() else []
         self._channel.say(
             "trials", done=done, n=n, readings=[self._point(k, each) for k, each in enumerate(trials)]
         )
 
     def _point(self, number: int, trial: ObservedTrial) -> dict[str, Any]:
-        """Where a trial stands in the plot, and the mean of what each sensor read, 0..1."""
+        """Return the position of a trial in the plot, and the mean reading of each sensor, 0..1."""
         at = float(number + 1)
         if trial.purpose == "sensors":
             right = max(x for wall in self._arena.walls for x in wall[::2])

@@ -9,6 +9,7 @@ from typing import Any
 from realitygap.platforms import names_a_port
 
 from ._job import Job
+from ._pace import Pace
 
 
 class CalibrationJob(Job):
@@ -17,18 +18,20 @@ class CalibrationJob(Job):
     Attributes:
         name: Of its files.
         kind: What is calibrated.
-        n_done, n_trials: Trials that are there, and wanted.
-        readings: Of each trial there is, what to plot.
-        made: What was fitted; None before.
+        platform: The platform that is measured.
+        n_done, n_trials: Number of trials: recorded, and total.
+        readings: Point of the plot for each recorded trial.
+        made: Result of the fit; None before.
     """
 
-    STOPPED = "Stopped. What was recorded is kept; the same name goes on with it."
+    STOPPED = "Stopped. Recorded trials are saved. Calibrate again under the same name to continue."
 
     def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = Path(order["out"]).stem
         self.kind = str(order["kind"])
-        self._uses_robot = names_a_port(str(order["platform"]))
+        self.platform = str(order["platform"])
         self.n_done = self.n_trials = 0
+        self._pace = Pace()
         self.readings: list[dict[str, Any]] = []
         self.made: dict[str, Any] | None = None
         super().__init__({"work": "calibrate", **order}, root, changed)
@@ -36,15 +39,26 @@ class CalibrationJob(Job):
     @property
     def has_robot(self) -> bool:
         """Whether a robot is in use."""
-        return self._uses_robot and not self.is_over
+        return names_a_port(self.platform) and not self.is_over
+
+    @property
+    def progress(self) -> str:
+        """Progress in words."""
+        if self.outcome is not None:
+            return self.outcome
+        if not self.n_trials:
+            return "Starting…"
+        number = min(self.n_done + 1, self.n_trials)
+        return f"Trial {number} of {self.n_trials}{self._pace.words}"
 
     def _on_trials(self, message: dict[str, Any]) -> None:
+        self._pace.note(message["done"] / max(message["n"], 1))
         self.n_done, self.n_trials = message["done"], message["n"]
         self.readings = message["readings"]
 
     def _on_made(self, message: dict[str, Any]) -> None:
         self.made = message
-        self.outcome = f"Written: {self.name}.toml. Simulate it with sim:{self.name}.toml"
+        self.outcome = f"Complete. Saved as {self.name}.toml. Use it as sim:{self.name}.toml."
 
     def _on_paused(self, message: dict[str, Any]) -> None:
         self.outcome = self.STOPPED

@@ -1,4 +1,4 @@
-"""What a process of the lab says to the server that began it, and is told: a line of JSON each."""
+"""Messages between a process of the lab and its server: one line of JSON each."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Channel:
             self._sink.flush()
 
     def ask(self, question: str, *, until: Callable[[], bool] | None = None, **values: Any) -> Message:
-        """Ask somebody at a page, and wait for the answer.
+        """Ask the visitors, and wait for an answer.
 
         Args:
             question: What is asked.

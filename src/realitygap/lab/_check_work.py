@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RealityGapError
-from realitygap.study import parse_study
+from realitygap.study import StudyFileError, parse_study
 
 from ._channel import LOOK_S, Channel, Message
 from ._files import refuse_code, refuse_files_outside
@@ -47,7 +47,7 @@ def work(channel: Channel, order: Message) -> None:
 
 
 def _read(text: str) -> Message:
-    """The values of the file as JSON has them, or the mistake."""
+    """Return the values of the file for JSON, or the mistake."""
     try:
         return {"data": json.loads(json.dumps(read_form(text), default=str))}
     except ValueError as error:
@@ -55,12 +55,15 @@ def _read(text: str) -> Message:
 
 
 def _check(root: Path, text: str, *, allow_code: bool) -> dict[str, Any]:
-    """The name of the study, or the mistakes in its file."""
+    """Return the name and size of the study, or the mistakes in its file."""
     try:
         refuse_files_outside(root, text)
         study = parse_study(text, str(root / "study.toml"))
         refuse_code(study, allow_code)
-        return {"name": study.about.name}
+        sizes = {"n_conditions": len(study.conditions), "replicates": study.about.replicates}
+        return {"name": study.about.name, **sizes}
+    except StudyFileError as error:
+        return {"mistakes": "\n".join(error.mistakes), "places": list(error.mistakes)}
     except RealityGapError as error:
         return {"mistakes": str(error)}
     except tomllib.TOMLDecodeError as error:

@@ -19,8 +19,8 @@ MOST = 4
 """Checks at a time."""
 
 _LATE = (
-    f"The check was stopped after {LIMIT_S:g} s; nothing was started. Reading the study, or a file that it names, "
-    "takes too long. Look at those files, then check again."
+    f"The check was stopped after {LIMIT_S:g} s; nothing was started. Reading the study, or one of its files, "
+    "takes too long. Look at the files, then check again."
 )
 
 

@@ -46,7 +46,7 @@ class CountedTrial:
 
     @property
     def number(self) -> int:
-        """Of the trial."""
+        """Number of the trial."""
         return self.trial.trial
 
     def role_of(self, who: str) -> ScoreRole | None:
@@ -142,7 +142,7 @@ class Counts:
         raise LedgerError(f"There is no trial {number} in {self._folder.name}.")
 
     def arena(self, condition: str) -> Arena:
-        """Where the trials of a condition are driven."""
+        """Return the arena of a condition."""
         if condition not in self._arenas:
             resolved = Condition.from_settings(condition, self._settings[condition])
             self._arenas[condition] = resolved.arena.arena()
@@ -201,7 +201,7 @@ class Counts:
             self._keeper.submit(forget_draft, self._folder, number, who, role).result()
 
     def draft(self, number: int, who: str, role: ScoreRole) -> Draft:
-        """What somebody has tapped of a trial so far; before that, what was last seen of it, for a first count."""
+        """Return the cells marked so far; for a first score without any, those of the last proposal."""
         draft = self._drafts.get((number, who, role)) or read_draft(self._folder, number, who, role)
         if draft is not None:
             return draft
@@ -224,7 +224,7 @@ class Counts:
         return CountCard(draft, arena, self.proposals(number), read_drawn(self._folder, number))
 
     def proposals(self, number: int) -> list[Proposal]:
-        """What a photograph or a camera saw of a trial, the last one first, as of the last look."""
+        """Return the proposals of photographs and cameras for a trial, the last one first."""
         return self._proposed.get(number, [])
 
     def _proposal(self, number: int, mark: str) -> Proposal | None:

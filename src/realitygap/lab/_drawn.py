@@ -1,4 +1,4 @@
-"""What lies beside a ledger: the lines that emulated robots drew, and cells tapped so far of trials not yet scored."""
+"""Files next to a ledger: lines that emulated robots drew, and cells marked for trials without a score."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def read_drawn(folder: Path, trial: int) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Draft:
-    """What somebody has tapped so far.
+    """Cells that a visitor has marked so far.
 
     Attributes:
         cells: Marked ones.
@@ -48,13 +48,13 @@ class Draft:
 
 
 def keep_draft(folder: Path, trial: int, who: str, role: str, draft: Draft) -> None:
-    """Keep what somebody has tapped so far."""
+    """Save the cells that a visitor has marked so far."""
     values = {"cells": sorted(draft.cells), "proposal": draft.proposal}
     write_json(folder, _draft(folder, trial, who, role), values)
 
 
 def read_draft(folder: Path, trial: int, who: str, role: str) -> Draft | None:
-    """What somebody has tapped so far; None where they have not begun."""
+    """Return the cells that a visitor has marked so far; None before the first."""
     found = read_json(_draft(folder, trial, who, role))
     cells = found.get("cells") if isinstance(found, dict) else None
     if isinstance(cells, list) and all(type(each) is int for each in cells):
@@ -85,7 +85,7 @@ def write_json(folder: Path, path: Path, value: Any) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """What is in a file; None where it is not there, or no JSON."""
+    """Return the value in a JSON file; None if it cannot be read."""
     try:
         return parse_json(read_file(path, MOST_JSON_BYTES, plain=True), nan=True)
     except (OSError, ValueError):

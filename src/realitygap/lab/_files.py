@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl
 
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
-from realitygap.platforms import names_a_port
+from realitygap.platforms import names_a_port, platform_names, platform_of, split_spec
 from realitygap.robots import split_port
 from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
@@ -21,6 +21,8 @@ LONGEST_TEXT = 200_000
 _SOCKETS = ("socket", "rfc2217")
 _EMULATORS_FILES = ("arena", "state", "twin")
 """Settings of an emulated robot's port that name files."""
+_PYTHON = "python:"
+"""A platform from a file, which is not imported here."""
 _PROSE = ("title", "note", "published_source", "change")
 
 
@@ -111,11 +113,13 @@ def refuse_camera(root: Path, spec: str) -> None:
 
 
 def refuse_platform(root: Path, platform: str) -> None:
-    """Refuse a platform whose port or file would be outside a folder.
+    """Refuse a platform that there is not, or whose port or file would be outside a folder.
 
     Raises:
-        StudyError: It would.
+        StudyError: There is no such platform, or it would.
     """
+    if not platform.startswith(_PYTHON) and split_spec(platform)[0] not in platform_names():
+        platform_of(platform)  # raises, and names the platform that may be meant
     if names_a_port(platform):
         refuse_port(root, platform)
     else:

@@ -78,7 +78,7 @@ def form_sections() -> dict[str, list[Field]]:
 
 
 def condition_fields() -> list[Field]:
-    """What is said of each condition itself."""
+    """Return the settings of a condition that the form shows."""
     own = ("name", "selection", "platform", "noise")
     return [_field("condition", key, Condition.model_fields[key], {}) for key in own]
 
@@ -103,7 +103,7 @@ def _field(place: str, key: str, info: FieldInfo, defaults: Mapping[str, Any]) -
 
 
 def _kind(annotation: Any) -> tuple[Kind, tuple[str, ...]]:
-    """What is entered for a type; None stands beside it where a setting may be left out."""
+    """Return the kind of field for a type, and its choices; optional types have None in addition."""
     origin = get_origin(annotation)
     if origin is typing.Annotated:
         return _kind(get_args(annotation)[0])
@@ -143,7 +143,7 @@ def entered(field: Field, text: str) -> Any:
 
 
 def written_form(data: Mapping[str, Any]) -> str:
-    """The study file with these values; a section without any is left out, and what is no section is kept as it is."""
+    """Study file with these values; a section without any is left out, and what is no section is kept as it is."""
     conditions = _conditions(data)
     plain = {
         key: value

@@ -1,4 +1,4 @@
-"""What a page may say over its websocket: messages of the page's own library and shape, and nothing else."""
+"""Messages that a page may send over its websocket; all others end the connection."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NEEDED = {
 def checked(
     receive: Callable[[], Awaitable[Message]], send: Callable[[Message], Awaitable[None]]
 ) -> Callable[[], Awaitable[Message]]:
-    """What a page says, up to the first message that no page says: at that the connection ends.
+    """Pass on messages up to the first one that no page sends, which ends the connection.
 
     Args:
         receive, send: Of a websocket, as ASGI has them.
@@ -84,7 +84,7 @@ def _is_json(text: Any) -> bool:
 
 
 def _value(text: str) -> Any:
-    """What a JSON text holds: numbers that are finite, and letters that there are.
+    """Parse JSON with finite numbers and valid characters only.
 
     Raises:
         ValueError: It is none, or holds others.

@@ -1,4 +1,4 @@
-"""A gap measured, or planned, in a process of its own; its report grows as trials come in."""
+"""A gap that is measured or planned in its own process; the report grows with each round of trials."""
 
 from __future__ import annotations
 
@@ -6,13 +6,21 @@ import time
 from pathlib import Path
 from typing import Any
 
+from realitygap.gap import Estimate
 from realitygap.report import write_gap_report
 from realitygap.study import gap_between, plan_gap
 
 from ._channel import Channel, Message
 
 _TOLD_S = 0.2
-"""Between two messages on how far it is [s]."""
+"""Time between two messages on the progress [s]."""
+MEASURES = {
+    "rms": "RMS gap",
+    "level": "Bias",
+    "srcc": "Rank correlation",
+    "noise_ceiling": "Ceiling of the rank correlation",
+}
+"""Measures that the page shows above the report."""
 
 
 def work(channel: Channel, order: Message) -> None:
@@ -44,7 +52,17 @@ def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -
     for trials in rounds(int(values.pop("trials"))):
         found = gap_between(**values, trials=trials, results=kept, tell=told.show)
         write_gap_report(found, page)
-        channel.say("measured", trials=trials, verdict=found.study.result.verdict)
+        result = found.study.result
+        measures = [(title, _words(getattr(result, name))) for name, title in MEASURES.items()]
+        channel.say("measured", trials=trials, verdict=result.verdict, measures=measures)
+
+
+def _words(estimate: Estimate) -> str:
+    """A measure with its interval, or why there is none."""
+    if estimate.estimate is None:
+        return estimate.refused or "not measured"
+    text = f"{estimate.estimate:.3f}"
+    return text if estimate.low is None else f"{text} [{estimate.low:.3f}, {estimate.high:.3f}]"
 
 
 def rounds(trials: int) -> list[int]:
@@ -61,7 +79,7 @@ class _Telling:
         self._last = 0.0
 
     def show(self, name: str, done: int, total: int) -> None:
-        """So many trials are done on a platform."""
+        """Report the number of trials on a platform."""
         now = time.monotonic()
         if now - self._last > _TOLD_S or done == total:
             self._last = now

@@ -1,4 +1,4 @@
-"""Work that goes on in a process of its own, as the pages see it."""
+"""Work in its own process, as the pages see it."""
 
 from __future__ import annotations
 

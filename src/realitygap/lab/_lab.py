@@ -1,13 +1,14 @@
-"""What the pages of the lab share: the studies, what goes on, and who has the robot."""
+"""State that all pages share: studies, running work, and the operator of the robot."""
 
 from __future__ import annotations
 
 import re
 import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from realitygap.errors import StudyError
 from realitygap.platforms import names_a_port
@@ -24,6 +25,8 @@ from ._hand import Hand
 from ._job import Job
 from ._live_job import LiveJob
 from ._photos import Photos
+from ._problem import FieldError, in_field
+from ._standing import Standing, standing_of
 from ._studies import Studies, used_by
 from ._study_job import StudyJob
 from ._video_job import ENDINGS, VideoJob, videos_in
@@ -32,7 +35,7 @@ from ._watcher import Watcher
 
 @dataclass(frozen=True)
 class Visitor:
-    """Somebody at a page.
+    """A visitor at a page.
 
     Attributes:
         key: Of their browser.
@@ -43,23 +46,31 @@ class Visitor:
     who: str = ""
 
 
+_NAME_RULE = "Use letters, digits, '.', '-', and '_'. Start with a letter or digit."
+
+MOST_REPORTS = 50
+"""Number of reports of gaps that a page lists."""
+
 HANDOVER_S = 20.0
-"""Time that the operator of a robot has to answer who asks for it; after that the robot is handed over [s]."""
+"""Time that an operator has to answer a visitor who requests control of the robot [s]."""
+
+STOPPED_S = 5.0
+"""Time for which pages show that the robot was stopped [s]."""
 
 
 @dataclass(frozen=True)
 class RobotRequest:
-    """A visitor who asks for the robot that another visitor has.
+    """A visitor's request to control the robot that another visitor operates.
 
     Attributes:
-        visitor: Who asks.
-        operator: Who has the robot.
-        is_refused: Whether the operator keeps the robot.
+        visitor: The visitor who requests control.
+        operator: The visitor who operates the robot.
+        state: `asked`; `kept` after the operator refused; `unanswered` after `HANDOVER_S` without an answer.
     """
 
     visitor: Visitor
     operator: Visitor
-    is_refused: bool = False
+    state: Literal["asked", "kept", "unanswered"] = "asked"
 
 
 class Lab:
@@ -76,7 +87,7 @@ class Lab:
         gap: The gap that is measured or planned, or was last; None before.
         calibration: The calibration that goes on, or was last; None before.
         operator: Who has the robot: one visitor at a time, while others watch; None while nobody has.
-        request: Who asked last for the robot that somebody else has; None where nobody did, or it was handed over.
+        request: Last request to control the robot; None if there was none, or the robot was handed over since.
         videos: The video of each study that is tracked, or was last, by the study's name.
         lives: The robot that a network of each study drives for those who look, by the study's name.
         version: Counts changes, so that a page knows when to look.
@@ -100,6 +111,7 @@ class Lab:
         self.videos: dict[str, VideoJob] = {}
         self.lives: dict[str, LiveJob] = {}
         self._lock = threading.RLock()
+        self._stopped_s = -STOPPED_S
 
     def changed(self) -> None:
         """Something has changed; may be called from any thread."""
@@ -141,14 +153,14 @@ class Lab:
         folder, video = self.studies.path(name), spec.partition("?")[0]
         refuse_camera(self.root, spec)
         if not trials:
-            raise StudyError("No trial waits to be counted: there is nothing to look for in a video.")
+            raise StudyError("There are no trials to score from a video. Drive a trial first.")
         if video not in videos_in(self.root):
             raise StudyError(
                 f"There is no video {video!r} in {self.root}. Put it there; its name ends in {', '.join(ENDINGS)}."
             )
         with self._lock:
             if any(not each.is_over for each in self.videos.values()):
-                raise StudyError("A video is being tracked already. Wait until that is done, or stop it.")
+                raise StudyError("A video is being tracked. Wait until it is complete, or stop it.")
             self.videos[name] = VideoJob(folder, self.root, spec, trials, self.changed)
         self.changed()
 
@@ -163,7 +175,8 @@ class Lab:
             StudyError: There is no such study, or a file outside the lab's folder is named.
         """
         folder, platform = self.studies.path(name), str(wish.get("platform") or "")
-        refuse_port(self.root, platform) if "://" in platform else refuse_outside(self.root, platform)
+        with in_field("platform"):
+            refuse_port(self.root, platform) if "://" in platform else refuse_outside(self.root, platform)
         with self._lock:
             before = self.lives.pop(name, None)
             if before is not None:
@@ -195,12 +208,12 @@ class Lab:
         """
         with self._lock:
             if self.job(name) is not None:
-                raise StudyError(f"The study {name!r} is running already. Give this one another name.")
+                raise StudyError(f"The study {name!r} is running. Choose another name.")
             folder = self.studies.new_path(name)
             self._begin(name, {"work": "study", "folder": str(folder), "text": text})
 
     def go_on(self, name: str, **options: Any) -> StudyJob:
-        """Have a study go on where it stopped.
+        """Resume a study.
 
         Args:
             name: Of the study.
@@ -212,102 +225,134 @@ class Lab:
         folder = self.studies.path(name)
         with self._lock:
             if self.job(name) is not None:
-                raise StudyError(f"The study {name!r} goes on already.")
+                raise StudyError(f"The study {name!r} is running.")
             if said := used_by(folder):
                 raise StudyError(f"{name!r} is in use: {said} writes to it. Wait until it ends, or stop it.")
             if options.get("port"):
-                refuse_port(self.root, options["port"])
-                refuse_camera(self.root, str(options.get("camera") or ""))
+                with in_field("port"):
+                    refuse_port(self.root, options["port"])
+                with in_field("camera"):
+                    refuse_camera(self.root, str(options.get("camera") or ""))
                 self.refuse_second_robot()
             return self._begin(name, {"work": "study", "folder": str(folder), **options})
 
     def _begin(self, name: str, order: dict[str, Any]) -> StudyJob:
         order["allow_code"] = self.allow_code
-        job = self.jobs[name] = StudyJob(name, order, self.root, self.changed)
+
+        def change() -> None:
+            job = self.jobs.get(name)
+            if job is not None and job.is_over:
+                self.studies.forget(name)  # its state is read after its end, never before
+            self.changed()
+
+        job = self.jobs[name] = StudyJob(name, order, self.root, change)
         self.changed()
         return job
 
+    def standing(self, name: str) -> Standing:
+        """Return the state of a study, as every page shows it."""
+        job = self.jobs.get(name)
+        is_over = job is not None and job.is_over
+        state = self.studies.lately(name)
+        if job is not None and job.is_over and not is_over:
+            state = self.studies.lately(name)  # it ended in the meantime
+        return standing_of(state, job)
+
+    def standings(self) -> list[Standing]:
+        """Return the states of all studies, the last one changed first."""
+        return [self.standing(name) for name in self.studies.names()]
+
     def job(self, name: str) -> StudyJob | None:
-        """The job of a study, while it goes on."""
+        """Return the job of a study while it runs."""
         job = self.jobs.get(name)
         return None if job is None or job.is_over else job
 
     # gaps
 
-    def measure_gap(self, name: str, values: dict[str, Any]) -> None:
+    def measure_gap(self, name: str, values: dict[str, Any], visitor: Visitor) -> None:
         """Measure a gap.
 
         Args:
-            name: Of its files in the folder `gaps`.
-            values: The arguments of `gap_between`.
+            name: Name of its files in the folder `gaps`.
+            values: Arguments of `gap_between`.
+            visitor: Operator of the robot, if the target is one.
 
         Raises:
-            StudyError: A name that cannot be, a file outside the lab's folder, or something is at work already.
+            FieldError: A name or a platform that cannot be used.
+            StudyError: A gap is being measured or planned, or the robot is in use.
         """
         page = self.gap_page(name)
         if page is None:
-            raise StudyError(
-                f"A gap cannot be named {shown(name)}: expected letters, digits, '.', '-' and '_'."
-            )
-        for spec in (values["sim"], values["target"], values["controllers"]):
-            refuse_platform(self.root, spec)
+            raise FieldError("name", f"{_NAME_RULE} You entered {shown(name)}.")
+        for key, spec in {"sim": values["sim"], "target": values["target"]}.items():
+            with in_field(key):
+                refuse_platform(self.root, spec)
+        with in_field("controllers"):
+            refuse_outside(self.root, values["controllers"])
         with self._lock:
-            if names_a_port(values["target"]):
-                self.refuse_second_robot()
             kept = page.with_suffix(".jsonl")
             refuse_links(self.root, page, kept)
+            if names_a_port(values["target"]):
+                self.refuse_second_robot()
+                self.operator, self.request = visitor, None
             page.parent.mkdir(exist_ok=True)
             order = {"measure": values, "page": str(page), "kept": str(kept)}
             self._begin_gap(name, order)
 
     def plan_gap(self, question: str, value: float) -> None:
-        """Plan how many controllers and trials a question takes.
+        """Plan the number of controllers and trials that a question needs.
 
         Raises:
-            StudyError: Something is at work already.
+            StudyError: A gap is being measured or planned.
         """
         with self._lock:
             self._begin_gap("", {"plan": {"question": question, "value": value}})
 
     def _begin_gap(self, name: str, order: dict[str, Any]) -> None:
         if self.gap is not None and not self.gap.is_over:
-            raise StudyError("A gap is being measured or planned already. Wait until it is done, or stop it.")
+            raise StudyError("A gap is being measured or planned. Wait until it is complete, or stop it.")
         self.gap = GapJob(name, order, self.root, self.changed)
         self.changed()
 
     def gap_page(self, name: str) -> Path | None:
-        """Where the report of a gap is to be; None where it cannot have this name."""
+        """Return the file of a gap's report; None if a gap cannot have this name."""
         if not re.fullmatch(NAME_PATTERN, name) or len(name) > 80:
             return None
         return self.root / "gaps" / f"{name}.html"
 
+    def gap_reports(self) -> list[str]:
+        """Return the names of the reports of gaps, the last one first."""
+        files = sorted((self.root / "gaps").glob("*.html"), key=lambda file: -file.stat().st_mtime)
+        return [file.stem for file in files if self.gap_page(file.stem) == file][:MOST_REPORTS]
+
     # calibrations
 
     def calibrate(self, name: str, values: dict[str, Any], visitor: Visitor) -> None:
-        """Carry out a calibration, or what is missing of it.
+        """Calibrate, or continue a calibration that was stopped.
 
         Args:
-            name: Of its file in the lab's folder, without .toml.
-            values: What, of which platform and how, as `_calibrate_work` takes it.
-            visitor: Who has the robot, where there is one.
+            name: Name of its file in the lab's folder, without .toml.
+            values: Order of `_calibrate_work`.
+            visitor: Operator of the robot, if the platform is one.
 
         Raises:
-            StudyError: A name that cannot be, a file outside the lab's folder, or something is at work already.
+            FieldError: A name, a platform, or a file that cannot be used.
+            StudyError: A calibration is running, or the robot is in use.
         """
         if not re.fullmatch(NAME_PATTERN, name) or len(name) > 80:
-            raise StudyError(
-                f"A calibration cannot be named {shown(name)}: expected letters, digits, '.', '-' and '_'."
-            )
+            raise FieldError("name", f"{_NAME_RULE} You entered {shown(name)}.")
         out = self.root / f"{name}.toml"
         if out.exists() and not out.with_suffix(".trials.jsonl").exists():
-            raise StudyError(f"There is a file {out.name} already, of something else. Give another name.")
+            raise FieldError("name", f"There is another file {out.name}. Choose another name.")
         refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
-        refuse_outside(self.root, values["base"])
-        refuse_platform(self.root, values["platform"])
+        with in_field("base"):
+            refuse_outside(self.root, values["base"])
+        with in_field("platform"):
+            refuse_platform(self.root, values["platform"])
         is_robot = names_a_port(values["platform"])
         with self._lock:
             if self.calibration is not None and not self.calibration.is_over:
-                raise StudyError("A calibration goes on already. Wait until it is done, or stop it.")
+                raise StudyError("A calibration is running. Wait until it is complete, or stop it.")
             if is_robot:
                 self.refuse_second_robot()
                 self.operator, self.request = visitor, None
@@ -336,8 +381,9 @@ class Lab:
             StudyError: No port is named, or a robot is in use.
         """
         if not port:
-            raise StudyError("No port was named. Expected one such as /dev/rfcomm0 or COM3.")
-        refuse_port(self.root, port)
+            raise FieldError("port", "This field is empty. Enter a port such as /dev/rfcomm0 or COM3.")
+        with in_field("port"):
+            refuse_port(self.root, port)
         with self._lock:
             self.refuse_second_robot()
             self.hand = Hand({"port": port, "witness": witness}, self.root, self.changed)
@@ -351,53 +397,71 @@ class Lab:
         self.changed()
 
     def ask_for_robot(self, visitor: Visitor) -> None:
-        """Ask the operator for the robot; after `HANDOVER_S` without an answer it is handed over.
+        """Request control of the robot; a robot that nobody operates is handed over immediately.
 
         Raises:
-            StudyError: Somebody else asks already.
+            StudyError: Another visitor's request is waiting for an answer.
         """
         with self._lock:
             operator, asked = self.operator, self.request
             if self.may_operate(visitor) or operator is None:
                 self.take_robot(visitor)
                 return
-            if asked is not None and not asked.is_refused:
+            if asked is not None and asked.state == "asked":
                 if asked.visitor.key == visitor.key:
                     return
                 raise StudyError(
-                    f"{asked.visitor.who or 'Somebody else'} asks for the robot already. Wait a moment."
+                    f"{asked.visitor.who or 'Another visitor'} has requested control. Wait for the answer."
                 )
             self.request = request = RobotRequest(visitor, operator)
-        waiting = threading.Timer(HANDOVER_S, self._answer, (request,), {"yes": True})
+        waiting = threading.Timer(HANDOVER_S, self._end_request, (request, "unanswered"))
         waiting.daemon = True
         waiting.start()
         self.changed()
 
     def answer_request(self, operator: Visitor, *, yes: bool) -> None:
-        """Hand the robot over to the visitor who asks for it, or keep it.
+        """Hand the robot over to the visitor who requests control, or keep it.
 
         Raises:
-            StudyError: Nobody asks this operator any more.
+            StudyError: No visitor requests control from this operator.
         """
         request = self.request
-        if request is None or request.operator.key != operator.key or not self._answer(request, yes=yes):
-            raise StudyError("Nobody asks you for the robot any more.")
+        if request is None or request.operator.key != operator.key or request.state == "kept":
+            raise StudyError("The request for control has ended.")
+        if yes:
+            self._hand_over(request)
+        else:
+            self._end_request(request, "kept")
 
-    def _answer(self, request: RobotRequest, *, yes: bool) -> bool:
-        """Answer a request; False if it was answered before, or the robot has another operator by now."""
+    def take_over(self, visitor: Visitor) -> None:
+        """Take control of the robot from an operator who did not answer.
+
+        Raises:
+            StudyError: The operator has not had the time to answer, or the robot is moving.
+        """
         with self._lock:
-            if self.request is not request or request.is_refused:
-                return False
-            if self.operator is None or self.operator.key != request.operator.key:
-                self.request = None
-                return False
-            self.request = None if yes else replace(request, is_refused=True)
-            if yes:
-                self.operator = request.visitor
-                if self.hand is not None and not self.hand.is_over:
-                    self.hand.stop()  # a handle that is still held drives no more
+            request = self.request
+            if request is None or request.visitor.key != visitor.key or request.state != "unanswered":
+                raise StudyError(f"Request control first, and wait {HANDOVER_S:.0f} s for the answer.")
+            if self.robot_moves:
+                raise StudyError("The robot is moving. Wait until it stands still, or stop it.")
+            self._hand_over(request)
+
+    def _hand_over(self, request: RobotRequest) -> None:
+        with self._lock:
+            if self.request is not request:
+                raise StudyError("The request for control has ended.")
+            self.operator, self.request = request.visitor, None
+            if self.hand is not None and not self.hand.is_over:
+                self.hand.stop()  # a drive pad that is still held drives no more
         self.changed()
-        return True
+
+    def _end_request(self, request: RobotRequest, state: Literal["kept", "unanswered"]) -> None:
+        with self._lock:
+            if self.request is request:
+                is_current = self.operator is not None and self.operator.key == request.operator.key
+                self.request = replace(request, state=state) if is_current else None
+        self.changed()
 
     def may_operate(self, visitor: Visitor) -> bool:
         """Whether this visitor has the robot, or nobody has."""
@@ -405,8 +469,8 @@ class Lab:
 
     @property
     def operator_name(self) -> str:
-        """Of who has the robot."""
-        return (self.operator.who if self.operator else "") or "Somebody at another page"
+        """Name of the visitor who operates the robot."""
+        return (self.operator.who if self.operator else "") or "Another visitor"
 
     def refuse_second_robot(self) -> None:
         """Refuse to take the robot while something has it.
@@ -415,14 +479,48 @@ class Lab:
             StudyError: Something has it.
         """
         if self.robot_job is not None:
-            raise StudyError(f"The study {self.robot_job.name!r} has the robot. End its sitting first.")
+            raise StudyError(f"The study {self.robot_job.name!r} uses the robot. Disconnect it there first.")
         if self.has_robot:
             raise StudyError(
-                "A robot is in use, by hand, for a gap or for a calibration. Let it go there first."
+                "A robot is connected for driving by hand, a gap, or a calibration. Disconnect it there first."
             )
 
+    @property
+    def robot_port(self) -> str:
+        """Port of the robot that is connected; empty if none is."""
+        if self.robot_job is not None:
+            return self.robot_job.port
+        if self.hand is not None and not self.hand.is_over:
+            return self.hand.port
+        measured = (each for each in (self.gap, self.calibration) if each is not None and each.has_robot)
+        return next((each.platform.removeprefix("scribbler:") for each in measured), "")
+
+    @property
+    def robot_action(self) -> str:
+        """Sentence that states what the robot is doing now; empty if it stands still."""
+        job, hand = self.robot_job, self.hand
+        if job is not None:
+            return f"The robot is driving trial {job.card['trial']}." if job.card is not None else ""
+        if hand is not None and not hand.is_over:
+            return "The robot is driven by hand." if hand.senses is not None and hand.senses["moves"] else ""
+        if self.gap is not None and self.gap.has_robot:
+            return "The robot is driving trials of a gap."
+        if self.calibration is not None and self.calibration.has_robot and self.calibration.ask is None:
+            return "The robot is driving a trial of a calibration."
+        return ""
+
+    @property
+    def robot_moves(self) -> bool:
+        """Whether the robot is driving, as far as its process has reported."""
+        return bool(self.robot_action)
+
+    @property
+    def is_just_stopped(self) -> bool:
+        """Whether a visitor stopped the robot in the last seconds, and it has not been driven since."""
+        return time.monotonic() - self._stopped_s < STOPPED_S and not self.robot_moves
+
     def stop_robot(self) -> bool:
-        """Stop the motors of whatever robot is in use; False where none is."""
+        """Stop the motors of the robot in use; return False if there is none."""
         job, hand, is_used = self.robot_job, self.hand, self.has_robot
         if job is not None:
             job.stop_robot()
@@ -431,6 +529,8 @@ class Lab:
         for each in (self.gap, self.calibration):
             if each is not None and each.has_robot:
                 each.ask_to_end()
+        if is_used:
+            self._stopped_s = time.monotonic()
         return is_used
 
     def close(self) -> None:

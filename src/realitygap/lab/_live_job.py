@@ -40,7 +40,7 @@ class LiveJob(Job):
         return self.scene is not None and not self.is_over
 
     def since(self, n: int) -> list[dict[str, Any]]:
-        """What a page that was told n messages is to be told now; everything in one where it knows none of the last."""
+        """Return the messages after the first n; one message with everything if they were forgotten."""
         n_new = self.n_told - n
         if not self.messages or n_new <= 0:
             return []

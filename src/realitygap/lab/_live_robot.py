@@ -1,4 +1,4 @@
-"""A robot that somebody wants to see driven by a network: simulated, a twin, or emulated."""
+"""A robot that a network drives while visitors watch: simulated, a twin, or emulated."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def open_robot(condition: Condition, spec: str = "") -> tuple[Robot, int]:
     platform = platform_of(spec)
     if platform.needs_person:
         raise StudyError(
-            f"{spec!r} cannot be shown live: somebody has to place this robot. Expected an emulated one, such as "
-            f"{platform.emulated!r}."
+            f"{spec!r} cannot be driven live, because a person must place this robot. Expected an emulated one, such "
+            f"as {platform.emulated!r}."
         )
     if platform.name == own.name:
         platform = platform.model_copy(update={"steps": own.steps})

@@ -1,4 +1,4 @@
-"""A network of a study that drives a robot in a process of its own, while somebody looks."""
+"""A network of a study drives a robot in its own process while visitors watch."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class _Stops:
 
 
 class _Live:
-    """Tells where an emulated robot is, 20 times a second, while a trial goes on."""
+    """Reports the pose of an emulated robot 20 times a second during a trial."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -96,7 +96,7 @@ class _Shown:
         return self.stops.is_asked
 
     def cut_off(self) -> None:
-        """The trial does not go on."""
+        """The trial was interrupted."""
         self._live.end()
 
     def driven(self, card: Card) -> None:
@@ -106,7 +106,7 @@ class _Shown:
 
 
 class WatchedOperator(Operator):
-    """Nobody beside an emulated robot; the page may watch and stop it.
+    """An emulated robot without an operator; visitors can watch and stop it.
 
     Args:
         channel: To the server.
@@ -131,7 +131,7 @@ class WatchedOperator(Operator):
         return super().accept(preflight)
 
     def settle(self, card: Card, problem: str) -> Verdict:
-        """Void, once a person has said that it may go on after a stop."""
+        """Void the trial; after a stop, wait until a visitor continues."""
         if self._is_stopped:
             self._is_stopped = False
             self._channel.ask("go on", card=card_values(card), problem=problem)
@@ -197,7 +197,7 @@ class PageOperator(Operator):
         super().meet(robot)
 
     def accept(self, preflight: Preflight) -> bool:
-        """Show what was found; go on if a person says so."""
+        """Show the result of the pre-flight check; return whether to drive."""
         found: dict[str, Any] = {"facts": preflight.facts, "problems": list(preflight.problems)}
         self._channel.say("preflight", **found)
         if not preflight.problems:
@@ -213,7 +213,7 @@ class PageOperator(Operator):
         return "driven" if answer.get("verdict") == "driven" else "void"
 
     def place(self, card: Card) -> None:
-        """Ask for the robot at its start, with the pen."""
+        """Request control at its start, with the pen."""
         self._channel.ask("place", card=card_values(card), is_placed=self._witness is not None)
         super().place(card)
         self._page.begun(card, self._witness)
@@ -224,7 +224,7 @@ class PageOperator(Operator):
         return self._page.step(card, step, seen, command)
 
     def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
-        """None if a person has to look at the cells first; then what was seen is kept for them."""
+        """Return the score, or None if a person must check the cells first; they are saved as a proposal."""
         self._page.driven(card)
         seen, number = super().drawn(card, driven), card.trial.trial
         if card.observe != "cells" or (
@@ -232,7 +232,7 @@ class PageOperator(Operator):
         ):
             return seen
         if seen is not None and seen.who == CameraObserver.who:
-            told = f"Cells and path by {self.proposer}, looked at by who entered them."
+            told = f"Cells and path by {self.proposer}, checked by the person who saved them."
             keep_proposal(self._folder, number, track_proposal(seen, self.proposer, self.proposer, told))
         if self._witness is not None:
             keep_drawn(self._folder, number, self._witness.score(card.arena).path or ())
@@ -241,7 +241,7 @@ class PageOperator(Operator):
     # a sheet
 
     def enter(self, cards: Sequence[Card], *, is_full: bool) -> Iterable[tuple[int, Score]]:
-        """Wait until these trials are scored at some page, or somebody says later."""
+        """Wait until these trials are scored, or a visitor postpones them."""
         if is_full or self._when == "trial":
             numbers = [card.trial.trial for card in cards]
             with Ledger.open(self._folder / LEDGER_NAME, writable=False) as ledger:
@@ -255,7 +255,7 @@ class PageOperator(Operator):
         return ()
 
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
-        """Ask whether the scores may breed the next generation; a trial that is taken back is scored anew."""
+        """Ask whether to close the generation; return the trials to score again."""
         numbers = [card.trial.trial for card in cards]
         with Ledger.open(self._folder / LEDGER_NAME, writable=False) as ledger:
 
@@ -270,7 +270,7 @@ class PageOperator(Operator):
 
 
 def card_values(card: Card) -> dict[str, Any]:
-    """What a page shows of a trial; of one under a code nothing that tells its condition."""
+    """Return the facts that a page shows about a trial; a blind trial hides its condition."""
     trial = card.trial
     return {
         "trial": trial.trial,

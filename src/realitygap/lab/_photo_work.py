@@ -1,4 +1,4 @@
-"""A photograph of a sheet, read in a process of its own: what its pens drew is proposed for their trials."""
+"""A photograph of a sheet is read in its own process, which proposes cells for each trial."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def work(channel: Channel, order: Message) -> None:
 
 
 def _layout(folder: Path, name: str) -> SheetLayout:
-    """What was printed for the trials of a condition."""
+    """Return the layout of a condition's sheet."""
     description = ResultsFolder.open(folder).description
     described = next(each for each in description["conditions"] if each["name"] == name)
     pens = tuple((description.get("trials") or {}).get("pens") or PEN_NAMES)

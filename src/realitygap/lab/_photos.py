@@ -1,4 +1,4 @@
-"""The photographs of a study's sheets: kept beside its ledger, and read one after the other."""
+"""Photographs of a study's sheets: saved next to its ledger, and read one by one."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class SheetPhoto:
 
 
 class Photos:
-    """The photographs of a study's sheets. What waits when the lab is killed is read when it is there again.
+    """Photographs of a study's sheets; those that wait are read after a restart of the lab.
 
     Args:
         folder: Of the study.
@@ -75,7 +75,7 @@ class Photos:
         return sorted([*self._photos.values()], key=lambda each: each.time, reverse=True)
 
     def of_sheet(self, sheet: int) -> SheetPhoto | None:
-        """The last one of a sheet that has been read; None where there is none."""
+        """Return the last photograph of a sheet that was read; None before the first."""
         return next((each for each in self.photos() if each.sheet == sheet and each.state == "read"), None)
 
     def photo(self, mark: str) -> SheetPhoto | None:
@@ -206,7 +206,7 @@ def _read(photo: SheetPhoto, message: dict[str, Any]) -> SheetPhoto:
 
 
 def _kept(place: Path) -> list[SheetPhoto]:
-    """Those on disk; what was being read is read anew."""
+    """Return the photographs on the disk; those that were being read wait again."""
     found = []
     for path in sorted(place.glob("*.json")):
         values = read_json(path)

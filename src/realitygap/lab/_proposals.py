@@ -1,4 +1,4 @@
-"""Cells that a photograph or a camera proposes for a trial, for somebody to confirm; they lie beside the ledger."""
+"""Cells that a photograph or a camera proposes for a trial; a person confirms them."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ class Proposal:
 
     @property
     def name(self) -> str:
-        """What to call it."""
+        """Name to show."""
         return f"the photo {self.source}" if self.kind == "photo" else f"the track of {self.source}"
 
     def score(self, cells: Sequence[int], who: str) -> Score:
-        """What goes into the ledger once somebody has looked: their cells, and from what they were confirmed."""
+        """Return the score for the ledger: confirmed cells, and the proposal that they began with."""
         if self.kind == "photo":
             seen = PhotoCount(
                 self.source, self.mark, tuple(self.cells), tuple(self.doubtful), is_confirmed=True
@@ -73,14 +73,14 @@ class Proposal:
 
 
 def keep_proposal(folder: Path, trial: int, proposal: Proposal) -> None:
-    """Keep what was proposed for a trial of the study in a folder; the same mark anew takes the place of the old."""
+    """Save a proposal for a trial of the study in a folder; it replaces an earlier one with its mark."""
     before = [each for each in _of_kind(folder, trial, proposal.kind) if each.mark != proposal.mark]
     kept = [*before, proposal][-MOST:]
     write_json(folder, _place(folder, trial, proposal.kind), [asdict(each) for each in kept])
 
 
 def read_proposals(folder: Path, trial: int) -> list[Proposal]:
-    """What was proposed for a trial, the last one first."""
+    """Return the proposals for a trial, the last one first."""
     found = [each for kind in KINDS for each in _of_kind(folder, trial, kind)]
     return sorted(found, key=lambda each: each.time, reverse=True)
 

@@ -1,4 +1,4 @@
-"""A robot at its port, driven by hand from a page: in a process of its own, with a dead man's handle."""
+"""A robot driven by hand from a page, in its own process; it stops when messages stop."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _witness(robot: Any, address: str | None) -> Witness | None:
 
 
 class _Hand:
-    """Drives as it is told, and stops when it is not."""
+    """Drives while messages arrive, and stops when they do not."""
 
     def __init__(self, channel: Channel, robot: Any, witness: Witness | None) -> None:
         self._channel, self._robot, self._witness = channel, robot, witness
@@ -114,7 +114,7 @@ class _Hand:
     # telling
 
     def _place(self) -> dict[str, Any]:
-        """Where an emulated robot is, and what is around it."""
+        """Return the arena of an emulated robot; empty for other robots."""
         if self._witness is None:
             return {}
         arena = self._witness.arena()

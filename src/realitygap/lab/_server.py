@@ -120,7 +120,7 @@ def _listen(host: str, port: int) -> socket.socket:
 
 
 def _names(host: str) -> list[str]:
-    """By what the lab can be reached."""
+    """Return the host names that reach the lab."""
     if host not in ("0.0.0.0", "::"):
         return [host]
     outward = ""
@@ -141,7 +141,7 @@ def _tell_addresses(root: Path, addresses: list[str], is_local: bool, tell: Call
         tell(f"Open {address}")
         if not is_local:
             tell(_qr_code(address))
-    tell("Whoever has this address can start studies and drive the robot. Give it to nobody else.")
+    tell("Everyone who has this address can start studies and drive the robot. Keep it secret.")
 
 
 def _qr_code(text: str) -> str:
@@ -176,6 +176,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
         tailwind=False,
         show_welcome_message=False,
         language="en-US",
+        dark=None,
         reconnect_timeout=LOST_S,
     )
     logging.getLogger("uvicorn.error").addFilter(_is_news)
@@ -203,7 +204,7 @@ def _in_one_line(record: logging.LogRecord) -> bool:
     if record.exc_info and (error := record.exc_info[1]) is not None:
         places = traceback.extract_tb(error.__traceback__)
         where = f" ({Path(places[-1].filename).name}, line {places[-1].lineno})" if places else ""
-        record.msg = "A page said what no page says, or this is a mistake in realitygap: %s"
+        record.msg = "A page sent an invalid message, or this is a mistake in realitygap: %s"
         record.args, record.exc_info = (f"{shown(error)}{where}",), None
     return True
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import os
 import re
 import socket
@@ -20,6 +21,9 @@ from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 
+from ._figure_cache import read_rows
+
+LABELS = ("SIM", "TWIN", "EMULATED", "REAL")
 LATELY_S = 0.8
 """How old what those who watch are told may be [s]."""
 _HOLDER = re.compile(r"process (\d{1,9}) on (.+)")
@@ -29,7 +33,7 @@ _LONGEST_HOLDER = 1000
 
 @dataclass(frozen=True)
 class StudyState:
-    """How far a study is.
+    """A study's folder at one moment.
 
     Attributes:
         name: Of its folder.
@@ -38,7 +42,10 @@ class StudyState:
         n_driven_runs, n_driven_done: Runs of conditions that a robot drives, and those complete.
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
-        problem: Why nothing more is known of it; empty otherwise.
+        labels: Labels of its conditions, such as SIM.
+        medians: Median best coverage of each condition, in the order of the study, as its figures show it; empty
+            before they were drawn.
+        problem: Why it cannot be read; empty otherwise.
     """
 
     name: str
@@ -50,17 +57,14 @@ class StudyState:
     n_driven_done: int = 0
     trials: dict[str, int] = field(default_factory=dict)
     used_by: str = ""
+    labels: tuple[str, ...] = ()
+    medians: tuple[float, ...] = ()
     problem: str = ""
 
     @property
     def is_complete(self) -> bool:
         """Whether nothing is missing."""
         return not self.problem and (self.n_done, self.n_driven_done) == (self.n_runs, self.n_driven_runs)
-
-    @property
-    def share(self) -> float:
-        """Of its runs that are there, 0 to 1."""
-        return (self.n_done + self.n_driven_done) / max(self.n_runs + self.n_driven_runs, 1)
 
     @property
     def has_robot(self) -> bool:
@@ -83,7 +87,7 @@ class Studies:
         self._looking = threading.Lock()
 
     def names(self) -> list[str]:
-        """Of the studies that are there, the last one changed first."""
+        """Return the names of all studies, the last one changed first."""
         with contextlib.suppress(OSError):
             found = [
                 entry
@@ -95,21 +99,24 @@ class Studies:
             return [entry.name for entry in sorted(found, key=_changed, reverse=True)]
         return []
 
+    def has(self, name: str) -> bool:
+        """Return whether there is a study of this name."""
+        path = self.root / name
+        is_name = re.fullmatch(NAME_PATTERN, name) is not None
+        return is_name and (path / "study.json").is_file() and self._is_within(path)
+
     def path(self, name: str) -> Path:
         """The folder of a study.
 
         Raises:
             StudyError: There is none of this name.
         """
-        path = self.root / name
-        if not (
-            re.fullmatch(NAME_PATTERN, name) and (path / "study.json").is_file() and self._is_within(path)
-        ):
-            raise StudyError(f"There is no study {shown(name)} in {self.root}.")
-        return path
+        if not self.has(name):
+            raise StudyError(f"There is no study named {shown(name)} in this folder.")
+        return self.root / name
 
     def new_path(self, name: str) -> Path:
-        """Where a study of this name is to be.
+        """Return the folder for a new study of this name.
 
         Raises:
             StudyError: The name cannot be had.
@@ -121,7 +128,7 @@ class Studies:
             )
         if path.exists():
             raise StudyError(
-                f"There is a folder {name!r} already. Give the study another name, or go on with that one."
+                f"There is a folder {name!r} already. Choose another name, or resume that study."
             )
         return path
 
@@ -135,24 +142,33 @@ class Studies:
             return known
 
     def state(self, name: str) -> StudyState:
-        """How far a study is."""
+        """Read the state of a study."""
         try:
             return _state(name, self.results(name))
         except (RealityGapError, OSError, KeyError, TypeError, ValueError) as error:
             return StudyState(name, title=name, problem=str(error) or repr(error))
 
     def states(self) -> list[StudyState]:
-        """How far all of them were a moment ago."""
+        """Return the recent states of all studies."""
         return [self.lately(name) for name in self.names()]
 
     def lately(self, name: str) -> StudyState:
-        """How far a study was a moment ago: however many watch it, its folder is looked at once."""
+        """Return the recent state of a study; all pages share one look at its folder."""
         with self._looking:
             when, state = self._seen.get(name, (-LATELY_S, None))
             if state is None or time.monotonic() - when >= LATELY_S:
                 state = self.state(name)
                 self._seen[name] = (time.monotonic(), state)
             return state
+
+    def forget(self, name: str) -> None:
+        """Have the next look at a study read its folder again."""
+        with self._looking:
+            self._seen.pop(name, None)
+
+    def nearest(self, name: str) -> list[str]:
+        """Return the names that are most like a name, at most three."""
+        return difflib.get_close_matches(name, self.names(), n=3, cutoff=0.0)
 
     def _is_within(self, path: Path) -> bool:
         return path.resolve().parent == self.root
@@ -169,16 +185,22 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
     simulated = [each["name"] for each in described["conditions"] if not _is_driven(each)]
     missing = sum(len(gap) for each in simulated for gap in folder.missing(each, replicates))
     n_complete, trials = _of_ledger(folder.path / LEDGER_NAME, driven, replicates)
+    n_done = replicates * len(simulated) - missing
+    rows = read_rows(folder.path, (n_done, n_complete))
     return StudyState(
         name=name,
         title=str(described.get("title") or name),
         note=str(described.get("note") or ""),
         n_runs=replicates * len(simulated),
-        n_done=replicates * len(simulated) - missing,
+        n_done=n_done,
         n_driven_runs=replicates * len(driven),
         n_driven_done=n_complete,
         trials=trials,
         used_by=used_by(folder.path),
+        labels=tuple(
+            sorted({each["label"] for each in described["conditions"] if each.get("label") in LABELS})
+        ),
+        medians=tuple(float(row["line_median"]) for row in rows or () if row["line_median"] is not None),
     )
 
 

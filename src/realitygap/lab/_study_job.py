@@ -1,4 +1,4 @@
-"""A study that goes on in a process of its own, as the pages see it."""
+"""A study that runs in its own process, as the pages see it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class StudyJob(Job):
     """
 
     QUIET = frozenset({"pose", "step"})
-    STOPPED = "Stopped. What was published or scored is safe; it can go on where it stopped."
-    LOST = "Its process ended (status {status}). What was published or scored is safe."
+    STOPPED = "Paused. Published runs and scores are saved. You can resume."
+    LOST = "The process of the study ended (status {status}). Published runs and scores are saved. You can resume."
 
     def __init__(self, name: str, order: Mapping[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = name
@@ -47,6 +47,7 @@ class StudyJob(Job):
         self.preflight: dict[str, Any] | None = None
         self.said = ""
         self.n_live = 0
+        self._ending: tuple[str, bool] | None = None
         super().__init__(order, root, changed)
 
     @property
@@ -90,9 +91,19 @@ class StudyJob(Job):
     def _on_driven(self, message: dict[str, Any]) -> None:
         self.card = None
 
+    # It is over only when its process has ended: until then its folder is in use.
+
     def _on_done(self, message: dict[str, Any]) -> None:
-        self.outcome = message["waiting"] or "Complete."
+        self._ending = (message["waiting"] or "Complete.", False)
+
+    def _on_error(self, message: dict[str, Any]) -> None:
+        self._ending = (message["text"], True)
+
+    def _on_interrupted(self, message: dict[str, Any]) -> None:
+        self._ending = (self.STOPPED, False)
 
     def _on_ended(self, message: dict[str, Any]) -> None:
         self.card = None
+        if self._ending is not None:
+            self.outcome, self.is_failed = self._ending
         super()._on_ended(message)

@@ -1,4 +1,4 @@
-"""A study, carried out in a process of its own."""
+"""A study runs in its own process."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TOLD_S = 0.5
 
 
 def work(channel: Channel, order: Message) -> None:
-    """Carry out a study, or what is missing of it.
+    """Run a study, or resume it.
 
     Args:
         channel: To the server.
@@ -54,7 +54,7 @@ def _study(order: Message, folder: Path) -> Study:
 
 @contextlib.contextmanager
 def _operated(channel: Channel, order: Message, study: Study, folder: Path) -> Iterator[Operator]:
-    """Who stands beside the robot, with a camera if one is named."""
+    """Return the operator of the robot, with a camera if one is named."""
     from realitygap.emulator import connect_witness
 
     address, camera, counts = order.get("witness") or None, order.get("camera") or None, order.get("counts")

@@ -1,4 +1,4 @@
-"""A video of trials, tracked in a process of its own: what it shows of them is proposed."""
+"""A video of trials is tracked in its own process, which proposes cells."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _tracked(channel: Channel, video: VideoFile, marks: Marks) -> Tracked:
 def _placed(
     wanted: dict[int, TrialToTrack], found: Tracked
 ) -> tuple[dict[int, TrackedTrial], dict[int, str]]:
-    """Where the trials are in the video, and why others are not; of two at the same time the one that fits better."""
+    """Find trials in the video, and reasons for those that are missing; of two at one time, keep the better fit."""
     placed: dict[int, TrackedTrial] = {}
     problems: dict[int, str] = {}
     for number, trial in wanted.items():

@@ -1,7 +1,8 @@
-"""Figures and replays of a study for those who watch it, drawn in a process of their own."""
+"""Figures and replays of a study, drawn in a separate process."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import queue
 import time
@@ -22,10 +23,12 @@ from realitygap.report import (
     draw_paths,
     draw_scores,
     draw_species,
+    summarize,
     write_report,
 )
 
 from ._channel import Channel, Message
+from ._figure_cache import keep_figures
 
 FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "scores": draw_scores,
@@ -35,6 +38,7 @@ FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "species": draw_species,
     "archive": draw_archive,
 }
+_COLUMNS = ["condition", "label", "n", "line_median", "line_low", "line_high"]
 IDLE_S = 60.0
 """After so long without a wish the process ends; the next wish begins another [s]."""
 _POLITE = 10
@@ -67,7 +71,7 @@ def _grant(channel: Channel, folder: Path, wish: Message) -> None:
     what = wish.get("what")
     try:
         if what == "figures":
-            _draw_all(channel, folder)
+            _draw_all(channel, folder, wish)
         elif what == "replay":
             channel.say("replay", key=wish["key"], **_replay(folder, wish))
         elif what == "report":
@@ -77,24 +81,38 @@ def _grant(channel: Channel, folder: Path, wish: Message) -> None:
         channel.say("refused", key=wish.get("key", ""), text=str(error))
 
 
-def _draw_all(channel: Channel, folder: Path) -> None:
-    """Every figure that can be drawn of what is there."""
+def _draw_all(channel: Channel, folder: Path, wish: Message) -> None:
+    """Summarize the published runs, and draw their figures."""
     began = time.process_time()
+    rows: list[Any] = []
+    figures: dict[str, Any] = {}
+    names = wish.get("names")
+
+    def tell(name: str, **figure: str) -> None:
+        figures[name] = figure
+        channel.say("figure", name=name, **figure)
+
+    with contextlib.suppress(RealityGapError):  # the figures state why there is nothing to show
+        rows = summarize(folder).select(_COLUMNS).to_dicts()
+        channel.say("summary", rows=rows)
     for name, draw in FIGURES.items():
+        if names and name not in names:
+            continue
         try:
             drawn = draw(folder)
         except (RealityGapError, ValueError) as error:
-            channel.say("figure", name=name, text=str(error))
+            tell(name, text=str(error))
             continue
         for number, wide in enumerate(drawn if isinstance(drawn, list) else [drawn]):
-            channel.say(
-                "figure",
-                name=f"{name}-{number}" if number else name,
+            tell(
+                f"{name}-{number}" if number else name,
                 caption=wide.caption,
                 alt=wide.alt,
                 wide=wide.svg,
                 narrow=wide.in_width(NARROW).svg,
             )
+    if not names:
+        keep_figures(folder, wish["done"], rows, figures)
     channel.say("drawn", seconds=time.process_time() - began)
 
 

@@ -11,20 +11,28 @@ from pathlib import Path
 from typing import Any
 
 from ._child import Child
+from ._figure_cache import read_figures
 
-LEAST_S = 5.0
-"""Between two drawings of the same figures [s]."""
+LEAST_S = 1.0
+"""Shortest time between two drawings of the same figures [s]."""
 SHARE = 25.0
-"""Figures are drawn for at most one part in so many of a processor's time, however long they take."""
+"""For a long study, one processor draws its figures for at most one part in 25 of its time."""
+GROWTH = 0.2
+"""Before that, figures are drawn again after this share of the time for which they have been watched."""
+RETRY_S = 5.0
+"""Time until figures are drawn again after the process that draws them ended early [s]."""
+LIVE = ("scores", "coverage")
+"""Figures that are drawn while a study runs; all are drawn when it stops."""
 MOST_REPLAYS = 64
 
 
 class Watcher:
-    """What a study looks like now; one process draws for all who watch.
+    """Figures of a study; one process draws for all pages.
 
     Attributes:
         figures: Figures by name: caption, alt, and the two drawings (SVG, gzip); or why there is none.
         n_drawn: Counts drawings.
+        rows: Condition, label, number of runs, median best coverage, and its interval, for each condition.
         replays: What was asked to be played, by the key of who asked; or why it cannot be.
         report_said: Why no report could be written; empty otherwise.
         report_stamp: Changes whenever one was written, or could not be.
@@ -38,6 +46,7 @@ class Watcher:
     def __init__(self, folder: Path, root: Path, changed: Callable[[], None]) -> None:
         self.figures: dict[str, dict[str, Any]] = {}
         self.n_drawn = 0
+        self.rows: list[dict[str, Any]] = []
         self.replays: dict[str, dict[str, Any]] = {}
         self.report_said = ""
         self.report_stamp = 0
@@ -46,19 +55,34 @@ class Watcher:
         self._lock = threading.Lock()
         self._stamp: Any = None
         self._due = 0.0
+        self._since = time.monotonic()
+        self._not_before = 0.0
         self._is_drawing = False
 
-    def look(self, stamp: Any) -> None:
-        """Have the figures drawn anew where the study has changed, but not too often.
+    def look(self, done: tuple[int, int], *, is_running: bool = False) -> None:
+        """Have the figures drawn again if the study has changed, but not too often while it runs.
 
         Args:
-            stamp: Changes whenever the study does.
+            done: Number of complete runs: simulated, and driven.
+            is_running: Whether the study runs.
         """
-        if stamp == self._stamp or time.monotonic() < self._due:
+        stamp = (*done, is_running)
+        earliest = max(self._due if is_running else 0.0, self._not_before)
+        if self._is_drawing or stamp == self._stamp or time.monotonic() < earliest:
+            return
+        if self._stamp is None and (kept := read_figures(self._folder, done)) is not None:
+            self._stamp = stamp
+            self.rows = kept[0]
+            self.figures = {name: _packed(figure) for name, figure in kept[1].items()}
+            self.n_drawn += 1
+            self._changed()
             return
         self._stamp, self._is_drawing = stamp, True
-        self._due = time.monotonic() + 600.0  # until they are drawn
-        self._want(what="figures")
+        self._want(what="figures", names=list(LIVE) if is_running else None, done=list(done))
+
+    def prepare(self) -> None:
+        """Have a process ready that draws: starting it takes longer than drawing."""
+        self._want(what="nothing")
 
     def replay(self, key: str, **wish: Any) -> None:
         """Ask for trials to be played; they come into `replays` under the key."""
@@ -92,7 +116,11 @@ class Watcher:
             elif kind == "drawn":
                 self.n_drawn += 1
                 self._is_drawing = False
-                self._due = time.monotonic() + max(LEAST_S, SHARE * message["seconds"])
+                now = time.monotonic()
+                pause = min(SHARE * message["seconds"], GROWTH * (now - self._since))
+                self._due = now + max(LEAST_S, pause)
+            elif kind == "summary":
+                self.rows = message["rows"]
             elif kind == "replay":
                 self.replays[message["key"]] = message
             elif kind == "report":
@@ -104,7 +132,7 @@ class Watcher:
                 self.replays[message["key"]] = message
             elif kind == "ended" and self._is_drawing:  # it ended before it had drawn what was asked for
                 self._stamp, self._is_drawing = None, False
-                self._due = time.monotonic() + LEAST_S
+                self._not_before = time.monotonic() + RETRY_S
         if kind != "figure":
             self._changed()
 

@@ -1,4 +1,4 @@
-"""The process in which a study goes on, or a robot is driven: `python -m realitygap.lab._work`."""
+"""Entry point of each process that runs a study or drives a robot: `python -m realitygap.lab._work`."""
 
 from __future__ import annotations
 

@@ -26,6 +26,7 @@ from ._gap.why import PARTS, part_of, why_gap
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
+from ._problems import StudyFileError
 from ._realism import measure_realism
 from ._robot import connect_robot
 from ._run import Progress, StudyResult, check_has_robot, drive_study, machine_facts, run_study
@@ -76,6 +77,7 @@ __all__ = [
     "StoppedByPerson",
     "Strategist",
     "Study",
+    "StudyFileError",
     "StudyResult",
     "StudySection",
     "TrackedTrial",

@@ -29,7 +29,7 @@ from realitygap.tasks import ControllerSettings, CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
 from ._named_files import find_files
-from ._problems import Problems
+from ._problems import Problems, StudyFileError
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
@@ -131,7 +131,7 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
-        raise StudyError("\n  ".join([head, *problems.lines]))
+        raise StudyFileError(head, problems.lines)
     return study
 
 

@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from realitygap.errors import StudyError
 from realitygap.settings import MISSING, mistakes, shown
 
 M = TypeVar("M", bound=BaseModel)
+
+
+class StudyFileError(StudyError):
+    """Mistakes in a study file.
+
+    Args:
+        head: Sentence that names the file.
+        mistakes: Each mistake, as PLACE: MESSAGE.
+
+    Attributes:
+        mistakes: Each mistake, as PLACE: MESSAGE.
+    """
+
+    def __init__(self, head: str, mistakes: Sequence[str]) -> None:
+        super().__init__("\n  ".join([head, *mistakes]))
+        self.mistakes = tuple(mistakes)
 
 
 class Problems:

@@ -12,11 +12,12 @@ from ._calibrate import add_calibrate
 from ._gap import add_gap
 from ._home import add_home
 from ._new import add_new
+from ._not_found import add_not_found
 from ._photos import add_photos
 from ._robot import add_robot
 from ._stop import add_stop
+from ._study import add_study
 from ._trials import add_trials
-from ._watch import add_watch
 
 
 def add_pages(lab: Lab) -> None:
@@ -25,6 +26,6 @@ def add_pages(lab: Lab) -> None:
     playback = resources.files("realitygap.playback")
     app.add_static_file(local_file=str(playback / "player.js"), url_path="/lab-player/player.js")
     app.add_static_file(local_file=str(playback / "player.css"), url_path="/lab-player/player.css")
-    pages = (add_home, add_new, add_trials, add_photos, add_robot, add_watch, add_gap, add_calibrate)
-    for add in (*pages, add_stop):
+    pages = (add_home, add_new, add_trials, add_photos, add_robot, add_study, add_gap, add_calibrate)
+    for add in (*pages, add_stop, add_not_found):
         add(lab)

@@ -1,4 +1,4 @@
-"""Calibrate: a robot measured step by step, with a plot that grows as readings come in."""
+"""Calibrate: a robot is measured trial by trial, and a simulated one is fitted to it."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from starlette.requests import Request
 
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.platforms import class_of
+from realitygap.platforms import class_of, emulated_robots
 from realitygap.world import load_arena
 
-from ._frame import framed, hint, section, text_of, visitor_of, whole_of
+from ._fields import Form
+from ._frame import framed, hint, section, text_of, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
-from ._notices import attempt, notify
+from ._notices import notify
 from ._part import Part, watching
 
 _KINDS = {
-    "path": "path: the paper's, five full steps ahead and five turning",
-    "sensors": "sensors: fifty readings at each distance from a wall",
-    "motion": "motion: motors and drift",
-    "contact": "contact: what happens at walls",
-    "all": "all: everything at once",
+    "path": ("Path", "The paper's method: five full steps ahead, and five that turn."),
+    "sensors": ("Sensors", "The paper's method: fifty readings at each distance from a wall."),
+    "motion": ("Motion", "Motors and drift."),
+    "contact": ("Contact", "Effect of walls on the motion."),
+    "all": ("All", "Motion, sensors, and contact together."),
 }
-_INKS = ("#1f5c99", "#b3161b", "#1e6b34", "#6a3d9a")
+"""Name and meaning of each kind of calibration."""
+_INKS = ("#0072b2", "#c94f00", "#00805c", "#b0508c")
 
 
 def add_calibrate(lab: Lab) -> None:
@@ -46,21 +48,22 @@ class _Page:
 
     def show(self) -> None:
         hint(
-            "A robot is measured, and a simulated one fitted to it. Emulators, twins and sim are measured by "
-            "themselves; beside a robot you are asked step by step. Trials are kept as they end: the same name goes on "
-            "with them."
+            "Measures a robot and fits a simulated one to it. Emulated robots, twins, and sim need no operator. For a "
+            "robot, the page tells you where to place it. Trials are saved: calibrate again under the same name to "
+            "continue."
         )
-        self._show_form()
-        self._work, self._plot, self._made = (
-            ui.refreshable(show) for show in (self._show_work, self._show_plot, self._show_made)
-        )
+        self._form_box = ui.element("div").classes("lab-form")
+        with self._form_box:
+            self._show_form()
+        self._work = Part(self._work_state, self._show_work)
+        self._plot, self._made = (ui.refreshable(show) for show in (self._show_plot, self._show_made))
         self._asked = Part(self._asked_stand, _show_question)
         self._seen = self._stand()
         with ui.column().classes("lab-cards"):
-            self._work()
+            self._work.show()
             self._asked.show()
-            self._plot()
             self._made()
+            self._plot()
         watching(self._lab, self._look)
 
     def _stand(self) -> Any:
@@ -70,7 +73,7 @@ class _Page:
         return id(job), job.n_done, job.n_trials, job.outcome, self._lab.operator, len(job.readings)
 
     def _asked_stand(self) -> tuple[CalibrationJob, dict[str, Any]] | None:
-        """What it asks this visitor."""
+        """The question that this visitor can answer, with its job."""
         job = self._lab.calibration
         ask = None if job is None or job.is_over else job.ask
         return None if job is None or ask is None or not self._may(job) else (job, ask)
@@ -80,12 +83,11 @@ class _Page:
 
     def _look(self) -> None:
         self._asked.look()
+        self._work.look()
         before, now, job = self._seen, self._stand(), self._lab.calibration
         if now == before or job is None:
             return
         self._seen = now
-        if before is None or before[:-1] != now[:-1]:
-            self._work.refresh()
         if self._chart is None or before is None or before[0] != now[0]:
             self._plot.refresh()
         elif before[-1] != now[-1]:
@@ -93,55 +95,84 @@ class _Page:
         self._made.refresh()
 
     def _show_form(self) -> None:
-        with ui.row().classes("lab-row"):
-            name = ui.input("Name", value="my-robot")
-            kind = ui.select(_KINDS, value="sensors", label="What")
-            platform = ui.input(
-                "Platform: scribbler:PORT, thymio:PORT, twin:FILE, sim or sim:FILE", value="sim"
+        form = Form()
+        form.summary()
+        kinds = {kind: name for kind, (name, _) in _KINDS.items()}
+        kind = form.choice("kind", "What to calibrate", kinds, "sensors")
+        meaning = hint(_KINDS["sensors"][1])
+        kind.on_value_change(lambda event: meaning.set_text(_KINDS[event.value][1]))
+        form.text(
+            "platform",
+            "Robot",
+            "sim",
+            options=["sim", *emulated_robots()],
+            is_needed=True,
+            explanation="scribbler:PORT, thymio:PORT, twin:FILE, sim, or sim:FILE. Emulated robots: "
+            f"{', '.join(emulated_robots())}.",
+        )
+        form.text("name", "Name", "my-robot", is_needed=True, explanation="Name of the calibration file.")
+        with ui.expansion("Advanced").classes("lab-expansion"):
+            form.choice("observe", "Observation level", ["cells", "encoders", "track"], "cells")
+            form.text(
+                "base",
+                "Robot model",
+                explanation="Robot, or its file, to start the fit from. Default: that of the platform.",
             )
-            observe = ui.select(["cells", "encoders", "track"], value="cells", label="What is seen of it")
-            base = ui.input("Robot, or its file, on whose numbers the fit builds (else that of the platform)")
-            budget = ui.number("Trials in all (else what it takes)", min=1, precision=0)
-            witness = ui.input("Witness of an emulator, HOST:PORT")
-            for each in (name, kind, platform, observe, base, budget, witness):
-                each.props("outlined dense").classes("lab-wide")
-
-        def begin() -> None:
-            self._lab.calibrate(
-                text_of(name),
-                {
-                    "kind": kind.value,
-                    "platform": text_of(platform),
-                    "observe": observe.value,
-                    "base": text_of(base) or class_of(text_of(platform)).base_robot,
-                    "budget": whole_of(budget),
-                    "witness": text_of(witness),
-                },
-                self._visitor,
+            form.number(
+                "budget",
+                "Number of trials",
+                None,
+                1,
+                10_000,
+                explanation="Total number of trials. Default: depends on what you calibrate.",
+            )
+            form.text(
+                "witness",
+                "Witness",
+                explanation="HOST:PORT of the witness of an emulator in another program.",
             )
 
-        ui.button("Calibrate", on_click=lambda: attempt(begin)).props("unelevated no-caps")
+        def begin(values: dict[str, Any]) -> None:
+            name = values.pop("name")
+            base = values["base"] or class_of(values["platform"]).base_robot
+            self._lab.calibrate(name, {**values, "base": base}, self._visitor)
 
-    def _show_work(self) -> None:
+        ui.button("Calibrate", on_click=lambda: form.submit(begin)).props("unelevated no-caps")
+
+    def _work_state(self) -> tuple[Any, ...] | None:
         job = self._lab.calibration
         if job is None:
+            return None
+        return (
+            id(job),
+            job.progress,
+            job.is_over,
+            job.is_failed,
+            job.n_done,
+            self._may(job),
+            self._lab.operator,
+        )
+
+    def _show_work(self, state: tuple[Any, ...] | None) -> None:
+        job = self._lab.calibration
+        self._form_box.set_visibility(job is None or job.is_over)
+        if job is None or state is None:
+            ui.label("No calibration has been started since the lab was opened.")
             return
         section(f"{job.name}: {job.kind}")
-        if job.outcome is not None:
-            ui.label(job.outcome).classes("lab-problem lab-lines" if job.is_failed else "").props(
-                'role="status"'
-            )
+        ui.label(job.progress).classes("lab-problem lab-lines" if job.is_failed else "").props(
+            'role="status"'
+        )
         share = job.n_done / max(job.n_trials, 1)
         ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % of the trials"')
-        ui.label(f"{job.n_done} of {job.n_trials} trials" if job.n_trials else "Getting ready ...")
         may = self._may(job)
         if not may:
             show_holder(self._lab, self._visitor)
         if not job.is_over:
-            ui.button("Stop for now", on_click=job.ask_to_end).props("outline no-caps").set_enabled(may)
+            ui.button("Stop calibration", on_click=job.ask_to_end).props("outline no-caps").set_enabled(may)
 
     def _show_plot(self) -> None:
-        """What each sensor read on average, against the distance of the wall or the number of the trial."""
+        """Show the mean reading of each sensor by distance from the wall, or by trial."""
         job, self._chart = self._lab.calibration, None
         if job is not None and any(each["means"] for each in job.readings):
             self._chart = ui.echart({}).classes("lab-plot").props('role="img"')
@@ -160,15 +191,17 @@ def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
 
     def answer(**values: Any) -> None:
         if not job.answer(ask["number"], **values):
-            notify("That has been answered already.")
+            notify("Another page has answered this question.")
 
     with ui.card().classes("lab-card lab-question").props('role="status"'):
         if ask["question"] == "place":
             ui.label(f"Trial {ask['trial'] + 1} of {ask['n']}").classes("lab-section")
             ui.label(ask["text"][:1].upper() + ask["text"][1:])
             with ui.row().classes("lab-row"):
-                ui.button("It stands there", on_click=lambda: answer(answer="go")).props("unelevated no-caps")
-                ui.button("Take the one before back", on_click=lambda: answer(answer="redo")).props(
+                ui.button("Robot is in place", on_click=lambda: answer(answer="go")).props(
+                    "unelevated no-caps"
+                )
+                ui.button("Undo last trial", on_click=lambda: answer(answer="redo")).props(
                     "outline no-caps"
                 ).set_enabled(ask["trial"] > 0)
         elif ask["question"] == "measure":
@@ -176,20 +209,20 @@ def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
             ui.label(ask["said"]).classes("lab-problem")
             with ui.row().classes("lab-row"):
                 ui.button(
-                    "Enter", on_click=lambda: answer(**{key: text_of(each) for key, each in fields.items()})
+                    "Save", on_click=lambda: answer(**{key: text_of(each) for key, each in fields.items()})
                 ).props("unelevated no-caps")
-                ui.button("Drive it again", on_click=lambda: answer(redo=True)).props("outline no-caps")
+                ui.button("Repeat trial", on_click=lambda: answer(redo=True)).props("outline no-caps")
         else:
             _ask_cells(answer)
 
 
 def _ask_cells(answer: Callable[..., None]) -> None:
     found: list[int] = []
-    ui.label("Which cells does its line cross?").classes("lab-section")
+    ui.label("Mark the cells that the line crosses").classes("lab-section")
     CellGrid(
         load_arena("paper"), name="Cells crossed", change=lambda cells: found.__setitem__(slice(None), cells)
     )
-    ui.button("Enter this count", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
+    ui.button("Save score", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
 
 
 def _grow(chart: ui.echart, job: CalibrationJob) -> None:
@@ -206,12 +239,12 @@ def _grow(chart: ui.echart, job: CalibrationJob) -> None:
 
 
 def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
-    """Of the plot, as its library has them."""
+    """Return the options of the plot."""
     n = max(len(each["means"]) for each in points)
     return {
         "animation": False,
         "grid": {"left": 50, "right": 16, "top": 36, "bottom": 44},
-        "legend": {"data": [f"sensor {k + 1}" for k in range(n)]},
+        "legend": {"data": [f"sensor {k + 1}" for k in range(n)], "top": 4},
         "xAxis": {"type": "value", "name": across, "nameLocation": "middle", "nameGap": 28},
         "yAxis": {"type": "value", "name": "reading", "min": 0},
         "series": [
@@ -228,22 +261,34 @@ def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
 
 
 def _show_fit(made: dict[str, Any]) -> None:
-    section("Fitted, with intervals of 90 %")
-    with ui.element("table").classes("lab-plain"):
-        for each in made["fitted"]:
-            with ui.element("tr"):
-                ends = f"{each['low']:.4g} to {each['high']:.4g} {each['unit']}"
-                for cell in (
-                    each["name"],
-                    f"{each['estimate']:.4g}",
-                    ends,
-                    "" if each["identified"] else "not identified",
-                ):
-                    with ui.element("td"):
-                        ui.label(cell)
+    if made["misspecified"]:
+        ui.label(
+            "Rejected: the simulator can't reproduce this robot. Don't use this calibration for conclusions."
+        ).classes("lab-rejected").props('role="alert"')
+    section("Parameters with 90 % intervals")
+    columns = [
+        {"name": name, "label": label, "field": name, "align": "left"}
+        for name, label in (
+            ("name", "Parameter"),
+            ("estimate", "Estimate"),
+            ("interval", "Interval"),
+            ("state", "Identified"),
+        )
+    ]
+    rows = [
+        {
+            "name": each["name"],
+            "estimate": f"{each['estimate']:.4g} {each['unit']}",
+            "interval": f"{each['low']:.4g} to {each['high']:.4g}",
+            "state": "Identified" if each["identified"] else "Not identified",
+        }
+        for each in made["fitted"]
+    ]
+    ui.table(rows=rows, columns=columns, row_key="name").classes("lab-table lab-fitted").props(
+        "flat bordered dense wrap-cells"
+    )
     for note in made["notes"]:
         hint(note)
-    if made["misspecified"]:
-        ui.label("The simulator cannot make what was observed: this is the nearest that it can do.").classes(
-            "lab-problem"
-        )
+    with ui.row().classes("lab-row"):
+        ui.link("New study", "/new")
+        ui.link("Measure the gap", "/gap")

@@ -1,4 +1,4 @@
-"""Counting: which cells a line crosses, tapped; kept tap by tap, and entered into the ledger at once."""
+"""Scoring: the visitor marks the cells that a line crosses; each tap is saved."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from ._grid import CellGrid, ink_of
 from ._notices import attempt
 
 _ROLES: dict[ScoreRole, str] = {
-    "score": "The count that selection uses.",
-    "second": "A second count, for the agreement alone. You do not see the first one.",
-    "correction": "A correction, for reports alone: the generation is closed.",
+    "score": "Selection uses this score.",
+    "second": "A second score measures the agreement. You do not see the first one.",
+    "correction": "Reports use this correction. The generation is closed.",
 }
 
-_HOW = "Tap a cell, or draw along the line. What you tap is kept as you go."
-_FRAMED = " Look at the framed cells: it is less than 90 % sure of them."
+_HOW = "Tap a cell, or draw along the line. Each tap is saved. Keys: arrows, Space to mark, Enter to save the score."
+_FRAMED = " Check the framed cells: they are less than 90 % certain."
 
 
 class Counting:
-    """The trials that wait for somebody to count them, and the grid for one of them.
+    """The trials to score, and the grid for one of them.
 
     Args:
         lab: Whose page it is.
@@ -54,7 +54,7 @@ class Counting:
 
     async def show(self) -> None:
         """Show it."""
-        section("Counting")
+        section("Score")
         self._lists = ui.refreshable(self._show_lists)
         self._card = ui.refreshable(self._show_card)
         self._lists()
@@ -64,7 +64,7 @@ class Counting:
         self._card()
 
     async def refresh(self) -> None:
-        """Show it anew; the grid only where another trial is to be counted, or in another way."""
+        """Update the lists, and the grid if another trial or role was chosen."""
         self._lists.refresh()
         now, seen = self._chosen_now(), self._seen()
         if (now, seen) != (self._shown, self._n_seen):
@@ -90,7 +90,7 @@ class Counting:
         return None if chosen is None else (chosen.number, role, who)
 
     async def look(self) -> None:
-        """Show the trial anew where something has been proposed for it."""
+        """Update the trial if it has a new proposal."""
         if self._seen() != self._n_seen:
             await self.refresh()
 
@@ -103,7 +103,7 @@ class Counting:
             self._loaded = None if card is None else (shown, card)
 
     def _seen(self) -> tuple[str, ...]:
-        """What is proposed for the trial that is being counted."""
+        """Return the proposals for the trial on the grid."""
         if self._shown is None:
             return ()
         return tuple(each.mark for each in self._counts.proposals(self._shown[0]))
@@ -113,16 +113,16 @@ class Counting:
         listed = self._counts.trials()
         shown = self._chosen_now()
         number = None if shown is None else shown[0]
-        self._list("To be counted", [each for each in listed if each.role_of(who) == "score"], number)
+        self._list("To score", [each for each in listed if each.role_of(who) == "score"], number)
         if who:
             second = [each for each in listed if each.role_of(who) == "second"]
-            self._list("To be counted a second time", second, number)
+            self._list("To score a second time", second, number)
         self._show_counted(listed)
         self._corrections(listed)
 
     def _show_card(self) -> None:
         if self._shown is None:
-            ui.label("No line waits to be counted.")
+            ui.label("No trials to score. Drive a trial first.")
         elif self._loaded is not None and self._loaded[0] == self._shown:
             number, role, who = self._shown
             self._show_trial(self._counts.trial(number), role, who, self._loaded[1])
@@ -146,20 +146,20 @@ class Counting:
                 ).props(f"{'unelevated' if is_chosen else 'outline'} no-caps dense padding='4px 10px'")
 
     def _show_counted(self, listed: list[CountedTrial]) -> None:
-        """What was counted and may still be taken back."""
+        """Show the scores that can be undone."""
         counted = [each for each in listed if each.trial.state == "scored" and not each.trial.is_closed]
         if not counted:
             return
-        with ui.expansion(f"Counted, and not closed: {len(counted)}").classes("lab-expansion"):
+        with ui.expansion(f"Scored, not closed: {len(counted)}").classes("lab-expansion"):
             for each in counted:
                 with ui.row().classes("lab-row"):
                     ui.label(f"Trial {each.number}, {each.pen}, by {each.first}")
-                    ui.button("Take back", on_click=lambda number=each.number: self._undo(number)).props(
-                        f'flat dense no-caps aria-label="Take back the count of trial {each.number}"'
+                    ui.button("Undo", on_click=lambda number=each.number: self._undo(number)).props(
+                        f'flat dense no-caps aria-label="Undo the score of trial {each.number}"'
                     )
 
     async def _undo(self, number: int) -> None:
-        said = f"The count of trial {number} is taken back; enter it anew."
+        said = f"The score of trial {number} is undone. Score it again."
         await attempt(lambda: self._counts.undo(number), said)
         self._lab.changed()
         await self.choose(number)
@@ -174,7 +174,7 @@ class Counting:
         if closed:
             ui.select(
                 closed,
-                label="Correct a count of a closed generation",
+                label="Correct a score of a closed generation",
                 on_change=lambda event: self.choose(event.value, corrects=True),
             ).classes("lab-wide").props("outlined dense")
 
@@ -216,11 +216,10 @@ class Counting:
                 name=f"Cells crossed in trial {each.number}",
                 change=lambda cells: put(Draft(cells, self._draft.proposal)),
             )
+            grid.on("save", lambda: self._enter(each, role))
             hint(_HOW + (_FRAMED if chosen and chosen.doubtful else ""))
             with ui.row().classes("lab-row"):
-                ui.button("Enter this count", on_click=lambda: self._enter(each, role)).props(
-                    "unelevated no-caps"
-                )
+                ui.button("Save score", on_click=lambda: self._enter(each, role)).props("unelevated no-caps")
 
                 async def clear() -> None:
                     put(Draft([]))
@@ -235,16 +234,16 @@ class Counting:
     def _show_proposal(
         self, each: CountedTrial, role: ScoreRole, proposal: Proposal, *, is_chosen: bool
     ) -> None:
-        """What something saw of the trial, and a way to begin with it."""
-        doubt = f", {len(proposal.doubtful)} to look at" if proposal.doubtful else ""
+        """Show a proposal, and a button to begin with it."""
+        doubt = f", {len(proposal.doubtful)} to check" if proposal.doubtful else ""
         name = proposal.name[:1].upper() + proposal.name[1:]
         with ui.row().classes("lab-row").props(f'data-proposal="{proposal.kind}"'):
             ui.label(f"{name}: {len(proposal.cells)} cells{doubt}.")
             if is_chosen:
-                ui.label("Shown").classes("lab-state")
+                ui.label("In use").classes("lab-state")
             else:
                 ui.button(
-                    f"Begin with its cells ({proposal.kind})",
+                    f"Use its cells ({proposal.kind})",
                     on_click=lambda: self._take(each, role, proposal),
                 ).props("outline no-caps dense")
         if proposal.said:
@@ -271,10 +270,10 @@ class Counting:
         def enter() -> None:
             self._counts.look()
             if self._counts.trial(each.number).trial.state != each.trial.state:
-                raise LedgerError(f"Somebody else has just changed trial {each.number}. Look again.")
+                raise LedgerError(f"Another visitor has just changed trial {each.number}. Check it again.")
             self._counts.score(each.number, draft, self._who(), role)
 
-        said = f"Trial {each.number}: {len(draft.cells)} cells are in the ledger."
+        said = f"Trial {each.number}: {len(draft.cells)} cells saved."
         if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()
@@ -282,21 +281,21 @@ class Counting:
 
     def _more(self, each: CountedTrial) -> None:
         """A note, and the ways to say that it does not count."""
-        with ui.expansion("Note, or void").classes("lab-expansion"):
-            text = ui.input("What is to be said of this trial").props("outlined dense").classes("lab-wide")
+        with ui.expansion("Note or void").classes("lab-expansion"):
+            text = ui.input("Note or reason").props("outlined dense").classes("lab-wide")
 
             async def note() -> None:
                 said, who = text_of(text), self._who()
-                if await attempt(lambda: self._counts.note(each.number, said, who), "Noted."):
+                if await attempt(lambda: self._counts.note(each.number, said, who), "Note saved."):
                     self._lab.changed()
 
             async def void() -> None:
-                said = f"Trial {each.number} is void; it will be driven again."
+                said = f"Trial {each.number} is void. It will be repeated."
                 if await attempt(lambda: self._counts.void(each.number, text_of(text)), said):
                     self._lab.changed()
 
             with ui.row().classes("lab-row"):
-                ui.button("Keep as a note", on_click=note).props("outline no-caps")
-                ui.button("Void, with this reason", on_click=void).props("outline no-caps").set_enabled(
+                ui.button("Save note", on_click=note).props("outline no-caps")
+                ui.button("Void trial", on_click=void).props("outline no-caps").set_enabled(
                     not each.trial.is_closed
                 )

@@ -39,8 +39,8 @@ class Driving:
             hint(f"{card['title']}. Pen: {card['pen']}.")
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
             self._said = ui.label("")
-            self._grid = CellGrid(arena, ink=card["pen"], name="Where the robot is").classes("lab-sketch")
-            ui.button("Abort this trial", on_click=self._job.stop_robot, color="negative").props(
+            self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
+            ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
                 "unelevated no-caps"
             )
         ui.timer(LIVE_S, self._look)

@@ -1,106 +1,96 @@
-"""What all pages have: the way to the others, and a stop for the robot."""
+"""The frame that all pages share: navigation, control of the robot, and the button that stops it."""
 
 from __future__ import annotations
 
 import contextlib
 import json
-import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import unquote
 
 from nicegui import ui
 from starlette.requests import Request
 
+from realitygap.errors import RealityGapError
 from realitygap.lab._access import VISITOR
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.settings import shown
 
 from ._handover import show_request
-from ._notices import notify
-from ._part import watching
+from ._notices import show_error
 from ._stop import Stop
 
 WHO = "realitygap_who"
 """The cookie with the name of who counts."""
 LONGEST_NAME = 60
 
-_PAGES = {"/": "Studies", "/new": "New study", "/robot": "Robot", "/calibrate": "Calibrate", "/gap": "Gap"}
+_PAGES = {"/": "Studies", "/robot": "Robot", "/calibrate": "Calibrate", "/gap": "Gap"}
 
 
 @contextlib.contextmanager
-def framed(lab: Lab, title: str, here: str) -> Iterator[None]:
-    """A page within its frame.
+def framed(
+    lab: Lab, title: str, here: str, *, above: Sequence[tuple[str, str]] = (), is_wide: bool = False
+) -> Iterator[None]:
+    """Show a page in the frame that all pages share.
 
     Args:
-        lab: Whose.
-        title: Of the page.
-        here: Its path, as the way to the others has it.
+        lab: The lab.
+        title: Title of the page.
+        here: Path of the page, as the navigation has it; empty for a page that is not in it.
+        above: Name and path of each page above this one, such as the list of studies.
+        is_wide: Whether the page is a dashboard, which is wider than a form.
     """
-    ui.on_exception(_said_wrong)
+    ui.on_exception(_show_mistake)
     ui.page_title(f"{title} – realitygap lab")
-    for sheet in ("lab-files/lab.css", "lab-player/player.css"):
+    for sheet in ("lab-files/tokens.css", "lab-files/lab.css", "lab-player/player.css"):
         ui.add_head_html(f'<link rel="stylesheet" href="/{sheet}">')
     ui.add_head_html('<script>document.documentElement.lang = "en-US"</script>')
     ui.add_head_html('<script src="/lab-files/frame.js"></script>')
     ui.colors(
-        primary="#1f5c99", negative="#b3161b", positive="#1e6b34", secondary="#4a5560", accent="#6a3d9a"
+        primary="var(--accent)",
+        negative="var(--danger)",
+        positive="var(--ok)",
+        secondary="var(--muted)",
+        dark_page="var(--ground)",
+        dark="var(--card)",
     )
-    with ui.header(elevated=False).classes("lab-header"), ui.element("nav").props('aria-label="Pages"'):
-        for path, name in _PAGES.items():
-            link = ui.link(name, path)
-            if path == here:
-                link.props('aria-current="page"')
-    with ui.column().classes("lab-main"):
+    with ui.header(elevated=False).classes("lab-header"):
+        ui.link("realitygap lab", "/").classes("lab-brand")
+        with ui.element("nav").props('aria-label="Pages"'):
+            for path, name in _PAGES.items():
+                link = ui.link(name, path)
+                if path == here:
+                    link.props('aria-current="page"')
+        ui.label("Reconnecting…").classes("lab-link").props('role="status"')
+    with ui.column().classes("lab-main lab-dashboard" if is_wide else "lab-main"):
+        if above:
+            with ui.element("nav").classes("lab-trail").props('aria-label="Path"'):
+                for name, path in above:
+                    ui.link(name, path)
+                    ui.label("›").props('aria-hidden="true"')
+                ui.label(title)
         ui.label(title).props('role="heading" aria-level="1"').classes("lab-title")
         asked = ui.element("div")
         yield
+    visitor = visitor_of(ui.context.client.request)
     # After the content: once a page has a timer, it is sent as far as it is done.
     with asked:
-        show_request(lab, visitor_of(ui.context.client.request))
-    with ui.footer(elevated=False).classes("lab-footer"):
-        stop = Stop(lab)
-        stop.show()
-        watching(lab, stop.look)
+        show_request(lab, visitor)
+    Stop(lab, visitor).show()
 
 
-def _said_wrong(error: Exception) -> None:
-    notify(
-        f"This is a mistake in realitygap, and nothing that was written is lost: {shown(error)}.",
-        type="negative",
+def _show_mistake(error: Exception) -> None:
+    show_error(
+        RealityGapError(
+            f"This is a mistake in realitygap, and nothing that was written is lost: {shown(error)}."
+        )
     )
 
 
 def text_of(field: Any) -> str:
-    """What was entered, without space around it; empty where it is no text."""
+    """Return the entered text without space around it; empty for other values."""
     value = field.value
     return value.strip() if isinstance(value, str) else ""
-
-
-def number_of(field: Any) -> float | None:
-    """What was entered; None where nothing was.
-
-    Raises:
-        ValueError: It is no number.
-    """
-    value = field.value
-    if value is None or value == "":
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{field.label}: expected a number, came {shown(value)}.")
-    return value
-
-
-def whole_of(field: Any) -> int | None:
-    """What was entered; None where nothing was.
-
-    Raises:
-        ValueError: It is no whole number.
-    """
-    value = number_of(field)
-    if value is not None and value != int(value):
-        raise ValueError(f"{field.label}: expected a whole number, came {shown(value)}.")
-    return None if value is None else int(value)
 
 
 def visitor_of(request: Request) -> Visitor:

@@ -1,4 +1,4 @@
-"""The grid of cells: tapped by whoever counts, and the place where a robot is seen."""
+"""The grid of cells: a visitor marks cells, or watches the robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Handing the robot from one visitor to another: the visitor who asks, and the one who has it."""
+"""Control of the robot: the visitor who operates it, and visitors who request control."""
 
 from __future__ import annotations
 
@@ -6,39 +6,46 @@ from nicegui import ui
 
 from realitygap.lab._lab import HANDOVER_S, Lab, RobotRequest, Visitor
 
-from ._notices import told
+from ._notices import try_now
 from ._part import Part, watching
-
-_UNANSWERED = f"Without an answer within {HANDOVER_S:.0f} s"
 
 
 def show_holder(lab: Lab, visitor: Visitor) -> None:
-    """Show a visitor who watches which visitor has the robot, and how to ask for it."""
+    """Show a visitor who watches which visitor operates the robot, and how to request control."""
 
     def show(request: RobotRequest | None) -> None:
-        has_asked = request is not None and request.visitor.key == visitor.key
+        own = request if request is not None and request.visitor.key == visitor.key else None
         with ui.row().classes("lab-row"):
-            ui.label(f"{lab.operator_name} has the robot; you are watching.")
-            if request is not None and has_asked and not request.is_refused:
-                ui.label(f"You asked for it. {_UNANSWERED} you get it.").props('role="status"')
+            ui.label(f"{lab.operator_name} is operating the robot. You are watching.")
+            if own is not None and own.state == "asked":
+                ui.label(
+                    f"You requested control. {lab.operator_name} has {HANDOVER_S:.0f} s to answer."
+                ).props('role="status"')
                 return
-            if has_asked:
-                ui.label(f"{lab.operator_name} keeps the robot for now.").props('role="status"')
-            ui.button("Ask for the robot", on_click=lambda: _confirm(lab, visitor)).props("outline no-caps")
+            if own is not None and own.state == "unanswered":
+                ui.label(f"{lab.operator_name} did not answer.").props('role="status"')
+                ui.button("Take control anyway", on_click=lambda: _confirm(lab, visitor)).props(
+                    "outline no-caps"
+                )
+                return
+            if own is not None:
+                ui.label(f"{lab.operator_name} keeps the robot.").props('role="status"')
+            ui.button("Request control", on_click=lambda: try_now(lambda: lab.ask_for_robot(visitor))).props(
+                "outline no-caps"
+            )
 
     _show_part(lab, Part(lambda: lab.request, show))
 
 
 def show_request(lab: Lab, visitor: Visitor) -> None:
-    """Show the operator, on whatever page, which visitor asks for the robot."""
+    """Show the operator, on every page, which visitor requests control."""
 
     def show(request: RobotRequest | None) -> None:
-        if request is None or request.is_refused or request.operator.key != visitor.key:
+        if request is None or request.state == "kept" or request.operator.key != visitor.key:
             return
         with ui.row().classes("lab-row lab-question").props('role="alert"'):
-            who = request.visitor.who or "Somebody at another page"
-            ui.label(f"{who} asks for the robot. {_UNANSWERED} it is handed over.")
-            for text, yes in (("Hand it over", True), ("Keep it", False)):
+            ui.label(f"{request.visitor.who or 'Another visitor'} requests control of the robot.")
+            for text, yes in (("Hand over", True), ("Keep", False)):
                 button = ui.button(text, on_click=lambda yes=yes: _answer(lab, visitor, yes=yes))
                 button.props("outline no-caps")
 
@@ -51,21 +58,26 @@ def _show_part(lab: Lab, part: Part[RobotRequest | None]) -> None:
 
 
 def _confirm(lab: Lab, visitor: Visitor) -> None:
-    """Have the visitor confirm, because its operator is working with the robot."""
+    """Show what the robot is doing before the visitor takes control without consent."""
     with ui.dialog(value=True) as dialog, ui.card():
-        ui.label(
-            f"{lab.operator_name} works with the robot and will be asked to hand it over. {_UNANSWERED} you get it. "
-            "Make sure that nobody has a hand on it."
-        )
+        state = ui.label("").props('role="status"')
+        ui.label(f"{lab.operator_name} did not answer, and may have a hand on the robot.")
 
-        def ask() -> None:
-            dialog.close()
-            told(lambda: lab.ask_for_robot(visitor))
+        def take() -> None:
+            if try_now(lambda: lab.take_over(visitor)):
+                dialog.close()
 
         with ui.row().classes("lab-row"):
-            ui.button("Ask now", on_click=ask).props("unelevated no-caps")
+            button = ui.button("Take control", on_click=take).props("unelevated no-caps")
             ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+
+        def look() -> None:
+            state.text = lab.robot_action or "The robot is standing still."
+            button.set_enabled(not lab.robot_moves)
+
+        look()
+        ui.timer(0.2, look)
 
 
 def _answer(lab: Lab, operator: Visitor, *, yes: bool) -> None:
-    told(lambda: lab.answer_request(operator, yes=yes))
+    try_now(lambda: lab.answer_request(operator, yes=yes))

@@ -1,22 +1,27 @@
-"""Home: the studies that are there, and how far each is."""
+"""Studies: the list of all studies, with the state of each and what to do next."""
 
 from __future__ import annotations
 
-from nicegui import run, ui
+from functools import partial
+from importlib import resources
+
+from nicegui import events, run, ui
 
 from realitygap.lab._lab import Lab
-from realitygap.lab._studies import StudyState
-from realitygap.lab._study_job import StudyJob
+from realitygap.lab._standing import Standing
 
-from ._frame import framed, hint
+from ._frame import framed, hint, section
 from ._notices import attempt
-from ._part import watching
+from ._part import Part, watching
 
 DISK_S = 2.0
-"""How often the studies' folders are looked at [s]: other programs may work in them."""
+"""Time between two looks at the folders of the studies [s]: other programs may write to them."""
 
 MOST_CARDS = 30
-"""Studies that are shown at first, the last ones changed: each costs a page time."""
+"""Number of studies that are shown at first."""
+
+PAPER = "paper"
+_ORDERS = {"changed": "Newest", "name": "Name", "state": "State"}
 
 
 def add_home(lab: Lab) -> None:
@@ -24,107 +29,178 @@ def add_home(lab: Lab) -> None:
 
     @ui.page("/", response_timeout=30)
     async def home() -> None:
-        states = list(await run.io_bound(lab.studies.states) or ())
-        n_shown = MOST_CARDS
-        with framed(lab, "Studies", "/"):
-            hint(f"In the folder {lab.root.name}.").tooltip(str(lab.root))
-            ui.button("Start a new study", on_click=lambda: ui.navigate.to("/new")).props(
-                "unelevated no-caps"
-            )
-
-            @ui.refreshable
-            def cards() -> None:
-                if not states:
-                    ui.label("No study is here yet.")
-                for state in states[:n_shown]:
-                    _card(lab, state)
-                if len(states) > n_shown:
-                    ui.button(f"Show {len(states) - n_shown:,} more", on_click=show_more).props(
-                        "outline no-caps"
-                    )
-
-            def show_more() -> None:
-                nonlocal n_shown
-                n_shown += MOST_CARDS
-                cards.refresh()
-
-            with ui.column().classes("lab-cards").props('aria-live="polite"'):
-                cards()
-
-            async def look() -> None:
-                found = await run.io_bound(lab.studies.states)
-                if found is not None and found != states:
-                    states[:] = found
-                    cards.refresh()
-
-            watching(lab, cards.refresh)
-            ui.timer(DISK_S, look)
+        standings = list(await run.io_bound(lab.standings) or ())
+        with framed(lab, "Studies", "/", is_wide=True):
+            _Page(lab, standings).show()
 
 
-def _card(lab: Lab, state: StudyState) -> None:
-    job = lab.jobs.get(state.name)
-    with ui.card().classes("lab-card").props(f'data-study="{state.name}"'):
+def start_paper(lab: Lab) -> None:
+    """Start the paper's simulated study.
+
+    Raises:
+        StudyError: There is a study of this name.
+    """
+    text = (resources.files("realitygap.study") / "studies" / f"{PAPER}.toml").read_text("utf-8")
+    lab.start_new(PAPER, text)
+
+
+class _Page:
+    def __init__(self, lab: Lab, standings: list[Standing]) -> None:
+        self._lab = lab
+        self._standings = standings
+        self._n_shown = MOST_CARDS
+        self._is_looking = False
+        self._filter = ""
+        self._order = "changed"
+
+    def show(self) -> None:
         with ui.row().classes("lab-row"):
-            ui.label(state.title or state.name).props('role="heading" aria-level="2"').classes("lab-section")
-            ui.label(_word(state, job)).classes("lab-state")
-        if state.title != state.name:
-            hint(state.name)
-        if state.problem:
-            ui.label(state.problem).classes("lab-problem")
+            ui.button("New study", on_click=lambda: ui.navigate.to("/new")).props("unelevated no-caps")
+            search = ui.input(placeholder="Filter", on_change=self._search)
+            search.props('outlined dense clearable debounce=200 aria-label="Filter studies"')
+            order = ui.select(_ORDERS, value=self._order, on_change=self._sort)
+            order.props('outlined dense aria-label="Order of studies"')
+        self._list = Part(self._now, self._show_list)
+        with ui.column().classes("lab-cards").props('aria-live="polite"'):
+            self._list.show()
+        self._work = Part(self._other, self._show_other)
+        with ui.column().classes("lab-cards"):
+            self._work.show()
+        watching(self._lab, self._look)
+        ui.timer(DISK_S, self._look)
+
+    async def _look(self) -> None:
+        """Read all states, then show the cards of which the state has changed."""
+        self._work.look()
+        if self._is_looking:
             return
-        share = _share(state, job)
-        ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
-        for line in _lines(state, job):
-            ui.label(line)
-        if job is not None and job.outcome is not None:
-            ui.label(job.outcome).classes("lab-problem" if job.is_failed else "lab-hint")
-        _buttons(lab, state, job)
+        self._is_looking = True
+        try:
+            found = await run.io_bound(self._lab.standings)
+        finally:
+            self._is_looking = False
+        if found is not None:
+            self._standings = found
+            self._list.look()
+
+    def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
+        self._filter = event.value or ""
+        self._list.refresh()
+
+    def _sort(self, event: events.ValueChangeEventArguments[str]) -> None:
+        self._order = event.value
+        self._list.refresh()
+
+    def _now(self) -> tuple[Standing, ...]:
+        wanted = self._filter.lower()
+        found = [each for each in self._standings if wanted in f"{each.name} {each.title}".lower()]
+        if self._order == "name":
+            found.sort(key=lambda each: each.name)
+        elif self._order == "state":
+            found.sort(key=lambda each: each.word)
+        return tuple(found)
+
+    def _show_list(self, standings: tuple[Standing, ...]) -> None:
+        if not self._standings:
+            ui.label("No studies yet. Run the paper's study (takes seconds) or create your own.")
+            with ui.row().classes("lab-row"):
+                ui.button("Run the paper's study", on_click=self._start_paper).props("unelevated no-caps")
+                ui.button("Create a study", on_click=lambda: ui.navigate.to("/new")).props("outline no-caps")
+            return
+        if not standings:
+            ui.label("No study has this text in its name or title. Clear the filter.")
+        for standing in standings[: self._n_shown]:
+            _card(self._lab, standing)
+        if len(standings) > self._n_shown:
+            ui.button(f"Show {len(standings) - self._n_shown:,} more", on_click=self._show_more).props(
+                "outline no-caps"
+            )
+
+    def _show_more(self) -> None:
+        self._n_shown += MOST_CARDS
+        self._list.refresh()
+
+    async def _start_paper(self) -> None:
+        if await attempt(partial(start_paper, self._lab)):
+            ui.navigate.to(f"/study/{PAPER}")
+
+    def _other(self) -> tuple[tuple[str, str, str], ...]:
+        """Title, progress, and address of what is measured, or was last."""
+        found = []
+        gap, calibration = self._lab.gap, self._lab.calibration
+        if gap is not None and gap.name:
+            found.append((f"Gap {gap.name}", gap.progress, "/gap"))
+        if calibration is not None:
+            found.append((f"Calibration {calibration.name}", calibration.progress, "/calibrate"))
+        return tuple(found)
+
+    def _show_other(self, works: tuple[tuple[str, str, str], ...]) -> None:
+        if works:
+            section("Other work")
+        for title, progress, address in works:
+            with ui.row().classes("lab-row"):
+                ui.link(title, address)
+                ui.label(progress)
 
 
-def _share(state: StudyState, job: StudyJob | None) -> float:
-    if job is not None and not job.is_over and job.progress and not state.has_robot:
-        return float(job.progress["n_done"] / max(job.progress["n_runs"], 1))
-    return state.share
+def _card(lab: Lab, standing: Standing) -> None:
+    with ui.card().classes("lab-card").props(f'data-study="{standing.name}"'):
+        with ui.row().classes("lab-row"):
+            ui.label(standing.title).props('role="heading" aria-level="2"').classes("lab-section")
+            show_state(standing)
+        if standing.title != standing.name:
+            hint(standing.name)
+        if standing.word != "Complete" and (standing.n_runs or standing.n_driven_runs):
+            share = standing.share
+            ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
+        if standing.progress:
+            ui.label(standing.progress)
+        if standing.medians:
+            _show_medians(standing.medians)
+        if standing.message:
+            ui.label(standing.message).classes("lab-problem")
+        with ui.row().classes("lab-row"):
+            if standing.n_runs or standing.n_driven_runs:
+                ui.button("Open", on_click=lambda: ui.navigate.to(f"/study/{standing.name}")).props(
+                    "unelevated no-caps"
+                )
+            if standing.has_robot:
+                text = "Answer" if standing.is_asking else "Open trials"
+                ui.button(text, on_click=lambda: ui.navigate.to(f"/study/{standing.name}/trials")).props(
+                    "outline no-caps"
+                )
+            show_control(lab, standing)
 
 
-def _word(state: StudyState, job: StudyJob | None) -> str:
-    if state.problem:
-        return "cannot be read"
-    if job is not None and not job.is_over:
-        if job.ask is not None:
-            return "waits for you"
-        return "a robot is driving" if job.is_driving else "running"
-    if state.used_by:
-        return "in use by another program"
-    if state.is_complete:
-        return "complete"
-    return "waits for a robot" if state.has_robot and state.n_done == state.n_runs else "stopped"
-
-
-def _lines(state: StudyState, job: StudyJob | None) -> list[str]:
-    lines = []
-    if state.n_runs:
-        n_done = state.n_done
-        if job is not None and not job.is_over and job.progress:
-            n_done = max(n_done, job.progress["n_done"])
-        lines.append(f"{n_done:,} of {state.n_runs:,} simulated runs")
-    if state.n_driven_runs:
-        lines.append(f"{state.n_driven_done} of {state.n_driven_runs} runs on a robot")
-    if state.trials:
-        lines.append("Trials: " + ", ".join(f"{n} {name}" for name, n in sorted(state.trials.items())))
-    return lines
-
-
-def _buttons(lab: Lab, state: StudyState, job: StudyJob | None) -> None:
+def _show_medians(medians: tuple[float, ...]) -> None:
+    """Show the median of each condition as a bar."""
+    highest = max(max(medians), 1e-9)
+    bars = "".join(
+        f'<rect x="{8 * k}" y="{24 - 24 * value / highest:.1f}" width="6" height="{24 * value / highest:.1f}"/>'
+        for k, value in enumerate(medians)
+    )
+    words = f"Median best coverage by condition: {min(medians):.3f} to {highest:.3f}"
     with ui.row().classes("lab-row"):
-        if job is not None and not job.is_over:
-            ui.button("Pause", on_click=job.ask_to_end).props("outline no-caps")
-        ui.button("Watch", on_click=lambda: ui.navigate.to(f"/watch/{state.name}")).props("outline no-caps")
-        if state.has_robot:
-            ui.button("Trials", on_click=lambda: ui.navigate.to(f"/trials/{state.name}")).props(
-                "unelevated no-caps"
-            )
-        if (job is None or job.is_over) and state.n_done < state.n_runs and not state.used_by:
-            ui.button("Go on", on_click=lambda: attempt(lambda: lab.go_on(state.name))).props(
-                "unelevated no-caps"
-            )
+        ui.html(
+            f'<svg viewBox="0 0 {8 * len(medians)} 24" width="{8 * len(medians)}" height="24" aria-hidden="true" '
+            f'class="lab-bars">{bars}</svg>',
+            sanitize=False,
+        )
+        hint(words)
+
+
+def show_state(standing: Standing) -> None:
+    """Show the state of a study, and the labels of its results."""
+    ui.label(standing.word).classes(f"lab-state lab-state-{standing.word.partition(' ')[0].lower()}")
+    for label in standing.labels:
+        ui.label(label).classes(f"lab-badge lab-label-{label.lower()}")
+
+
+def show_control(lab: Lab, standing: Standing) -> None:
+    """Show the button that pauses or resumes a study."""
+    job = lab.job(standing.name)
+    if job is not None:
+        ui.button("Pause", on_click=job.ask_to_end).props("outline no-caps")
+    elif standing.can_resume:
+        text = "Resume" if standing.n_done else "Start"
+        ui.button(text, on_click=lambda: attempt(lambda: lab.go_on(standing.name))).props("outline no-caps")

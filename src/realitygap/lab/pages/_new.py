@@ -1,8 +1,9 @@
-"""A new study: from a form made of all settings, or from a file."""
+"""New study: a form of all settings, or a study file."""
 
 from __future__ import annotations
 
 import asyncio
+import re
 from importlib import resources
 from typing import Any, Literal
 
@@ -24,8 +25,9 @@ from realitygap.lab._form import (
 from realitygap.lab._lab import Lab
 from realitygap.study import named_studies
 
+from ._fields import Form
 from ._frame import framed, hint, section, text_of
-from ._notices import attempt, notify, told
+from ._notices import WRONG
 
 BEGINNING = """[study]
 name = "my-study"
@@ -41,10 +43,18 @@ name = "novelty-10"
 selection = "novelty"
 noise = 0.1
 """
-
+_EMPTY = "Two conditions"
 
 MOST_SHOWN = 50
-"""Conditions in the form."""
+"""Number of conditions that the form shows."""
+
+_BASICS = {
+    "study.name": "Name",
+    "study.title": "Title",
+    "study.replicates": "Runs per condition",
+    "study.seed": "Seed",
+}
+_COLUMNS = {"name": "Name", "selection": "Search", "platform": "Platform", "noise": "Noise"}
 
 
 class _Draft:
@@ -54,19 +64,20 @@ class _Draft:
         self.data: dict[str, Any] = read_form(BEGINNING)
 
     def value(self, place: str) -> Any:
-        found: Any = self.data
+        """Return the value of a setting; None if it has none."""
+        value: Any = self.data
         for key in place.split("."):
-            found = found.get(key) if isinstance(found, dict) else None
-        return found
+            value = value.get(key) if isinstance(value, dict) else None
+        return value
 
     def put(self, place: str, value: Any) -> None:
-        """Set a value, or take it out where it is None."""
+        """Set a value; None removes it."""
         *above, key = place.split(".")
         table = self.data
-        for each in above:
-            if not isinstance(table.get(each), dict):
-                table[each] = {}
-            table = table[each]
+        for name in above:
+            if not isinstance(table.get(name), dict):
+                table[name] = {}
+            table = table[name]
         table.pop(key, None) if value is None else table.__setitem__(key, value)
 
 
@@ -76,9 +87,8 @@ def add_new(lab: Lab) -> None:
     @ui.page("/new", response_timeout=30)
     async def new() -> None:
         await run.io_bound(lab.checks.prepare)
-        draft = _Draft()
-        with framed(lab, "New study", "/new"):
-            _Page(lab, draft).show()
+        with framed(lab, "New study", "", above=[("Studies", "/")]):
+            _Page(lab, _Draft()).show()
 
 
 class _Page:
@@ -86,81 +96,90 @@ class _Page:
         self._lab = lab
         self._draft = draft
         self._check: Check | None = None
+        self._boxes: list[tuple[str, ui.element]] = []
+        self._is_open = False
 
     def show(self) -> None:
-        hint(
-            "Begin with one of the studies that come with realitygap, or with a file; change what you like; then start "
-            "it. Every setting stands below with what it means; an empty one has its default."
-        )
         with ui.row().classes("lab-row"):
-            ui.select(named_studies(), label="Begin with", on_change=self._begin_with).classes("lab-wide")
-            upload = ui.upload(on_upload=self._uploaded, auto_upload=True, max_file_size=LONGEST_TEXT)
+            ui.label("Template").props('aria-hidden="true"')
+            ui.select([_EMPTY, *named_studies()], value=_EMPTY, on_change=self._choose).props(
+                'outlined dense aria-label="Template"'
+            ).classes("lab-wide")
+            upload = ui.upload(on_upload=self._take_upload, auto_upload=True, max_file_size=LONGEST_TEXT)
             upload.props('accept=".toml"').classes("lab-hidden")  # its own buttons have no names
-            upload.on("rejected", self._rejected)
-            ui.button("or with a file").props("outline no-caps").on(
+            upload.on("rejected", self._reject)
+            ui.button("Upload .toml file").props("outline no-caps").on(
                 "click", js_handler=f"() => getElement({upload.id}).pickFiles()"
             )
-        self._form = ui.refreshable(self._show_form)
-        self._conditions = ui.refreshable(self._show_conditions)
         with ui.tabs().props("no-caps align=left") as tabs:
             form_tab, file_tab = ui.tab("Form"), ui.tab("File")
-        with ui.tab_panels(tabs, value=form_tab, on_change=self._turned).classes("lab-panels"):
+        self._show_summary()
+        self._form_part = ui.refreshable(self._show_form)
+        with ui.tab_panels(tabs, value=form_tab, on_change=self._turn).classes("lab-panels"):
             with ui.tab_panel(form_tab):
-                self._form()
+                self._form_part()
             with ui.tab_panel(file_tab):
                 self._text = (
-                    ui.textarea("The study file", value=written_form(self._draft.data))
+                    ui.textarea(value=written_form(self._draft.data))
                     .classes("lab-file")
                     .props(
-                        "outlined spellcheck=false input-style='font-family: monospace; min-height: 24rem'"
+                        'outlined spellcheck=false aria-label="Study file" '
+                        "input-style='font-family: monospace; min-height: 24rem'"
                     )
                 )
         self._is_text = False
-        self._said = ui.label("").classes("lab-problem lab-lines").props('role="status"')
-        with ui.row().classes("lab-row") as self._waiting:
-            ui.spinner()
-            ui.label("Reading the study file ...").props('role="status"')
-            ui.button("Cancel", on_click=self._cancel).props("flat no-caps")
-        self._waiting.set_visibility(False)
-        with ui.row().classes("lab-row"):
-            ui.button("Check", on_click=self._checked).props("outline no-caps")
-            ui.button("Start the study", on_click=self._start).props("unelevated no-caps")
+        with ui.element("div").classes("lab-actions"):
+            with ui.row().classes("lab-row") as self._waiting:
+                ui.spinner()
+                ui.label("Checking the study file…").props('role="status"')
+                ui.button("Cancel", on_click=self._cancel).props("flat no-caps")
+            self._waiting.set_visibility(False)
+            self._size = ui.label("").props('role="status"')
+            with ui.row().classes("lab-row"):
+                ui.button("Check", on_click=self._check_only).props("outline no-caps")
+                ui.button("Start study", on_click=self._start).props("unelevated no-caps")
 
-    # where it comes from
+    def _show_summary(self) -> None:
+        """Show the place for mistakes, above form and file."""
+        self._form = Form()
+        self._form.summary()
 
-    async def _begin_with(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        if event.value not in named_studies():
-            return
-        text = (resources.files("realitygap.study") / "studies" / f"{event.value}.toml").read_text("utf-8")
-        await self._take(text)
+    # templates and files
 
-    def _rejected(self) -> None:
-        notify(
-            f"This is no study file: expected one that ends in .toml, of at most {LONGEST_TEXT:,} bytes.",
-            type="negative",
+    async def _choose(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        if event.value in named_studies():
+            file = resources.files("realitygap.study") / "studies" / f"{event.value}.toml"
+            await self._take(file.read_text("utf-8"))
+        elif event.value == _EMPTY:
+            await self._take(BEGINNING)
+
+    def _reject(self) -> None:
+        self._form.show_problems(
+            {"": f"Choose a study file that ends in .toml and has at most {LONGEST_TEXT:,} bytes."}
         )
 
-    async def _uploaded(self, event: events.UploadEventArguments) -> None:
+    async def _take_upload(self, event: events.UploadEventArguments) -> None:
         data = await event.file.read()
         try:
             text = data[: LONGEST_TEXT + 1].decode("utf-8")
         except UnicodeDecodeError:
-            notify("This is not a text file in UTF-8. Expected a study file (.toml).", type="negative")
+            self._form.show_problems({"": "This is not a text file in UTF-8. Choose a study file (.toml)."})
             return
         await self._take(text)
 
     async def _take(self, text: str) -> None:
-        """Put the text of a file into the form; where it has mistakes it is shown as it is."""
+        """Show the text of a file in the form; a text with mistakes is shown as it is."""
         self._text.value = text
         found = await self._ask("read", text)
         if "data" not in found:
-            self._said.text = found["mistakes"]
+            self._show_mistakes(found)
             return
+        self._form.show_problems({})
         self._draft.data = found["data"]
-        self._form.refresh()
+        self._form_part.refresh()
 
-    async def _turned(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        """Between form and file: each shows what the other has."""
+    async def _turn(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        """Turn between form and file, which show the same study."""
         self._is_text = event.value == "File"
         if self._is_text:
             self._text.value = written_form(self._draft.data)
@@ -170,14 +189,45 @@ class _Page:
     # the form
 
     def _show_form(self) -> None:
-        for place, fields in form_sections().items():
-            is_open = place == "study"
-            with ui.expansion(TITLES[place], value=is_open).classes("lab-expansion"):
-                for field in fields:
-                    _input(field, self._draft.value(field.place), self._putter(field))
-            if place == "study":
-                with ui.expansion("Conditions", value=True).classes("lab-expansion"):
-                    self._conditions()
+        self._form.clear()
+        self._boxes = []
+        sections = form_sections()
+        known = {field.place: field for fields in sections.values() for field in fields}
+        with ui.element("div").classes("lab-form"):
+            for place, label in _BASICS.items():
+                self._input(known[place], place, label, self._draft.value(place), self._putter(known[place]))
+        section("Conditions")
+        with ui.expansion("Meaning of the columns").classes("lab-expansion"):
+            for field in condition_fields():
+                hint(f"{_COLUMNS[field.place.partition('.')[2]]}: {field.description}")
+        self._show_conditions()
+        with ui.expansion("Advanced", value=self._is_open, on_value_change=self._open).classes(
+            "lab-expansion"
+        ):
+            ui.input(placeholder="Filter settings by name or meaning", on_change=self._search).props(
+                'outlined dense clearable debounce=200 aria-label="Filter settings"'
+            ).classes("lab-wide")
+            for name, fields in sections.items():
+                rest = [field for field in fields if field.place not in _BASICS]
+                with ui.expansion(TITLES[name]).classes("lab-expansion") as box:
+                    for field in rest:
+                        label = field.place.rpartition(".")[2].replace("_", " ").capitalize()
+                        value = self._draft.value(field.place)
+                        with ui.element("div").classes("lab-form") as one:
+                            self._input(field, field.place, label, value, self._putter(field))
+                        self._boxes.append((f"{field.place} {label} {field.description}".lower(), one))
+                self._boxes.append((" ".join(f"{f.place} {f.description}" for f in rest).lower(), box))
+
+    def _open(self, event: events.ValueChangeEventArguments[bool]) -> None:
+        """Remember whether advanced settings are shown, for the next time that the form is drawn."""
+        self._is_open = event.value
+
+    def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
+        wanted = (event.value or "").lower()
+        for text, box in self._boxes:
+            box.set_visibility(wanted in text)
+            if isinstance(box, ui.expansion):
+                box.value = bool(wanted) and wanted in text
 
     def _putter(self, field: Field) -> Any:
         return lambda value: self._draft.put(field.place, value)
@@ -190,35 +240,67 @@ class _Page:
             if isinstance(condition, dict):
                 self._show_condition(number, condition)
         if len(listed) > MOST_SHOWN:
-            hint(
-                f"The first {MOST_SHOWN} of {len(listed):,} conditions are shown. Change the others in the file."
-            )
-        ui.button("Add a condition", on_click=self._add_condition).props("outline no-caps")
+            hint(f"The form shows {MOST_SHOWN} of {len(listed):,} conditions. Change the others in the file.")
+        ui.button("Add condition", on_click=self._add_condition).props("outline no-caps")
 
     def _show_condition(self, number: int, condition: dict[str, Any]) -> None:
-        with ui.card().classes("lab-card"):
-            section(f"Condition {number + 1}")
+        label = f"Condition {number + 1}"
+        with ui.element("div").classes("lab-condition").props(f'role="group" aria-label="{label}"'):
             for field in condition_fields():
                 key = field.place.partition(".")[2]
 
                 def put(value: Any, key: str = key) -> None:
                     condition.pop(key, None) if value is None else condition.__setitem__(key, value)
 
-                _input(field, condition.get(key), put)
-            if more := [key for key, value in condition.items() if isinstance(value, dict)]:
-                hint(f"It has settings of its own for {', '.join(more)}: see the file.")
-            ui.button("Take this condition out", on_click=lambda: self._remove(number)).props("flat no-caps")
+                place = f"condition[{number + 1}].{key}"
+                self._input(field, place, _COLUMNS[key], condition.get(key), put, is_short=True)
+            ui.button("Remove", on_click=lambda: self._remove(number)).props(
+                f'flat no-caps aria-label="Remove condition {number + 1}"'
+            )
+        if more := [key for key, value in condition.items() if isinstance(value, dict)]:
+            hint(f"{label} has its own settings for {', '.join(more)}. See the file.")
+
+    def _input(
+        self, field: Field, key: str, label: str, value: Any, put: Any, *, is_short: bool = False
+    ) -> None:
+        """Add the field of one setting."""
+        has_default = field.default not in ("", '""')
+        default = f" Default: {field.default}." if has_default and not is_short else ""
+        explanation = "" if is_short else f"{field.description}{default}"
+        if field.kind in ("choice", "yes-no"):
+            choices = field.choices or ("true", "false")
+            shown = value if field.kind == "choice" or value is None else str(value).lower()
+            if isinstance(shown, str) and shown not in choices:
+                choices = (*choices, shown)
+            chosen = self._form.choice(
+                key, label, [*choices], shown if isinstance(shown, str) else None, explanation
+            )
+            chosen.props("clearable")
+            chosen.on_value_change(lambda event: _enter(field, event.value, put))
+            return
+        text = "" if value is None else _as_entered(field, value)
+        placeholder = field.default.strip('"') if field.kind == "text" else field.default
+        written = self._form.text(
+            key,
+            label,
+            text,
+            explanation=explanation,
+            placeholder=placeholder,
+            parse=lambda text: _parsed(field, text),
+        )
+        written.props("debounce=300")
+        written.on_value_change(lambda event: _enter(field, event.value, put))
 
     def _add_condition(self) -> None:
         listed = self._draft.data["condition"]
         listed.append({"name": f"condition-{len(listed) + 1}"})
-        self._conditions.refresh()
+        self._form_part.refresh()
 
     def _remove(self, number: int) -> None:
         del self._draft.data["condition"][number]
-        self._conditions.refresh()
+        self._form_part.refresh()
 
-    # done
+    # check and start
 
     def _whole(self) -> str:
         return text_of(self._text) if self._is_text else written_form(self._draft.data)
@@ -233,7 +315,6 @@ class _Page:
             return {"mistakes": str(error)}
         if check is None:
             return {"mistakes": "The lab is closing."}
-        self._said.text = ""
         self._waiting.set_visibility(True)
         try:
             return await asyncio.wrap_future(check.found)
@@ -246,43 +327,61 @@ class _Page:
         if self._check is not None:
             self._check.end()
 
-    async def _checked(self) -> None:
-        found = await self._ask("check", self._whole())
-        self._said.text = found.get("mistakes") or "It can be started."
-
-    async def _start(self) -> None:
+    async def _checked(self) -> dict[str, Any] | None:
+        """Check what was entered; None if there are mistakes, which are shown."""
+        problems = {} if self._is_text else self._form.problems()
+        if problems:
+            self._form.show_problems(problems)
+            return None
         text = self._whole()
         found = await self._ask("check", text)
-        self._said.text = found.get("mistakes", "")
-        if "name" in found and await attempt(lambda: self._lab.start_new(found["name"], text)):
-            ui.navigate.to("/")
+        if "name" not in found:
+            self._show_mistakes(found)
+            return None
+        self._form.show_problems({})
+        n, replicates = found["n_conditions"], found["replicates"]
+        conditions = "1 condition" if n == 1 else f"{n:,} conditions"
+        self._size.text = f"No mistakes. {conditions} × {replicates:,} runs = {n * replicates:,} runs."
+        return {**found, "text": text}
 
+    def _show_mistakes(self, found: dict[str, Any]) -> None:
+        self._size.text = ""
+        places = found.get("places")
+        if not places or self._is_text:
+            self._form.show_problems({"": str(found["mistakes"])})
+            return
+        self._form.show_problems(dict(_problem_of(each) for each in places))
 
-def _input(field: Field, value: Any, put: Any) -> None:
-    """The field of one setting, with what it means."""
-    name = field.place.rpartition(".")[2].replace("_", " ")
-    with ui.element("div").classes("lab-field").props(f'data-place="{field.place}"'):
-        if field.kind in ("choice", "yes-no"):
-            choices = field.choices or ("true", "false")
-            shown = value if field.kind == "choice" or value is None else str(value).lower()
-            if isinstance(shown, str) and shown not in choices:
-                choices = (*choices, shown)
-            chosen = ui.select(
-                [*choices], label=name, value=shown if isinstance(shown, str) else None, clearable=True
-            )
-            chosen.props("outlined dense")
-            chosen.on_value_change(lambda event: _enter(field, event.value, put))
+    async def _check_only(self) -> None:
+        await self._checked()
+
+    async def _start(self) -> None:
+        found = await self._checked()
+        if found is None:
+            return
+        try:
+            await run.io_bound(self._lab.start_new, found["name"], found["text"])
+        except WRONG as error:
+            self._form.show_problems({"study.name": str(error)})
         else:
-            text = "" if value is None else _as_entered(field, value)
-            default = field.default.strip('"') if field.kind == "text" else field.default
-            ui.input(
-                name, value=text, placeholder=default, on_change=lambda event: _enter(field, event.value, put)
-            ).props("debounce=300 stack-label outlined dense")
-        hint(
-            f"{field.description} Default: {field.default}."
-            if field.default not in ("", '""')
-            else field.description
-        )
+            ui.navigate.to(f"/study/{found['name']}")
+
+
+def _problem_of(mistake: str) -> tuple[str, str]:
+    """Return the key of a field and what is wrong there, from PLACE: MESSAGE of a study file."""
+    match = re.fullmatch(r"(condition\[\d+\])?(?: '[^']*')?([\w.-]*): (.*)", mistake, re.DOTALL)
+    if match is None:
+        return mistake, mistake
+    key, text = f"{match[1] or ''}{match[2]}", match[3]
+    asked = re.fullmatch(r"expected (.*), (?:came|got) (.*)\.", text, re.DOTALL)
+    return key, text if asked is None else f"Enter {asked[1]}. You entered {asked[2]}."
+
+
+def _parsed(field: Field, text: str) -> Any:
+    try:
+        return None if text == "" else entered(field, text)
+    except ValueError as error:
+        raise ValueError(_problem_of(str(error))[1]) from error
 
 
 def _as_entered(field: Field, value: Any) -> str:
@@ -290,7 +389,11 @@ def _as_entered(field: Field, value: Any) -> str:
 
 
 def _enter(field: Field, text: Any, put: Any) -> None:
+    """Put what was entered into the draft; a text that is no value stays in the field, which is marked."""
     if not isinstance(text, str) or text == "":
         put(None)
-    else:
-        told(lambda: put(entered(field, text)))
+        return
+    try:
+        put(entered(field, text))
+    except ValueError:
+        return

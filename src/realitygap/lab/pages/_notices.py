@@ -1,4 +1,4 @@
-"""Notices of a page, placed so that they cover no button at its foot."""
+"""Notifications of a page, below its header."""
 
 from __future__ import annotations
 
@@ -10,21 +10,27 @@ from nicegui import run, ui
 from realitygap.errors import RealityGapError
 
 WRONG = (RealityGapError, ValueError, TypeError, OSError)
-"""What people can mend."""
+"""Errors that a visitor can correct."""
 
 
 def notify(message: str, **options: Any) -> None:
-    """Show a notice for some seconds, below the way to the other pages.
+    """Show a notification for 5 s.
 
     Args:
         message: What happened, then what to do.
-        options: As `ui.notify` takes them.
+        options: Arguments of `ui.notify`.
     """
     ui.notify(message, position="top", **options)
 
 
-def told(act: Callable[[], Any]) -> bool:
-    """Do something that waits for nothing; what is wrong with it is shown. Whether it was done."""
+def show_error(error: Exception) -> None:
+    """Show an error until the visitor closes it."""
+    close = {"label": "Close", "color": "white", "noCaps": True}
+    notify(str(error), type="negative", multi_line=True, timeout=0, actions=[close])
+
+
+def try_now(act: Callable[[], Any]) -> bool:
+    """Call a function that waits for nothing, and show its error; return whether it succeeded."""
     try:
         act()
     except WRONG as error:
@@ -34,15 +40,15 @@ def told(act: Callable[[], Any]) -> bool:
 
 
 async def attempt(act: Callable[[], Any], done: str = "", **options: Any) -> bool:
-    """Do something in a thread, because it may wait for a disk, and show a notice of how it ended.
+    """Call a function in a thread, because it may wait for a disk, and show its error.
 
     Args:
-        act: Does it.
-        done: The notice when it is done; none where it is empty.
-        options: Of that notice, as `ui.notify` takes them.
+        act: The function.
+        done: Notification after success; none if empty.
+        options: Arguments of `ui.notify` for that notification.
 
     Returns:
-        Whether it was done.
+        Whether it succeeded.
     """
     with ui.context.client:  # the button that was pressed may be gone by then
         try:
@@ -53,9 +59,3 @@ async def attempt(act: Callable[[], Any], done: str = "", **options: Any) -> boo
         if done:
             notify(done, **options)
         return True
-
-
-def show_error(error: Exception) -> None:
-    """Show what is wrong."""
-    close = {"label": "Close", "color": "white", "noCaps": True}
-    notify(str(error), type="negative", multi_line=True, timeout=8000, actions=[close])

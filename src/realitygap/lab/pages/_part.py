@@ -1,4 +1,4 @@
-"""A part of a page that is shown anew when what it shows has changed, and only then."""
+"""A part of a page that is drawn again only when its content has changed."""
 
 from __future__ import annotations
 
@@ -39,10 +39,15 @@ class Part(Generic[T]):
         self._refreshable()
 
     def look(self) -> None:
-        """Have it shown anew where it has changed."""
+        """Draw it again if its content has changed."""
         if not self._is_due and self._stand() != self._shown:
             self._is_due = True
             self._refreshable.refresh()
+
+    def refresh(self) -> None:
+        """Show it again, although what it shows is the same."""
+        self._is_due = True
+        self._refreshable.refresh()
 
     def _draw(self) -> None:
         self._is_due = False

@@ -1,4 +1,4 @@
-"""Photographs of sheets: sent, read, looked at, and entered."""
+"""Photographs of sheets: uploaded, read, checked, and saved as scores."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def add_photos(lab: Lab) -> None:
 
 
 async def _body(request: Request) -> bytes:
-    """What is sent, as far as it may be: what is longer is refused by what takes it."""
+    """Yield the upload up to the limit; the receiver refuses longer files."""
     parts, size = [], 0
     try:
         async for part in request.stream():
@@ -134,8 +134,8 @@ class SheetPhotos:
                 "outlined dense"
             ).classes("lab-number")
         hint(
-            f"A photo of the whole of sheet {self._sheet} proposes its cells. Look at them, correct them by tapping, "
-            "enter them. The sheet is one of realitygap print-sheet."
+            f"A photo of the whole of sheet {self._sheet} proposes its cells. Check them, correct them, and "
+            "save them. Print sheets with realitygap print-sheet."
         )
         PhotoInput(f"/photos/{self._counts.name}?sheet={self._sheet}", f"sheet {self._sheet}")
         last = self._photos.of_sheet(self._sheet)
@@ -163,11 +163,11 @@ class SheetPhotos:
                 ui.label(photo.state).classes("lab-state")
             if photo.state in ("waiting", "reading"):
                 ui.linear_progress(show_value=False).props(f'indeterminate aria-label="{photo.said}"')
-                ui.label(f"{photo.said} ... You may leave this page; it goes on.").props('role="status"')
+                ui.label(f"{photo.said}… You can leave this page.").props('role="status"')
             elif photo.state == "refused":
                 ui.label(photo.said).classes("lab-problem").props('role="alert"')
                 ui.button(
-                    "Leave it out", on_click=lambda: attempt(lambda: self._photos.forget(photo.mark))
+                    "Remove photo", on_click=lambda: attempt(lambda: self._photos.forget(photo.mark))
                 ).props("outline no-caps")
             else:
                 self._show_read(photo)
@@ -177,31 +177,31 @@ class SheetPhotos:
             ui.label(photo.said)
         waiting = [each for each in self._waiting(photo.sheet) if self._seen(each, photo)]
         if not waiting:
-            ui.label("All trials on it are counted.")
+            ui.label("All trials of this sheet are scored.")
             return
         for each in waiting:
             with ui.row().classes("lab-row"):
                 ui.button(
-                    f"Look at trial {each.number}, {each.pen}",
+                    f"Check trial {each.number}, {each.pen}",
                     on_click=lambda number=each.number: self._jump(number),
                 ).props("outline no-caps")
                 ui.label(self._told(each, photo))
         ready = [each for each in waiting if self._draft(each, photo) is not None]
         if len(ready) > 1:
-            ui.button(
-                f"I looked at all: enter {len(ready)} trials", on_click=lambda: self._enter(photo)
-            ).props("unelevated no-caps")
+            ui.button(f"Save {len(ready)} trials", on_click=lambda: self._enter(photo)).props(
+                "unelevated no-caps"
+            )
 
     def _seen(self, each: CountedTrial, photo: SheetPhoto) -> bool:
         return any(found.mark == photo.mark for found in self._counts.proposals(each.number))
 
     def _told(self, each: CountedTrial, photo: SheetPhoto) -> str:
         found = next(one for one in self._counts.proposals(each.number) if one.mark == photo.mark)
-        doubt = f", {len(found.doubtful)} to look at" if found.doubtful else ""
+        doubt = f", {len(found.doubtful)} to check" if found.doubtful else ""
         return f"{len(found.cells)} cells{doubt}. {found.said}"
 
     def _draft(self, each: CountedTrial, photo: SheetPhoto) -> Draft | None:
-        """What is entered together with the others: what began from this photo, and was perhaps corrected."""
+        """Return the draft that began with this photo, with its corrections."""
         draft = self._drafts.get(each.number)
         return draft if draft is not None and draft.cells and draft.proposal == photo.mark else None
 
@@ -210,6 +210,6 @@ class SheetPhotos:
             await self.load()
             found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
             drafts = {number: draft for number, draft in found.items() if draft is not None}
-            said = f"{len(drafts)} trials are in the ledger."
+            said = f"{len(drafts)} trials saved."
             await attempt(lambda: self._counts.score_all(drafts, self._who()), said, type="positive")
         self._lab.changed()

@@ -15,7 +15,7 @@ LIVE_S = 0.05
 
 
 class Player(Element, component="player.js"):
-    """Trials that are played; `live` is for one that goes on."""
+    """Player of trials; `live` shows a trial that is being driven."""
 
     def __init__(self, scene: dict[str, Any], trials: list[dict[str, Any]], *, live: bool = False) -> None:
         super().__init__()

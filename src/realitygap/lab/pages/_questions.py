@@ -1,4 +1,4 @@
-"""What the operator is asked, and the buttons that answer."""
+"""Questions for the operator, with the buttons that answer them."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ class _Asked:
 
     @property
     def card(self) -> dict[str, Any]:
-        """Of the trial that it is about."""
+        """Card of the trial in question."""
         found: dict[str, Any] = self.ask["card"]
         return found
 
     def answer(self, **values: Any) -> None:
         """Answer it."""
         if not self.job.answer(self.ask["number"], **values):
-            notify("That has been answered already.")
+            notify("Another page has answered this question.")
 
     def button(self, text: str, *, is_main: bool = True, **values: Any) -> None:
         """One that answers."""
@@ -68,35 +68,33 @@ class _Asked:
 
 
 def _meet(asked: _Asked) -> None:
-    ui.label("The robot answers. For its pre-flight it turns on the spot for a moment.").classes(
-        "lab-section"
-    )
-    ui.label("Stand it free.")
-    asked.button("It stands free")
+    ui.label("Place the robot on free floor").classes("lab-section")
+    ui.label("During the pre-flight check, the robot turns on the spot for a moment.")
+    asked.button("Robot is in place")
 
 
 def _accept(asked: _Asked) -> None:
-    ui.label("The pre-flight found something against driving").classes("lab-section")
+    ui.label("The pre-flight check found a problem").classes("lab-section")
     for problem in asked.ask["problems"]:
         ui.label(problem).classes("lab-problem")
     with ui.row().classes("lab-row"):
-        asked.button("Do not drive", yes=False)
-        asked.button("Drive all the same", yes=True, is_main=False)
+        asked.button("Cancel", yes=False)
+        asked.button("Drive anyway", yes=True, is_main=False)
 
 
 def _settle(asked: _Asked) -> None:
     _title(asked.card)
-    ui.label(f"It was cut off: {asked.ask['problem']}.").classes("lab-problem")
-    ui.label("Void: it is driven again. Driven: it counts, with what it has drawn so far.")
+    ui.label(f"The trial was interrupted: {asked.ask['problem']}.").classes("lab-problem")
+    ui.label("Void: the trial is repeated. Driven: it counts, with the line drawn so far.")
     with ui.row().classes("lab-row"):
-        asked.button("Void, drive it again", verdict="void")
-        asked.button("Driven, count it", verdict="driven", is_main=False)
+        asked.button("Void and repeat", verdict="void")
+        asked.button("Count as driven", verdict="driven", is_main=False)
 
 
 def _go_on(asked: _Asked) -> None:
     _title(asked.card)
-    ui.label(f"It was cut off: {asked.ask['problem']}. It will be driven again.")
-    asked.button("Go on")
+    ui.label(f"The trial was interrupted: {asked.ask['problem']}. It will be repeated.")
+    asked.button("Continue")
 
 
 def _place(asked: _Asked) -> None:
@@ -107,18 +105,18 @@ def _place(asked: _Asked) -> None:
         ui.element("span").classes("lab-pen").style(f"background: {ink_of(card['pen'])}")
         ui.label(f"Pen: {card['pen']}. Sheet {card['sheet']}. {card['n_left']} left in this generation.")
     if asked.ask["is_placed"]:
-        ui.label("The emulated robot is put at its start by itself.")
+        ui.label("The emulated robot is placed at its start automatically.")
     else:
-        ui.label(f"Put the robot at its start, pen in: {start_words(arena)}")
+        ui.label(f"Put the robot at its start, pen down: {start_words(arena)}")
     CellGrid(arena, name=f"The start: {start_words(arena)}").classes("lab-sketch")
-    asked.button("Start the trial")
+    asked.button("Start trial")
 
 
 def _score(asked: _Asked) -> None:
     trials = asked.ask["trials"]
-    ui.label("Which cells do the lines cross?").classes("lab-section")
-    what = f"Sheet {asked.ask['sheet']} is full." if asked.ask["is_full"] else "The trial is driven."
-    ui.label(f"{what} Count below, at this page or at any other; it goes on by itself once all are counted.")
+    ui.label("Mark the cells that the lines cross").classes("lab-section")
+    what = f"Sheet {asked.ask['sheet']} is full." if asked.ask["is_full"] else "The trial has ended."
+    ui.label(f"{what} Score the trials below, on this page or another. The study then continues.")
     with ui.row().classes("lab-row"):
         for number in trials:
             ui.button(f"Trial {number}", on_click=lambda number=number: asked.jump(number)).props(
@@ -128,18 +126,18 @@ def _score(asked: _Asked) -> None:
 
 
 def _close(asked: _Asked) -> None:
-    ui.label("All trials of this generation are counted").classes("lab-section")
+    ui.label("All trials of this generation are scored").classes("lab-section")
     ui.label(
-        "Once it is closed, these scores breed the next generation and stay; later there are corrections alone."
+        "The scores select the parents of the next generation. After closing, you can only add corrections."
     )
     for number in asked.ask["trials"]:
         each = asked.counts.trial(number)
         with ui.row().classes("lab-row"):
             ui.label(f"Trial {number}, {each.pen}: {len(each.trial.cells or ())} cells by {each.first}")
-            ui.button("Take back", on_click=lambda number=number: asked.answer(undo=number)).props(
-                f'flat dense no-caps aria-label="Take back the score of trial {number}"'
+            ui.button("Undo", on_click=lambda number=number: asked.answer(undo=number)).props(
+                f'flat dense no-caps aria-label="Undo the score of trial {number}"'
             ).set_enabled(asked.may)
-    asked.button("Close the generation")
+    asked.button("Close generation")
 
 
 def _title(card: dict[str, Any]) -> None:

@@ -1,7 +1,8 @@
-"""Robot: connect, look it over, drive it by hand."""
+"""Robot: connect it, check it, and drive it by hand."""
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from nicegui import events, run, ui
@@ -14,26 +15,35 @@ from realitygap.platforms import emulated_robots
 from realitygap.robots import list_ports
 from realitygap.robots.scribbler import PortGuess
 
-from ._frame import framed, hint, section, text_of, visitor_of
+from ._fields import Form
+from ._frame import framed, hint, section, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
 from ._notices import attempt
 from ._part import watching
 
 LIVE_S = 0.05
-"""Between two looks at the senses: 20 a second."""
+"""Time between two updates of the readings [s]."""
+STALE_S = 1.0
+"""Age from which readings are shown as old [s]."""
 EMULATED = "emulator://s2?fluke=2"
+_OBSTACLES = {
+    3: (("Left obstacle", "0 to 6400"), ("Center obstacle", "0 to 6400"), ("Right obstacle", "0 to 6400")),
+    2: (("Left infrared", "0 or 1"), ("Right infrared", "0 or 1")),
+    7: tuple((f"Infrared {k}", "0 to 4505") for k in range(7)),
+}
+"""Names and ranges of the obstacle sensors, by their number."""
 
 
 class DrivePad(Element, component="drive_pad.js"):
-    """A handle that drives while it is held."""
+    """A pad that drives the robot while it is held."""
 
     def __init__(self, *, name: str, is_off: bool, stops: int) -> None:
         super().__init__()
         self._props |= {"name": name, "disabled": is_off, "stops": stops}
 
     def know(self, stops: int) -> None:
-        """Tell it how often somebody pressed stop: a press from now on is one after all of them."""
+        """Set the number of stops so far: the pad drives only if it is pressed after all of them."""
         if self._props["stops"] != stops:
             self._props["stops"] = stops
             self.update()
@@ -57,16 +67,18 @@ class _Page:
         self._n_shown = -1
         self._n_points = 0
         self._pad: DrivePad | None = None
+        self._gauges: list[_Gauge] = []
+        self._last_s = time.monotonic()
 
     def show(self) -> None:
-        self._seen = self._stand()
+        self._seen = self._state()
         self._part = ui.refreshable(self._show)
         with ui.column().classes("lab-cards"):
             self._part()
         watching(self._lab, self._look)
         ui.timer(LIVE_S, self._live)
 
-    def _stand(self) -> Any:
+    def _state(self) -> Any:
         hand = self._lab.hand
         shown = None
         if hand is not None:
@@ -82,7 +94,7 @@ class _Page:
         return shown, self._lab.operator, self._lab.robot_job
 
     async def _look(self) -> None:
-        now = self._stand()
+        now = self._state()
         if now == self._seen:
             return
         before, self._seen = self._seen, now
@@ -93,56 +105,83 @@ class _Page:
             self._part.refresh()
 
     def _is_same_robot(self, before: Any, now: Any) -> bool:
-        """Whether only what is told of it has changed: whoever holds the pad goes on holding it."""
-        one, other = before[0], now[0]
-        return one is not None and other is not None and one[:3] == other[:3] and before[1:] == now[1:]
+        """Whether only facts about the robot have changed: a drive pad that is held must stay on the page."""
+        old, new = before[0], now[0]
+        return old is not None and new is not None and old[:3] == new[:3] and before[1:] == now[1:]
 
     def _show(self) -> None:
-        self._pad = None
+        self._pad, self._gauges = None, []
         hand, job = self._lab.hand, self._lab.robot_job
         if job is not None:
-            ui.label(f"The study {job.name!r} has the robot.")
-            ui.button("To its trials", on_click=lambda: ui.navigate.to(f"/trials/{job.name}")).props(
+            ui.label(f"The study {job.name!r} uses the robot.").props('role="status"')
+            ui.button("Open trials", on_click=lambda: ui.navigate.to(f"/study/{job.name}/trials")).props(
                 "outline no-caps"
             )
             return
-        if hand is not None and hand.outcome is not None:
-            ui.label(hand.outcome).classes("lab-problem" if hand.is_failed else "").props('role="status"')
         if hand is None or hand.is_over:
-            self._show_connecting()
+            self._show_connecting(hand)
             return
         if not hand.label:
-            ui.label(f"Connecting to {hand.port} ...").props('role="status"')
-            ui.button("Give up", on_click=hand.ask_to_end).props("outline no-caps")
+            ui.label(f"Connecting to {hand.port}…").props('role="status"')
+            ui.button("Cancel", on_click=hand.ask_to_end).props("outline no-caps")
             return
         self._show_robot(hand)
 
-    def _show_connecting(self) -> None:
-        found = self._ports
-        likely = [guess.port for guess in found if guess.seems != "a serial port"]
-        port = (
-            ui.input(
+    # before a robot is connected
+
+    def _show_connecting(self, last: Hand | None) -> None:
+        message = "No robot connected." if last is None or last.outcome is None else last.outcome
+        is_failed = last is not None and last.is_failed
+        ui.label(message).classes("lab-problem lab-lines" if is_failed else "").props('role="status"')
+        with ui.row().classes("lab-row"):
+            if last is not None and is_failed:
+                ui.button("Retry", on_click=lambda: attempt(lambda: self._connect(last.port))).props(
+                    "unelevated no-caps"
+                )
+            ui.button(
+                "Use an emulated robot", on_click=lambda: attempt(lambda: self._connect(EMULATED))
+            ).props(f"{'outline' if is_failed else 'unelevated'} no-caps")
+        hint("The emulated robot drives in a simulated arena. It needs no hardware.")
+        if self._ports:
+            section("Ports of this computer")
+        for guess in self._ports:
+            with ui.row().classes("lab-row"):
+                ui.button(
+                    f"Connect {guess.port}",
+                    on_click=lambda port=guess.port: attempt(lambda: self._connect(port)),
+                ).props("outline no-caps")
+                ui.label(guess.seems)
+        with ui.expansion("Another port").classes("lab-expansion"), ui.element("div").classes("lab-form"):
+            form = Form()
+            form.summary()
+            form.text(
+                "port",
                 "Port",
-                value=likely[0] if likely else EMULATED,
-                autocomplete=[*(guess.port for guess in found), *emulated_robots()],
+                explanation="For example /dev/rfcomm0, COM3, socket://HOST:PORT, or thymio:/dev/ttyACM0. Emulated "
+                f"robots: {', '.join(emulated_robots())}.",
+                is_needed=True,
             )
-            .props("outlined dense")
-            .classes("lab-wide")
-        )
-        for guess in found:
-            hint(f"{guess.port}: {guess.seems}")
-        hint(f"Emulated robots in this program: {', '.join(emulated_robots())}.")
-        witness = ui.input("Witness of an emulator in another program, HOST:PORT (else leave it empty)")
-        witness.props("outlined dense").classes("lab-wide")
+            form.text(
+                "witness",
+                "Witness",
+                explanation="HOST:PORT of the witness of an emulator in another program. Leave it empty for a robot.",
+            )
 
-        def connect() -> None:
-            self._lab.connect(text_of(port), text_of(witness), self._visitor)
+            def connect(values: dict[str, Any]) -> None:
+                self._connect(values["port"], values["witness"])
 
-        ui.button("Connect", on_click=lambda: attempt(connect)).props("unelevated no-caps")
+            ui.button("Connect", on_click=lambda: form.submit(connect)).props("unelevated no-caps")
+
+    def _connect(self, port: str, witness: str = "") -> None:
+        self._lab.connect(port, witness, self._visitor)
+
+    # a robot that is connected
 
     def _show_robot(self, hand: Hand) -> None:
         may = self._lab.may_operate(self._visitor)
-        ui.label(f"{hand.label} at {hand.port}").classes("lab-section").props('role="status"')
+        with ui.row().classes("lab-row"):
+            ui.label(hand.label).classes(f"lab-label-{hand.label.lower()} lab-badge")
+            ui.label(f"Connected to {hand.port}").props('role="status"')
         if not may:
             show_holder(self._lab, self._visitor)
         with ui.element("div").classes("lab-two"):
@@ -153,75 +192,81 @@ class _Page:
                 )
                 self._pad.on("drive", self._drive)
                 self._pad.on("release", self._release)
-                hint(
-                    "Hold it and pull, or use the arrow keys. Let go, or close the page, and the robot stops."
-                )
-            with ui.column().classes("lab-cards"):
-                section("Senses")
-                self._bars = [
-                    ui.linear_progress(0, show_value=False, size="14px").props(
-                        f'aria-label="Obstacle reading {k + 1}"'
-                    )
-                    for k in range(len(hand.senses["raw"]) if hand.senses else 3)
-                ]
-                self._said = ui.label("")
-                self._moves = ui.label("")
+                hint("Hold and pull the pad, or use the arrow keys. The robot stops when you let go.")
+            with ui.column().classes("lab-cards lab-senses") as self._senses:
+                section("Sensors")
+                n_obstacles = len(hand.senses["raw"]) if hand.senses else 3
+                self._gauges = [_Gauge(name, unit) for name, unit in _OBSTACLES.get(n_obstacles, ())]
+                self._light, self._line = ui.label("Light"), ui.label("Line")
+                self._motion = ui.label("Standing").props('role="status"')
         self._grid = None
         if hand.arena is not None:
-            section("Where it is")
-            self._grid = CellGrid(hand.arena, ink="red", name="Where the emulated robot is").classes(
+            section("Position")
+            self._grid = CellGrid(hand.arena, ink="red", name="Position of the emulated robot").classes(
                 "lab-sketch"
             )
             self._n_points = 0
         self._facts = ui.refreshable(lambda: self._show_facts(hand))
         self._facts()
         with ui.row().classes("lab-row"):
-            for text, what in (("Pre-flight: turns on the spot", "preflight"), ("Take a picture", "picture")):
+            actions = [("Run pre-flight", "preflight"), ("Take picture", "picture")]
+            if hand.arena is not None:
+                actions.append(("Put at start", "place"))
+            for text, what in actions:
                 ui.button(text, on_click=lambda what=what: hand.want(what)).props(
                     "outline no-caps"
                 ).set_enabled(may)
-            if hand.arena is not None:
-                ui.button("Put it at the start", on_click=lambda: hand.want("place")).props(
-                    "outline no-caps"
-                ).set_enabled(may)
-            ui.button("Let the robot go", on_click=hand.ask_to_end).props("flat no-caps").set_enabled(may)
+            ui.button("Disconnect", on_click=hand.ask_to_end).props("flat no-caps").set_enabled(may)
+        hint("During the pre-flight, the robot turns on the spot.")
 
     def _show_facts(self, hand: Hand) -> None:
-        section("What it says of itself")
-        about = ", ".join(f"{key} {value}" for key, value in hand.about.items() if value not in ("", "None"))
-        ui.label(about)
-        ui.label("Battery: not told" if hand.battery_v is None else f"Battery: {hand.battery_v:.2f} V")
+        section("Robot")
+        battery = "unknown" if hand.battery_v is None else f"{hand.battery_v:.2f} V"
+        facts = {"battery": battery, **hand.about}
+        with ui.element("dl").classes("lab-facts"):
+            for key, value in facts.items():
+                if value not in ("", "None"):
+                    with ui.element("dt"):
+                        ui.label(key.replace("_", " ").capitalize())
+                    with ui.element("dd"):
+                        ui.label(value)
         if hand.said:
             ui.label(hand.said).classes("lab-problem")
         if hand.preflight is not None:
-            ui.label("Pre-flight").classes("lab-section")
-            for name, value in hand.preflight["facts"].items():
-                ui.label(f"{name}: {value}")
+            section("Pre-flight check")
             for problem in hand.preflight["problems"]:
-                ui.label(f"Against driving: {problem}").classes("lab-problem")
+                ui.label(problem).classes("lab-problem")
             if not hand.preflight["problems"]:
-                ui.label("Nothing speaks against driving.")
+                ui.label("Pre-flight check passed.").classes("lab-ok")
+            with ui.element("dl").classes("lab-facts"):
+                for name, value in hand.preflight["facts"].items():
+                    with ui.element("dt"):
+                        ui.label(name)
+                    with ui.element("dd"):
+                        ui.label(str(value))
         if hand.picture:
             ui.element("img").props(
-                f'src="data:image/png;base64,{hand.picture}" alt="What the robot sees"'
+                f'src="data:image/png;base64,{hand.picture}" alt="Picture of the robot\'s camera"'
             ).classes("lab-picture")
 
     def _live(self) -> None:
         hand = self._lab.hand
-        if hand is not None and self._pad is not None:
-            self._pad.know(hand.n_stops)
-        if hand is None or hand.senses is None or hand.n_live == self._n_shown or not hasattr(self, "_bars"):
+        if hand is None or self._pad is None:
             return
-        self._n_shown = hand.n_live
+        self._pad.know(hand.n_stops)
+        if hand.senses is None:
+            return
+        if hand.n_live == self._n_shown:
+            self._show_age()
+            return
+        self._n_shown, self._last_s = hand.n_live, time.monotonic()
+        self._senses.classes(remove="lab-stale")
         senses = hand.senses
-        for bar, reading in zip(self._bars, senses["readings"], strict=False):
-            bar.value = round(reading, 3)
-        seen = ", ".join(f"{value:.0f}" for value in senses["raw"])
-        more = "".join(
-            f"; {name} {', '.join(map(str, senses[name]))}" for name in ("light", "line") if name in senses
-        )
-        self._said.text = f"Obstacles {seen}{more}"
-        self._moves.text = ("Driving" if senses["moves"] else "Standing") + (
+        for gauge, reading, raw in zip(self._gauges, senses["readings"], senses["raw"], strict=False):
+            gauge.put(reading, raw)
+        for name, label in (("light", self._light), ("line", self._line)):
+            label.text = f"{name.capitalize()}: {', '.join(map(str, senses[name]))}" if name in senses else ""
+        self._motion.text = ("Driving" if senses["moves"] else "Standing") + (
             ", blocked" if senses["stalled"] else ""
         )
         if self._grid is not None and "pose" in senses:
@@ -229,6 +274,13 @@ class _Page:
             anew = len(line) < self._n_points or self._n_points == 0
             self._grid.follow(senses["pose"], line if anew else line[self._n_points :], anew=anew)
             self._n_points = len(line)
+
+    def _show_age(self) -> None:
+        """Gray out readings that are old."""
+        age = time.monotonic() - self._last_s
+        if age > STALE_S:
+            self._senses.classes(add="lab-stale")
+            self._motion.text = f"No reading for {age:.0f} s"
 
     def _drive(self, event: events.GenericEventArguments) -> None:
         hand = self._lab.hand
@@ -240,3 +292,18 @@ class _Page:
         hand = self._lab.hand
         if hand is not None and self._lab.may_operate(self._visitor):
             hand.release()
+
+
+class _Gauge:
+    """A reading with its name, its range, and a bar."""
+
+    def __init__(self, name: str, unit: str) -> None:
+        with ui.row().classes("lab-gauge"):
+            ui.label(f"{name} ({unit})")
+            self._text = ui.label("").classes("lab-value")
+        self._bar = ui.linear_progress(0, show_value=False, size="14px").props(f'aria-label="{name}"')
+
+    def put(self, reading: float, raw: float) -> None:
+        """Show a reading, 0 to 1, and its raw value."""
+        self._bar.value = round(reading, 3)
+        self._text.text = f"{raw:.0f}"

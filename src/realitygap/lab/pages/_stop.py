@@ -1,19 +1,20 @@
-"""The stop for the robot, at the foot of every page."""
+"""Stop robot: the button that every page shows while a robot is connected."""
 
 from __future__ import annotations
 
 from nicegui import app, events, ui
 from starlette.responses import PlainTextResponse, Response
 
-from realitygap.lab._lab import Lab
+from realitygap.lab._lab import Lab, Visitor
 
 from ._notices import notify
+from ._part import Part, watching
 
 _LOST = "Connection lost. Use the robot's power switch."
 
 
 def add_stop(lab: Lab) -> None:
-    """Add what stops the robot without a page's websocket: `frame.js` asks for it."""
+    """Add the request that stops the robot without a page's websocket; `frame.js` sends it."""
 
     @app.post("/stop")
     async def stop() -> Response:  # in the event loop: it waits for no thread
@@ -21,36 +22,54 @@ def add_stop(lab: Lab) -> None:
 
 
 class Stop:
-    """The button, and the key Escape.
+    """The robot that is connected, the button that stops it, and the key Escape.
+
+    The browser also shows the button while it has no connection to the lab, because the state is unknown then.
 
     Args:
-        lab: Whose robot it stops.
+        lab: The lab whose robot it stops.
+        visitor: The visitor at the page.
     """
 
-    def __init__(self, lab: Lab) -> None:
-        self._lab = lab
+    def __init__(self, lab: Lab, visitor: Visitor) -> None:
+        self._lab, self._visitor = lab, visitor
 
     def show(self) -> None:
         """Show it."""
-        ui.label(_LOST).classes("lab-stop-lost").props('role="alert"')
-        self._button = (
-            ui.button("Stop the robot", on_click=self._press, color=None)
-            .classes("lab-stop")
-            .props('unelevated no-caps aria-keyshortcuts="Escape"')
-        )
+        with (
+            ui.element("div")
+            .classes("lab-stop-bar")
+            .props('role="region" aria-label="Robot in use"') as self._bar
+        ):
+            self._chip = ui.label("").classes("lab-chip").props('role="status"')
+            # One button for the whole life of the page: a press is never lost because the button was drawn again.
+            with ui.button("Stop robot", on_click=self._press, color=None) as self._button:
+                ui.label(_LOST).classes("lab-stop-lost").props('role="alert"')
+            self._button.classes("lab-stop").props('unelevated no-caps aria-keyshortcuts="Escape"')
         ui.keyboard(on_key=self._key, repeating=False, ignore=[])
-        self.look()
+        part = Part(self._state, self._update)
+        part.show()
+        watching(self._lab, part.look)
+        ui.timer(1.0, part.look)  # nothing reports that the seconds after a stop are over
 
-    def look(self) -> None:
-        """Show it in red while there is a robot to stop."""
-        self._button.classes(**{"add" if self._lab.has_robot else "remove": "lab-stop-ready"})
+    def _state(self) -> tuple[str, bool]:
+        lab = self._lab
+        if not (port := lab.robot_port):
+            return "", lab.is_just_stopped
+        name = "Emulated robot" if port.startswith("emulator://") else f"Robot on {port}"
+        other = "" if lab.may_operate(self._visitor) else f"{lab.operator_name} is operating · "
+        return other + name, lab.is_just_stopped
+
+    def _update(self, state: tuple[str, bool]) -> None:
+        text, is_stopped = state
+        self._bar.classes(**{"add" if text else "remove": "lab-connected"})
+        self._chip.text = text
+        self._button.text = "Robot stopped" if is_stopped else "Stop robot"
 
     def _press(self) -> None:
-        if self._lab.stop_robot():
-            notify("The robot was told to stop.", type="warning")
-        else:
-            notify("No robot is in use here.")
+        if not self._lab.stop_robot():
+            notify("No robot is connected.")
 
     def _key(self, event: events.KeyEventArguments) -> None:
-        if event.action.keydown and event.key.escape and self._lab.stop_robot():
-            notify("The robot was told to stop.", type="warning")
+        if event.action.keydown and event.key.escape:
+            self._lab.stop_robot()

@@ -1,4 +1,4 @@
-"""Trials: the page of the operator beside the robot, and of those who count what it drew."""
+"""Trials: the page for the operator of the robot, and for scoring."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from nicegui import run, ui
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from realitygap.errors import RealityGapError, StudyError
+from realitygap.errors import RealityGapError
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
+from realitygap.lab._problem import FieldError
 from realitygap.lab._study_job import StudyJob
 from realitygap.platforms import emulated_robots
 from realitygap.report import measure_agreement
@@ -20,7 +22,8 @@ from realitygap.robots.scribbler import PortGuess
 
 from ._counting import Counting
 from ._driving import Driving
-from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
+from ._fields import Form
+from ._frame import LONGEST_NAME, framed, remember_who, section, text_of, visitor_of
 from ._handover import show_holder
 from ._notices import WRONG, attempt
 from ._part import Part, watching
@@ -29,10 +32,19 @@ from ._questions import show_question
 from ._videos import Videos
 
 EMULATED = "emulator://s2?fluke=2"
+_STEPS = ("Place", "Drive", "Score", "Close")
+_STEP_OF = {"settle": "Drive", "go on": "Drive", "score": "Score", "close": "Close"}
+"""Steps of the questions that do not belong to placing the robot."""
+_SCORERS = {
+    "page": "A person, on this page",
+    "camera": "The camera; without one, a person confirms",
+    "witness": "The emulator; only for emulated robots",
+}
+_WHEN = {"sheet": "When a sheet is full", "trial": "After each trial"}
 _NUMBER = """
 <q-td :props="props">
   <q-btn v-if="props.row.counts" outline dense no-caps padding="4px 12px" :label="String(props.value)"
-         :aria-label="`Count trial ${props.value}`" @click="$parent.$emit('choose', props.value)" />
+         :aria-label="`Score trial ${props.value}`" @click="$parent.$emit('choose', props.value)" />
   <template v-else>{{ props.value }}</template>
 </q-td>
 """
@@ -42,21 +54,24 @@ _NUMBER = """
 def add_trials(lab: Lab) -> None:
     """Add the page."""
 
-    @ui.page("/trials/{name}", response_timeout=30)
+    @ui.page("/study/{name}/trials", response_timeout=30)
     async def trials(name: str, request: Request) -> None:
         def open_study() -> tuple[Counts, Photos]:
             counts = lab.counts(name)
             counts.look()
             return counts, lab.photos(name)
 
+        if not await run.io_bound(lab.studies.has, name):
+            raise HTTPException(404, name)
+        above = [("Studies", "/"), (name, f"/study/{name}")]
         try:
             found = await run.io_bound(open_study)
         except RealityGapError as error:
-            with framed(lab, "Trials", ""):
+            with framed(lab, "Trials", "", above=above):
                 ui.label(str(error)).classes("lab-problem")
             return
         if found is not None:
-            with framed(lab, f"Trials of {name}", ""):
+            with framed(lab, "Trials", "", above=above):
                 await _Page(lab, name, *found, visitor_of(request)).show()
 
 
@@ -75,34 +90,38 @@ class _Page:
 
     async def show(self) -> None:
         await self._load()
-        ui.input(
-            "Your name",
-            value=self._visitor.who,
-            on_change=lambda event: self._named(text_of(event)),
-        ).props(f"outlined dense debounce=400 maxlength={LONGEST_NAME}").classes("lab-wide")
-        hint(
-            "It stands in the ledger with whatever you enter. Two people who count the same trials have two names."
-        )
         self._seen: Any = None
         self._robot = Part(self._robot_stand, self._show_robot)
         self._asked = Part(self._asked_stand, self._show_asked)
         self._ending = Part(self._may_end, self._show_ending)
+        self._steps = Part(self._step, _show_steps)
+        self._steps.show()
+        with ui.element("section").props('aria-label="Current step"'):
+            self._asked.show()
+        name = Form().text(
+            "who",
+            "Your name",
+            self._visitor.who,
+            explanation="Your name is saved with each score. Two people who score the same trials need two names.",
+        )
+        name.props(f"debounce=400 maxlength={LONGEST_NAME}")
+        name.on_value_change(lambda event: self._named(text_of(event)))
         with ui.element("section").props('aria-label="Robot"').classes("lab-part"):
             section("Robot")
-            for part in (self._robot, self._asked, self._ending):
+            for part in (self._robot, self._ending):
                 part.show()
         self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
         self._listed = self._counts.trials()
         self._photos = ui.refreshable(self._sheets.show)
         self._photo_part = ui.element("section").props('aria-label="Photos of sheets"').classes("lab-part")
         with self._photo_part:
-            section("From a photo of the sheet")
+            section("Score from a photo")
             self._photos()
         self._photo_part.set_visibility(bool(self._sheets.sheets()))
         self._filmed = ui.refreshable(self._videos.show)
         with ui.element("section").props('aria-label="Video"'):
             self._filmed()
-        with ui.element("section").props('aria-label="Counting"').classes("lab-part"):
+        with ui.element("section").props('aria-label="Score"').classes("lab-part"):
             await self._counting.show()
         self._table = ui.refreshable(self._show_table)
         with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
@@ -122,7 +141,7 @@ class _Page:
             self._agreement = await run.io_bound(self._agree) or ""
 
     async def _look(self) -> None:
-        """Show anew what has changed; what somebody is tapping stays as it is."""
+        """Update the parts that have changed; a grid in use stays."""
         if self._is_looking:  # the disk takes its time
             return
         self._is_looking = True
@@ -137,7 +156,7 @@ class _Page:
             self._is_looking = False
 
     async def _show_changes(self) -> None:
-        for part in (self._robot, self._asked, self._ending):
+        for part in (self._robot, self._asked, self._ending, self._steps):
             part.look()
         if self._counts.trials() is not self._listed:
             self._listed = self._counts.trials()
@@ -179,6 +198,8 @@ class _Page:
 
     def _robot_stand(self) -> _RobotStand:
         job, last = self._job(), self._lab.jobs.get(self._name)
+        if last is not None and not last.port:  # of simulated runs: the study page shows how they ended
+            last = None
         return _RobotStand(
             job,
             outcome="" if last is None else last.outcome or "",
@@ -212,8 +233,17 @@ class _Page:
         ask = job.ask
         return _AskedStand(job, ask, None if ask is not None else job.card, self._may())
 
+    def _step(self) -> str:
+        """The step that the study is at; empty if nothing waits and no robot is connected."""
+        state = self._asked_stand()
+        if state.ask is not None:
+            return _STEP_OF.get(state.ask["question"], "Place")
+        if state.job is not None:
+            return "Drive" if state.card is not None else "Place"
+        return "Score" if any(each.trial.state == "driven" for each in self._counts.trials()) else ""
+
     def _show_asked(self, now: _AskedStand) -> None:
-        """What it waits for; else the trial that goes on."""
+        """Show the question, or the trial that is being driven."""
         if now.job is None:
             return
         if now.ask is not None:
@@ -221,86 +251,62 @@ class _Page:
         elif now.card is not None:
             Driving(now.job, now.card, self._counts).show()
         else:
-            ui.label("Getting ready ...").props('role="status"')
+            ui.label("Preparing the next trial…").props('role="status"')
 
     def _may_end(self) -> _AskedStand:
         return _AskedStand(self._job(), may=self._may())
 
     def _show_ending(self, now: _AskedStand) -> None:
         if now.job is not None:
-            ui.button("End the sitting", on_click=now.job.ask_to_end).props("flat no-caps").set_enabled(
-                now.may
-            )
+            ui.button("Disconnect", on_click=now.job.ask_to_end).props("flat no-caps").set_enabled(now.may)
 
     def _show_beginning(self) -> None:
-        """What to say before a robot drives."""
+        """Show the form that connects a robot."""
         if self._can_begin is None:
             return
         if self._can_begin.is_complete:
-            ui.label("All runs on a robot are complete.")
+            ui.label("All robot runs are complete.")
             return
+        if not self._counts.trials():
+            ui.label("No trials yet. Connect a robot to drive trials.")
         found = self._can_begin.ports
-        ports = [guess.port for guess in found]
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
-        ui.label(
-            "Where is the robot? Stand it free: it turns on the spot for its pre-flight. An emulated one drives in "
-            "this program, and draws its line for you to count."
-        )
-        port = (
-            ui.input(
-                "Port", value=likely[0] if likely else EMULATED, autocomplete=[*ports, *emulated_robots()]
-            )
-            .props("outlined dense")
-            .classes("lab-wide")
-        )
-        counts = (
-            ui.select(
-                {
-                    "page": "People, at this page",
-                    "camera": "The camera by itself (else people confirm what it sees)",
-                    "witness": "The emulator itself (emulated robots only)",
-                },
-                value="page",
-                label="Who counts cells",
-            )
-            .classes("lab-wide")
-            .props("outlined dense")
-        )
-        when = (
-            ui.select(
-                {"sheet": "When a sheet is full", "trial": "After each trial"},
-                value="sheet",
-                label="When to count",
-            )
-            .classes("lab-wide")
-            .props("outlined dense")
-        )
-        witness = (
-            ui.input("Witness of an emulator in another program, HOST:PORT (else leave it empty)")
-            .props("outlined dense")
-            .classes("lab-wide")
-        )
+        self._form = form = Form()
+        form.summary()
 
-        camera = (
-            ui.input("Camera above the robot: its number, such as 0?tag=10 (else leave it empty)")
-            .props("outlined dense")
-            .classes("lab-wide")
-        )
-
-        def begin() -> None:
-            if counts.value == "camera" and not text_of(camera):
-                raise StudyError("Which camera counts? Give its number, such as 0.")
-            self._lab.go_on(
-                self._name,
-                port=text_of(port),
-                counts=counts.value,
-                when=when.value,
-                witness=text_of(witness),
-                camera=text_of(camera),
-            )
+        def begin(values: dict[str, Any]) -> None:
+            if values["counts"] == "camera" and not values["camera"]:
+                raise FieldError("camera", "Enter the number of the camera that scores, such as 0.")
+            self._lab.go_on(self._name, **values)
             self._lab.take_robot(self._visitor)
 
-        ui.button("Begin a sitting", on_click=lambda: attempt(begin)).props("unelevated no-caps")
+        def emulate() -> Any:
+            port.value = EMULATED
+            return form.submit(begin)
+
+        with ui.element("div").classes("lab-form"):
+            port = form.text(
+                "port",
+                "Port",
+                likely[0] if likely else EMULATED,
+                options=[*(guess.port for guess in found), *emulated_robots()],
+                is_needed=True,
+                explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",
+            )
+            with ui.row().classes("lab-row"):
+                ui.button("Connect robot", on_click=lambda: form.submit(begin)).props("unelevated no-caps")
+                ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
+            with ui.expansion("Advanced").classes("lab-expansion"):
+                form.choice("counts", "Scored by", _SCORERS, "page")
+                form.choice("when", "When to score", _WHEN, "sheet")
+                form.text(
+                    "witness",
+                    "Witness",
+                    explanation="HOST:PORT of the witness of an emulator in another program.",
+                )
+                form.text(
+                    "camera", "Camera", explanation="Number and options of an overhead camera: 0?tag=10."
+                )
 
     def _beginning(self) -> _Beginning | None:
         try:
@@ -321,7 +327,7 @@ class _Page:
         section("All trials")
         found = self._counts.trials()
         if not found:
-            ui.label("No trial is planned yet.")
+            ui.label("No trials yet.")
             return
         if self._agreement:
             ui.label(self._agreement)
@@ -347,7 +353,7 @@ class _Page:
                 ("pen", "Pen"),
                 ("state", "State"),
                 ("cells", "Cells"),
-                ("said", "Said of it"),
+                ("said", "Notes"),
             )
         ]
         table = ui.table(rows=rows, columns=columns, row_key="number", pagination=20)
@@ -364,20 +370,18 @@ class _Page:
                 )
 
     def _show_note(self) -> None:
-        ui.input("A note on the whole").props("outlined dense").classes("lab-wide").on(
-            "keydown.enter", lambda event: self._note(event.sender)
-        )
-        hint("Enter keeps it.")
+        note = Form().text("note", "Note on the study", explanation="Press Enter to save the note.")
+        note.on("keydown.enter", lambda event: self._note(event.sender))
 
     def _n_cells(self, each: Any) -> str:
-        """How many cells, hidden from who might still count them a second time."""
+        """Return the number of cells; hidden from a visitor who can still score a second time."""
         if each.trial.cells is None:
             return ""
         is_seen = each.trial.is_closed or each.second or each.first == self._visitor.who
         return str(len(each.trial.cells)) if is_seen else "counted"
 
     async def _note(self, field: Any) -> None:
-        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Noted."):
+        if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Note saved."):
             field.value = ""
 
 
@@ -391,7 +395,7 @@ class _Beginning:
 
 @dataclass(frozen=True)
 class _RobotStand:
-    """What is to be said of a robot, or of the last sitting."""
+    """The robot of a study, or the outcome of the last session."""
 
     job: StudyJob | None
     outcome: str
@@ -404,7 +408,7 @@ class _RobotStand:
 
 @dataclass(frozen=True)
 class _AskedStand:
-    """What a study asks, or the trial that goes on, and whether this visitor may answer."""
+    """A question of a study, or the trial that is driven, and whether this visitor may answer."""
 
     job: StudyJob | None
     ask: dict[str, Any] | None = None
@@ -412,9 +416,19 @@ class _AskedStand:
     may: bool = False
 
 
+def _show_steps(current: str) -> None:
+    with ui.element("ol").classes("lab-steps").props('aria-label="Steps"'):
+        for step in _STEPS:
+            with ui.element("li") as item:
+                ui.label(step)
+            if step == current:
+                item.props('aria-current="step"')
+
+
 def _show_preflight(found: dict[str, Any]) -> None:
     n_problems = len(found["problems"])
-    with ui.expansion(f"Pre-flight: {n_problems or 'nothing'} against driving").classes("lab-expansion"):
+    found_words = f"{n_problems} problems" if n_problems else "passed"
+    with ui.expansion(f"Pre-flight check: {found_words}").classes("lab-expansion"):
         for name, value in found["facts"].items():
             ui.label(f"{name}: {value}")
         for problem in found["problems"]:

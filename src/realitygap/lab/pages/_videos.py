@@ -1,4 +1,4 @@
-"""A video of a sitting, tracked: the cells of its trials, to be looked at."""
+"""A video of trials is tracked; a person checks the cells."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in
 
-from ._frame import hint, text_of
-from ._notices import attempt
+from ._fields import Form
+from ._frame import hint
 
 
 class Videos:
@@ -47,7 +47,7 @@ class Videos:
         if job is not None:
             self._show_outcome(job)
         if self._waiting():
-            with ui.expansion("Cells from a video of the camera").classes("lab-expansion"):
+            with ui.expansion("Score from a video").classes("lab-expansion"):
                 self._show_form()
 
     # inside
@@ -60,7 +60,7 @@ class Videos:
 
     def _show_tracking(self, job: VideoJob) -> None:
         bar = ui.linear_progress(job.share, show_value=False).props('aria-label="Of the video gone through"')
-        ui.label(f"Tracking {job.spec} ... You may leave this page; it goes on.").props('role="status"')
+        ui.label(f"Tracking {job.spec}… You can leave this page.").props('role="status"')
         ui.timer(0.3, lambda: bar.set_value(round(job.share, 3)))
         ui.button("Stop tracking", on_click=job.ask_to_end).props("outline no-caps")
 
@@ -73,27 +73,29 @@ class Videos:
             for number in job.found:
                 if number in waiting:
                     ui.button(
-                        f"Look at trial {number}", on_click=lambda number=number: self._jump(number)
+                        f"Check trial {number}", on_click=lambda number=number: self._jump(number)
                     ).props("outline no-caps")
 
     def _show_form(self) -> None:
         found, waiting = self._files, self._waiting()
         hint(
             "Film the arena with its corner tags and the robot with its tag, from before a trial until the robot "
-            "stands. One video may show several trials. Put it into the lab's folder."
+            "stands still. Put the video into the lab's folder."
         )
-        video = ui.input("Video", value=found[-1] if found else "", autocomplete=found)
-        options = ui.input("What to look for", value="tag=10&tag-height=0.1")
-        which: dict[int, str] = {0: f"All {len(waiting)} that wait"} | {
-            each: f"Trial {each}" for each in waiting
-        }
-        trial = ui.select(which, value=0, label="Trials in it")
-        for each in (video, options, trial):
-            each.props("outlined dense").classes("lab-wide")
-        hint("As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.")
+        form = Form()
+        form.summary()
+        form.text("video", "Video", found[-1] if found else "", options=found, is_needed=True)
+        form.text(
+            "tags",
+            "Tags",
+            "tag=10&tag-height=0.1",
+            explanation="As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.",
+        )
+        which = {0: f"All {len(waiting)} trials to score"} | {number: f"Trial {number}" for number in waiting}
+        form.choice("trial", "Trials in the video", which, 0)
 
-        def track() -> None:
-            spec = f"{text_of(video)}?{text_of(options)}"
-            self._lab.track(self._counts.name, spec, [trial.value] if trial.value else self._waiting())
+        def track(values: dict[str, Any]) -> None:
+            spec, trial = f"{values['video']}?{values['tags']}", values["trial"]
+            self._lab.track(self._counts.name, spec, [trial] if trial else self._waiting())
 
-        ui.button("Track it", on_click=lambda: attempt(track)).props("unelevated no-caps")
+        ui.button("Track video", on_click=lambda: form.submit(track)).props("unelevated no-caps")

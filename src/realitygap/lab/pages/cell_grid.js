@@ -95,9 +95,11 @@ export default {
       const ways = { ArrowUp: this.columns, ArrowDown: -this.columns, ArrowRight: 1, ArrowLeft: -1 };
       const cell = Number(event.target.dataset.cell);
       if (this.locked) return;
-      if (event.key === " " || event.key === "Enter") {
+      if (event.key === " ") {
         this.put(cell, !this.marked.has(cell));
         this.tell();
+      } else if (event.key === "Enter") {
+        this.$emit("save");
       } else if (event.key in ways) {
         const next = cell + ways[event.key];
         const sameRow = Math.floor(next / this.columns) === Math.floor(cell / this.columns);

@@ -15,7 +15,10 @@ export default {
       send: (message) => this.$emit(message.kind),
     };
     this.values = values;
-    if (this.$refs.place) this.close = player.render({ model, el: this.$refs.place });
+    if (!this.$refs.place) return;
+    this.close = player.render({ model, el: this.$refs.place });
+    const isCalm = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (!live && !isCalm) this.$refs.place.querySelector(".rg-play").click(); // it moves from the start
   },
   methods: {
     // called by the server while a trial goes on, and once it has ended

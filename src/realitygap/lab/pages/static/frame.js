@@ -1,11 +1,9 @@
-// What every page does by itself, besides what the server tells it.
+// What every page does without the server.
 (() => {
-  // Each stop is sent over a request of its own too: it must not wait for a websocket that a phone has just lost.
+  // Each stop is also sent as a request: it must not wait for a websocket that a phone has just lost.
+  const setLost = (isLost) => document.body.classList.toggle("lab-lost", isLost);
   const stop = () =>
-    fetch("/stop", { method: "POST", keepalive: true }).then(
-      (answer) => document.body.classList.toggle("lab-lost", !answer.ok),
-      () => document.body.classList.add("lab-lost"),
-    );
+    fetch("/stop", { method: "POST", keepalive: true }).then((answer) => setLost(!answer.ok), () => setLost(true));
   const isStop = (event) => event.target instanceof Element && event.target.closest(".lab-stop");
   addEventListener("pointerdown", (event) => { if (isStop(event)) stop(); }, true);
   addEventListener("keydown", (event) => {
@@ -13,12 +11,36 @@
     if (isPressed && !event.repeat) stop();
   }, true);
 
-  // A lab that was started again has another token. Its answer then tells where the new one is.
+  // While the websocket is lost, no button but the stop works: what it says would be lost.
+  const isOffline = () => document.body.classList.contains("lab-offline");
+  addEventListener("click", (event) => {
+    if (!isOffline() || isStop(event) || !event.target.closest("button, .q-btn")) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }, true);
+  const probe = async () => {
+    if (!isOffline()) return setLost(false);
+    const answer = await fetch("/lab-files/frame.js", { cache: "no-store" }).catch(() => null);
+    if (isOffline()) setLost(answer === null);
+    setTimeout(probe, 1000);
+  };
+  const setOffline = (offline) => {
+    if (offline === isOffline()) return;
+    document.body.classList.toggle("lab-offline", offline);
+    probe();
+  };
+
+  // A lab that was started again has another token. Its answer then states where the new one is.
   const reloadIfRefused = async () => {
     const answer = await fetch(location.href, { method: "HEAD" }).catch(() => null);
     if (answer && answer.status === 403) location.reload();
   };
-  const listen = () =>
-    window.socket ? window.socket.on("connect_error", reloadIfRefused) : setTimeout(listen, 200);
+  const listen = () => {
+    if (!window.socket) return setTimeout(listen, 200);
+    window.socket.on("connect_error", reloadIfRefused);
+    window.socket.on("connect_error", () => setOffline(true));
+    window.socket.on("disconnect", () => setOffline(true));
+    window.socket.on("connect", () => setOffline(false));
+  };
   listen();
 })();

@@ -1,0 +1,277 @@
+"""Forms: each label above its field, each explanation and each mistake below it."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from nicegui import run, ui
+from nicegui.elements.mixins.value_element import ValueElement
+
+from realitygap.lab._problem import FieldError
+from realitygap.settings import shown
+
+from ._notices import WRONG
+
+
+@dataclass
+class _Field:
+    """A field, the line for its mistake, and its help.
+
+    Attributes:
+        label: Label above it.
+        input: The element that takes the value.
+        problem: Line below it for a mistake.
+        help: Explanation below it; None if there is none.
+        check: Raises a ValueError if the value cannot be used.
+    """
+
+    label: str
+    input: ValueElement[Any]
+    problem: ui.label
+    help: ui.label | None
+    check: Callable[[], Any]
+
+
+class Form:
+    """The fields of a form, and a summary of their mistakes.
+
+    Call `summary` where the summary belongs, at the top of the form; then add fields.
+    """
+
+    def __init__(self) -> None:
+        self._fields: dict[str, _Field] = {}
+
+    def summary(self) -> None:
+        """Show the place for the summary of mistakes."""
+        with ui.element("div").classes("lab-summary lab-lines").props('role="alert" tabindex="-1"') as box:
+            self._summary = box
+        box.set_visibility(False)
+
+    # fields
+
+    def text(
+        self,
+        key: str,
+        label: str,
+        value: str = "",
+        *,
+        explanation: str = "",
+        options: Sequence[str] = (),
+        placeholder: str = "",
+        is_needed: bool = False,
+        parse: Callable[[str], Any] = str,
+    ) -> ui.input:
+        """Add a line of text.
+
+        Args:
+            key: Key of the field.
+            label: Label, above the field.
+            value: Initial text.
+            explanation: Explanation, below the field.
+            options: Texts that are proposed.
+            placeholder: Text that is shown while the field is empty, such as the default.
+            is_needed: Whether the field must not be empty.
+            parse: Returns the value of the text; raises a ValueError if it has none.
+        """
+
+        def check() -> Any:
+            entered = element.value.strip() if isinstance(element.value, str) else ""
+            if is_needed and not entered:
+                raise ValueError("This field is empty. Enter a value.")
+            return parse(entered)
+
+        with self._around(label):
+            element = ui.input(value=value, autocomplete=list(options) or None, placeholder=placeholder)
+            self._add(key, label, element, explanation, check)
+        return element
+
+    def number(
+        self,
+        key: str,
+        label: str,
+        value: float | None,
+        low: float,
+        high: float,
+        *,
+        explanation: str = "",
+        is_whole: bool = True,
+    ) -> ui.number:
+        """Add a number; a field without an initial value may be empty.
+
+        Args:
+            key: Key of the field.
+            label: Label, above the field.
+            value: Initial number; None if the field is empty.
+            low, high: Smallest and largest number.
+            explanation: Explanation, below the field.
+            is_whole: Whether only whole numbers are allowed.
+        """
+
+        def check() -> float | int | None:
+            entered = element.value
+            if entered is None or entered == "":
+                if value is None:
+                    return None
+                raise ValueError(f"This field is empty. Enter {kind} from {low:g} to {high:g}.")
+            is_number = isinstance(entered, int | float) and not isinstance(entered, bool)
+            if not is_number or not math.isfinite(entered) or not low <= entered <= high:
+                raise ValueError(f"Enter {kind} from {low:g} to {high:g}. You entered {shown(entered)}.")
+            if is_whole and entered != int(entered):
+                raise ValueError(f"Enter {kind} from {low:g} to {high:g}. You entered {shown(entered)}.")
+            return int(entered) if is_whole else float(entered)
+
+        kind = "a whole number" if is_whole else "a number"
+        with self._around(label):
+            element = ui.number(value=value)
+            element.props(f'step="{1 if is_whole else "any"}"')
+            self._add(key, label, element, explanation, check)
+        return element
+
+    def choice(
+        self,
+        key: str,
+        label: str,
+        options: Mapping[Any, str] | Sequence[str],
+        value: Any,
+        explanation: str = "",
+    ) -> ui.select:
+        """Add a choice.
+
+        Args:
+            key: Key of the field.
+            label: Label, above the field.
+            options: The choices; a mapping also has their names.
+            value: Initial choice.
+            explanation: Explanation, below the field.
+        """
+        with self._around(label):
+            listed = dict(options) if isinstance(options, Mapping) else list(options)
+            element = ui.select(listed, value=value)
+            self._add(key, label, element, explanation, lambda: element.value)
+        return element
+
+    # mistakes
+
+    def values(self) -> dict[str, Any]:
+        """Return what was entered, by key.
+
+        Raises:
+            FieldError: A value cannot be used; the first one is named.
+        """
+        found = {}
+        for key, field in self._fields.items():
+            try:
+                found[key] = field.check()
+            except ValueError as error:
+                raise FieldError(key, str(error)) from error
+        return found
+
+    def problems(self) -> dict[str, str]:
+        """Return what is wrong in each field, by key; empty if nothing is."""
+        return {key: text for key in self._fields if (text := self._checked(key))}
+
+    def clear(self) -> None:
+        """Forget all fields, because others will be added."""
+        self._fields.clear()
+
+    async def submit(self, act: Callable[[dict[str, Any]], Any]) -> bool:
+        """Pass what was entered to a function, in a thread; show mistakes at their fields.
+
+        Args:
+            act: Takes the values by key; raises a FieldError for a mistake in one field.
+
+        Returns:
+            Whether it succeeded.
+        """
+        with ui.context.client:  # the button that was pressed may be gone by then
+            problems = self.problems()
+            if not problems:
+                try:
+                    await run.io_bound(act, self.values())
+                except FieldError as error:
+                    problems = {error.field: str(error)}
+                except WRONG as error:
+                    problems = {"": str(error)}
+            self.show_problems(problems)
+            return not problems
+
+    def show_problems(self, problems: Mapping[str, str]) -> None:
+        """Show mistakes at their fields and in the summary, and move the focus there.
+
+        Args:
+            problems: Messages by key; a key that is no field's is shown in the summary only.
+        """
+        for key, field in self._fields.items():
+            self._mark(field, problems.get(key, ""))
+        self._summary.clear()
+        self._summary.set_visibility(bool(problems))
+        if not problems:
+            return
+        with self._summary:
+            for key, text in problems.items():
+                named = self._fields.get(key)
+                if named is None:
+                    ui.label(text if key in ("", text) else f"{key}: {text}")
+                else:
+                    target = _control(named.input)
+                    link = ui.link(f"{named.label}: {text}", f"#{target}")
+                    link.on("click", js_handler=f"(e) => {{ e.preventDefault(); {_focus(target)} }}")
+        ui.run_javascript(f"setTimeout(() => {{ {_focus(self._summary.html_id)} }}, 50)")
+
+    def _around(self, label: str) -> ui.element:
+        box = ui.element("div").classes("lab-field")
+        with box:
+            self._label = ui.html(html.escape(label), tag="label", sanitize=False).classes("lab-label")
+        return box
+
+    def _add(
+        self, key: str, label: str, element: ValueElement[Any], explanation: str, check: Callable[[], Any]
+    ) -> None:
+        element.props(f'outlined dense for="{_control(element)}"')
+        self._label.props(f'for="{_control(element)}"')
+        note = ui.label(explanation).classes("lab-hint") if explanation else None
+        problem = ui.label("").classes("lab-problem")
+        field = self._fields[key] = _Field(label, element, problem, note, check)
+        self._mark(field, "")
+        element.on("blur", lambda: self._mark(field, self._checked(key)))
+
+    def _checked(self, key: str) -> str:
+        """The mistake in a field; empty if there is none."""
+        try:
+            self._fields[key].check()
+        except ValueError as error:
+            return str(error)
+        return ""
+
+    def _mark(self, field: _Field, text: str) -> None:
+        field.problem.text = text
+        field.problem.set_visibility(bool(text))
+        about = [each.html_id for each in (field.help, field.problem if text else None) if each is not None]
+        for name, value in (
+            ("aria-describedby", " ".join(about)),
+            ("aria-invalid", "true" if text else ""),
+            ("error", bool(text)),
+        ):
+            if value:
+                field.input.props[name] = value
+            else:
+                field.input.props.pop(name, None)
+        field.input.props["no-error-icon"] = True
+        field.input.props["hide-bottom-space"] = True
+        field.input.update()
+
+
+def _control(element: ui.element) -> str:
+    """The id of the control that takes the focus."""
+    return f"f{element.id}"
+
+
+def _focus(target: str) -> str:
+    return (
+        f"const it = document.getElementById('{target}'); it.focus({{preventScroll: true}}); "
+        "it.scrollIntoView({block: 'center'});"
+    )

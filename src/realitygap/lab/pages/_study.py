@@ -1,0 +1,469 @@
+"""Study: its finding, figures that grow while it runs, replays, and its report."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from typing import Any
+
+from nicegui import app, events, run, ui
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse, PlainTextResponse, Response
+
+from realitygap.errors import RealityGapError
+from realitygap.lab._access import FOREIGN_HEADERS
+from realitygap.lab._counts import Counts
+from realitygap.lab._lab import Lab
+from realitygap.lab._standing import Standing
+from realitygap.lab._study_job import StudyJob
+from realitygap.lab._watcher import Watcher
+from realitygap.platforms import emulated_robots
+
+from ._driving import Driving
+from ._fields import Form
+from ._frame import framed, hint, section
+from ._home import show_control, show_state
+from ._notices import attempt
+from ._part import Part, watching
+from ._player import LivePlayer, Player
+
+MOST_FILES = 200
+"""Number of files of the lab's folder that are proposed."""
+LOOK_S = 0.5
+"""Time between two looks at the study's folder [s]."""
+
+_TITLES = {
+    "scores": "Best score by generation",
+    "coverage": "Best coverage by generation",
+    "paths": "Best paths",
+    "networks": "Networks",
+    "species": "Species",
+    "archive": "Archive of novelty search",
+}
+_EACH = {
+    "": "One trial",
+    "individual": "Each individual of a generation",
+    "generation": "The best of each generation",
+    "condition": "The best of each condition",
+}
+
+
+def add_study(lab: Lab) -> None:
+    """Add the page, and the files that it shows."""
+
+    @ui.page("/study/{name}", response_timeout=30)
+    async def study(name: str) -> None:
+        above = [("Studies", "/")]
+        found = await run.io_bound(_open, lab, name)
+        if found is None and lab.jobs.get(name) is None:
+            raise HTTPException(404, name)
+        if found is None:
+            with framed(lab, name, "", above=above, is_wide=True):
+                _Starting(lab, name).show()
+        elif found.standing.word == "Failed" and not found.conditions:
+            with framed(lab, name, "", above=above):
+                ui.label(found.standing.message).classes("lab-problem lab-lines")
+        else:
+            with framed(lab, found.standing.title, "", above=above, is_wide=True):
+                _Page(lab, found).show()
+
+    @app.get("/figures/{name}/{figure}-{width}.svg")
+    def figure(name: str, figure: str, width: str) -> Response:
+        watcher = lab.watchers.get(name)
+        drawn = {} if watcher is None else watcher.figures.get(figure, {})
+        if width not in ("wide", "narrow") or width not in drawn:
+            return PlainTextResponse("There is no such figure.", 404)
+        packed = {"cache-control": "no-store", "content-encoding": "gzip"}  # which every browser reads
+        headers = {**FOREIGN_HEADERS, **packed}
+        return Response(drawn[width], media_type="image/svg+xml", headers=headers)
+
+    @app.get("/reports/{name}")
+    def report(name: str) -> Response:
+        try:
+            path = lab.studies.path(name) / "report.html"
+        except RealityGapError as error:
+            return PlainTextResponse(str(error), 404)
+        if not path.is_file() or path.is_symlink():
+            return PlainTextResponse("There is no report yet.", 404)
+        headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
+        return FileResponse(path, media_type="text/html", headers=headers)
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """Facts about a study that are read when its page is opened."""
+
+    standing: Standing
+    watcher: Watcher
+    counts: Counts | None
+    conditions: list[str]
+    files: list[str]
+
+
+def _open(lab: Lab, name: str) -> _Opened | None:
+    """Read what the page shows; None if there is no study of this name."""
+    try:
+        lab.studies.path(name)
+    except RealityGapError:
+        return None
+    standing = lab.standing(name)
+    conditions: list[str] = []
+    counts = None
+    if standing.n_runs or standing.n_driven_runs:
+        conditions = list(lab.studies.results(name).conditions)
+        counts = lab.counts(name) if standing.has_robot else None
+    if counts is not None:
+        counts.look()
+    files = sorted(path.name for path in lab.root.glob("*.toml"))[:MOST_FILES]
+    watcher = lab.watcher(name)
+    if standing.word == "Running":
+        watcher.prepare()
+    return _Opened(standing, watcher, counts, conditions, files)
+
+
+class _Starting:
+    """A study whose process has not made its folder yet."""
+
+    def __init__(self, lab: Lab, name: str) -> None:
+        self._lab, self._name = lab, name
+
+    def show(self) -> None:
+        Part(self._state, self._show).show()
+        self._timer = ui.timer(0.2, self._look)
+
+    def _state(self) -> str:
+        job = self._lab.jobs[self._name]
+        return job.outcome or ""
+
+    def _show(self, outcome: str) -> None:
+        ui.label("Starting the study…").props('role="status"')
+        ui.skeleton().classes("lab-skeleton")
+
+    async def _look(self) -> None:
+        if await run.io_bound(self._lab.studies.has, self._name):
+            self._timer.deactivate()
+            ui.navigate.reload()
+        elif self._state():
+            self._timer.deactivate()
+            ui.label(self._state()).classes("lab-problem lab-lines").props('role="alert"')
+            ui.link("New study", "/new")
+
+
+class _Page:
+    def __init__(self, lab: Lab, opened: _Opened) -> None:
+        self._lab = lab
+        self._standing = opened.standing
+        self._name = opened.standing.name
+        self._opened = opened
+        self._watcher = opened.watcher
+        self._has_report = False
+        self._is_writing = False
+        self._is_looking = False
+        self._key = secrets.token_hex(8)
+        self._asked = self._has_played = False
+        self._report_stamp = self._watcher.report_stamp
+
+    def show(self) -> None:
+        if self._standing.note:
+            hint(self._standing.note)
+        self._state = Part(lambda: self._standing, self._show_state)
+        self._state.show()
+        with ui.tabs().props("no-caps align=left") as tabs:
+            overview, replay, report = ui.tab("Overview"), ui.tab("Replay"), ui.tab("Report")
+        panels = ui.tab_panels(tabs, value=overview, on_change=self._turn).classes("lab-panels")
+        with panels.props("keep-alive"):
+            with ui.tab_panel(overview):
+                self._show_overview()
+            with ui.tab_panel(replay):
+                self._show_replay()
+            with ui.tab_panel(report):
+                self._show_reporting()
+        watching(self._lab, self._look)
+        ui.timer(LOOK_S, self._look_at_disk)
+
+    async def _turn(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        """Play the typical run when the replays are opened for the first time."""
+        if event.value == "Replay" and not self._has_played and self._standing.n_done:
+            await self._replay()
+
+    def _show_overview(self) -> None:
+        self._drive = Part(self._driven, self._show_driving)
+        self._drive.show()
+        self._finding = Part(lambda: self._watcher.rows, self._show_finding)
+        self._finding.show()
+        self._waiting = Part(self._waiting_for, self._show_waiting)
+        self._waiting.show()
+        self._gallery = ui.column().classes("lab-cards")
+        self._images: dict[str, _Image] = {}
+        self._n_drawn = 0
+        self._renew_figures()
+
+    # state
+
+    def _show_state(self, standing: Standing) -> None:
+        with ui.row().classes("lab-row"):
+            show_state(standing)
+            ui.label(standing.progress).props('role="status"')
+            show_control(self._lab, standing)
+            if standing.has_robot:
+                ui.button(
+                    "Open trials", on_click=lambda: ui.navigate.to(f"/study/{self._name}/trials")
+                ).props("outline no-caps")
+        if standing.word != "Complete":
+            share = standing.share
+            ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
+        if standing.message:
+            ui.label(standing.message).classes("lab-problem lab-lines")
+
+    def _job(self) -> StudyJob | None:
+        return self._lab.jobs.get(self._name)
+
+    def _driven(self) -> tuple[StudyJob, dict[str, Any]] | None:
+        """The trial that is being driven."""
+        job = self._job()
+        card = None if job is None or job.is_over else job.card
+        return None if job is None or card is None else (job, card)
+
+    async def _look(self) -> None:
+        await self._look_at_disk()
+        if self._opened.counts is not None:
+            await run.io_bound(self._opened.counts.look)
+        self._drive.look()
+        if self._asked and self._key in self._watcher.replays:
+            self._asked = False
+            self._stage.refresh()
+        self._live.look()
+        if self._report_stamp != (stamp := self._watcher.report_stamp):
+            self._report_stamp, self._is_writing = stamp, False
+            self._report.refresh()
+
+    async def _look_at_disk(self) -> None:
+        if self._is_looking:
+            return
+        self._is_looking = True
+        try:
+            found = await run.io_bound(self._read_disk)
+        finally:
+            self._is_looking = False
+        if found is None:
+            return
+        self._standing, has_report = found
+        self._state.look()
+        self._finding.look()
+        self._renew_figures()
+        if has_report != self._has_report:
+            self._has_report = has_report
+            self._report.refresh()
+
+    def _read_disk(self) -> tuple[Standing, bool]:
+        """Read the state of the study; ask for new figures if they are due."""
+        standing = self._lab.standing(self._name)
+        state = self._lab.studies.lately(self._name)
+        if state.n_done or state.n_driven_done:
+            done = (state.n_done, state.n_driven_done)
+            self._watcher.look(done, is_running=standing.word in ("Running", "In use"))
+        return standing, (self._lab.root / self._name / "report.html").is_file()
+
+    def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:
+        if driven is not None and self._opened.counts is not None:
+            Driving(*driven, self._opened.counts).show()
+
+    # finding and figures
+
+    def _show_finding(self, rows: list[dict[str, Any]]) -> None:
+        known = [row for row in rows if row["line_median"] is not None]
+        if not known:
+            return
+        known.sort(key=lambda row: -row["line_median"])
+        best = known[0]
+        n_missing = self._standing.n_runs - self._standing.n_done
+        so_far = " so far" if n_missing else ""
+        ui.label(
+            f"{best['condition']} has the highest median best coverage{so_far}: {_estimate(best)} "
+            f"({best['label']}, {best['n']} runs)."
+        ).classes("lab-finding")
+        with ui.expansion("Conditions", value=True).classes("lab-expansion"):
+            columns = [
+                {"name": key, "label": label, "field": key, "align": align, "sortable": True}
+                for key, label, align in (
+                    ("condition", "Condition", "left"),
+                    ("median", "Median best coverage", "left"),
+                    ("n", "Runs", "right"),
+                    ("label", "Label", "left"),
+                )
+            ]
+            shown = [{**row, "median": _estimate(row)} for row in known]
+            ui.table(rows=shown, columns=columns, row_key="condition").classes("lab-table").props(
+                "flat dense wrap-cells"
+            )
+            hint("Best coverage of a run, along the robot's path. Brackets: 95 % interval of the median.")
+
+    def _waiting_for(self) -> str | None:
+        """Why there are no figures; None once there are some."""
+        if self._drawn():
+            return None
+        standing = self._standing
+        n = standing.n_done + standing.n_driven_done
+        return f"Drawing figures for {n:,} runs…" if n else ""
+
+    def _drawn(self) -> list[str]:
+        """Names of the figures that can be shown."""
+        return [name for name, figure in list(self._watcher.figures.items()) if "text" not in figure]
+
+    def _show_waiting(self, reason: str | None) -> None:
+        if reason:
+            ui.label(reason).props('role="status"')
+            ui.skeleton().classes("lab-skeleton")
+        elif reason is not None:
+            ui.label("No runs yet. Figures appear when the first run finishes.")
+
+    def _renew_figures(self) -> None:
+        """Add new figures below those on the page, and have those load new drawings; nothing else moves."""
+        self._waiting.look()
+        is_new = self._n_drawn != self._watcher.n_drawn
+        self._n_drawn = self._watcher.n_drawn
+        for name in self._drawn():
+            if name not in self._images:
+                with self._gallery:
+                    self._images[name] = _Image(name, self._watcher.figures[name])
+                self._images[name].load(self._name, self._n_drawn)
+            elif is_new:
+                self._images[name].load(self._name, self._n_drawn)
+
+    # replays
+
+    def _show_replay(self) -> None:
+        self._form = form = Form()
+        form.summary()
+        names = self._opened.conditions
+        with ui.element("div").classes("lab-fields"):
+            form.choice("each", "Trials", _EACH, "")
+            form.choice("condition", "Condition", names, names[0])
+            for key, label in (
+                ("replicate", "Run"),
+                ("generation", "Generation"),
+                ("individual", "Individual"),
+            ):
+                form.number(key, label, None, 0, 2**31)
+        hint("If you don't choose a run, the run with the median best coverage is shown.")
+
+        def given(values: dict[str, Any]) -> dict[str, Any]:
+            keys = ("replicate", "generation", "individual")
+            return {key: values[key] for key in keys if values[key] is not None}
+
+        def ask(values: dict[str, Any]) -> None:
+            wish: dict[str, Any] = {"each": values["each"] or None, **given(values)}
+            if values["each"] != "condition":
+                wish["condition"] = values["condition"]
+            self._watcher.replay(self._key, **wish)
+
+        def drive(values: dict[str, Any]) -> None:
+            chosen = {"condition": values["condition"], "platform": values["platform"]}
+            self._lab.drive_live(self._name, {**chosen, **given(values)})
+
+        async def show() -> None:
+            self._has_played = self._asked = True
+            self._key = secrets.token_hex(8)  # what was asked for before comes too late
+            self._stage.refresh()
+            if not await form.submit(ask):
+                self._asked = False
+                self._stage.refresh()
+
+        self._replay = show
+        ui.button("Show trials", on_click=show).props("unelevated no-caps")
+        self._stage = ui.refreshable(self._show_stage)
+        self._stage()
+        section("Drive live")
+        with ui.element("div").classes("lab-form"):
+            form.text(
+                "platform",
+                "Platform",
+                options=self._platforms(),
+                explanation="For example sim, jyro, or twin:FILE. Default: the platform of the condition.",
+            )
+        ui.button("Drive live", on_click=lambda: form.submit(drive)).props("outline no-caps")
+        self._live = Part(self._live_state, self._show_live)
+        self._live.show()
+
+    def _platforms(self) -> list[str]:
+        """Platforms on which a network can be driven live; files are those in the lab's folder."""
+        return ["sim", "jyro", *emulated_robots(), *(f"twin:{name}" for name in self._opened.files)]
+
+    def _show_live(self, state: Any) -> None:
+        job = self._lab.lives.get(self._name)
+        if job is None:
+            return
+        LivePlayer(self._lab, job).show()
+        if not job.is_over:
+            ui.button("End drive", on_click=job.ask_to_end).props("flat no-caps")
+        elif job.scene is not None:
+            ui.label(job.outcome or "").classes("lab-problem" if job.is_failed else "lab-hint").props(
+                'role="status"'
+            )
+
+    def _live_state(self) -> Any:
+        job = self._lab.lives.get(self._name)
+        return None if job is None else (id(job), job.scene is None, job.is_over)
+
+    def _show_stage(self) -> None:
+        if self._asked:
+            ui.label("Computing the trials…").props('role="status"')
+            return
+        found = self._watcher.replays.get(self._key)
+        if found is None:
+            return
+        if "text" in found:
+            ui.label(found["text"]).classes("lab-problem").props('role="alert"')
+        else:
+            Player(found["scene"], found["trials"])
+
+    # report
+
+    def _show_reporting(self) -> None:
+        hint(
+            "The report is one HTML file with all tables and figures. It is written into the study's folder."
+        )
+        self._report = ui.refreshable(self._show_report)
+        self._report()
+
+    async def _write(self) -> None:
+        self._is_writing = True
+        self._report.refresh()
+        await attempt(self._watcher.write_report)
+
+    def _show_report(self) -> None:
+        ui.button("Write report", on_click=self._write).props("unelevated no-caps").set_enabled(
+            not self._is_writing
+        )
+        if self._is_writing:
+            ui.label("Writing the report…").props('role="status"')
+        if self._watcher.report_said:
+            ui.label(self._watcher.report_said).classes("lab-problem").props('role="alert"')
+        if self._has_report:
+            ui.link("Open report", f"/reports/{self._name}", new_tab=True)
+
+
+class _Image:
+    """A figure in its two widths, with its caption."""
+
+    def __init__(self, name: str, figure: dict[str, Any]) -> None:
+        self._name = name
+        section(_TITLES[name.partition("-")[0]])
+        with ui.element("picture").classes("lab-figure"):
+            self._narrow = ui.element("source").props('media="(max-width: 700px)"')
+            self._wide = ui.element("img")
+            self._wide.props["alt"] = figure["alt"]
+        self._caption = hint(figure["caption"])
+
+    def load(self, study: str, version: int) -> None:
+        """Load the drawing of this version."""
+        address = f"/figures/{study}/{self._name}"
+        self._narrow.props["srcset"] = f"{address}-narrow.svg?v={version}"
+        self._wide.props["src"] = f"{address}-wide.svg?v={version}"
+
+
+def _estimate(row: dict[str, Any]) -> str:
+    """The median with its interval, if there are enough runs for one."""
+    if row["line_low"] is None:
+        return f"{row['line_median']:.3f}"
+    return f"{row['line_median']:.3f} [{row['line_low']:.3f}, {row['line_high']:.3f}]"

@@ -1,0 +1,94 @@
+"""A study from an empty folder to its figures; mistakes in the form; addresses without a page. In a real browser."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from .conftest import OUTAGE, PHONE
+from .test_hand import wait_for
+
+pytestmark = pytest.mark.slow
+
+RECORD = """() => {
+  const seen = JSON.parse(sessionStorage.seen || "[]");
+  setInterval(() => {
+    const words = [...document.querySelectorAll(".lab-state")].map((it) => it.textContent);
+    const now = JSON.stringify([words, document.body.innerText.match(/[\\d,]+\\/[\\d,]+ runs/)?.[0] || "",
+      document.body.innerText.includes("No runs yet")]);
+    if (seen.at(-1) !== now) sessionStorage.seen = JSON.stringify([...seen, now]), seen.push(now);
+  }, 50);
+}"""
+"""Keep each combination of states, progress, and the text of a study without runs, looked for every 50 ms."""
+
+LAST = "novelty-80"
+
+
+def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
+    page = visit(forgive=OUTAGE)
+    page.context.add_init_script(f"addEventListener('DOMContentLoaded', {RECORD})")
+    page.get_by_text("No studies yet.").wait_for()
+    page.get_by_role("button", name="Run the paper's study").click()
+    page.wait_for_url("**/study/paper")
+    page.locator(".lab-state", has_text="Complete").wait_for()
+    page.get_by_text("has the highest median best coverage: 0.4").wait_for()
+    page.locator(".lab-figure img").first.wait_for()
+    seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
+    for words, progress, is_empty in seen:
+        assert len(words) <= 1, seen
+        assert words != ["Complete"] or (progress == "" and not is_empty), seen
+    assert [words for words, _, _ in seen if words == ["In use"]] == []
+    assert page.get_by_text(LAST).count()
+    page.locator(".lab-figure img").nth(4).wait_for()
+    wait_for(lambda: (lab.root / "paper" / "lab" / "figures.json").is_file())
+    lab.stop()
+    lab.start()
+    again = visit("study/paper", size=PHONE)  # from the folder: no process draws
+    again.locator(".lab-figure img").nth(4).wait_for()
+    assert str(lab.root) not in again.locator("body").inner_text()
+
+
+def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):
+    page = visit("new")
+    assert page.evaluate("document.documentElement.scrollHeight") <= 1600
+    name = page.get_by_label("Name", exact=True).first
+    name.fill("ui test!")
+    page.get_by_label("Runs per condition").fill("many")
+    page.wait_for_timeout(600)  # a field waits a moment for more letters
+    page.get_by_role("button", name="Start study").click()
+    summary = page.get_by_role("alert").filter(has_text="Runs per condition: Enter a whole number.")
+    summary.wait_for()
+    page.get_by_label("Runs per condition").fill("4")
+    page.wait_for_timeout(600)
+    page.get_by_role("button", name="Start study").click()
+    summary = page.get_by_role("alert").filter(has_text="You entered 'ui test!'.")
+    summary.wait_for()
+    page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
+    assert name.get_attribute("aria-invalid") == "true"
+    assert page.get_by_label("Runs per condition").get_attribute("aria-invalid") is None
+    about = page.locator(f"[id='{name.get_attribute('aria-describedby').split()[-1]}']")
+    assert "You entered 'ui test!'." in about.inner_text()
+    box = summary.bounding_box()
+    assert 0 <= box["y"] <= 900 - box["height"]
+    summary.get_by_role("link").click()
+    page.wait_for_function("id => document.activeElement.id === id", arg=name.get_attribute("id"))
+    assert str(lab.root) not in page.locator("body").inner_text()
+    assert list(lab.root.iterdir()) == []
+
+
+def test_addresses_without_a_page_lead_to_the_studies(lab, visit):
+    folder = lab.root / "paper"
+    folder.mkdir()
+    (folder / "study.json").write_text("{}")
+    page = visit("gap", forgive=["404"])
+    for path, text in (
+        ("nonsense", "There is no page here."),
+        ("study/papre", "There is no study named 'papre' in this folder."),
+        ("study/papre/trials", "There is no study named 'papre' in this folder."),
+    ):
+        assert page.goto(lab.address + path).status == 404
+        page.get_by_text(text).wait_for()
+        page.get_by_role("link", name="Robot").wait_for()
+        assert page.get_by_role("link", name="paper", exact=True).count() == path.count("papre")
+        assert str(lab.root) not in page.locator("body").inner_text()

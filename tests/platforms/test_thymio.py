@@ -20,7 +20,7 @@ from realitygap.robots import open_on
 from realitygap.robots.thymio import Thymio
 from realitygap.study import calibrate, connect_robot, drive_study, load_study
 from realitygap.trials import TrialPlan
-from realitygap.world import Arena, Obstacle, Pose, load_arena, paper_arena
+from realitygap.world import Arena, Obstacle, Pose, paper_arena
 from tests.commands import run_command
 
 SPEED = 8.0

@@ -35,8 +35,8 @@ MOTOR_S = 0.01
 LIFE_MARGIN_S = 0.2
 """Time for which a command outlives its step, so that the next one finds the motors running [s]."""
 EMULATED_MARGIN_S = 0.06
-"""The same in a playground, two of its steps [s]: there a robot that stands for a moment loses no speed, and if its time
-is faster than ours, a delay of this program would take it far."""
+"""The same in a playground, two of its steps [s]: a robot that stands for a moment loses no speed there, and a delay of
+this program would take it far if its time is faster than ours."""
 RENEW_S = 0.2
 """Time after which a long command is sent again [s]."""
 START_S = 2.0

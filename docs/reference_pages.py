@@ -25,7 +25,14 @@ from realitygap import myro
 from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
-from realitygap.platforms import EnkiPlatform, JyroPlatform, ScribblerPlatform, SimPlatform, TwinPlatform
+from realitygap.platforms import (
+    EnkiPlatform,
+    JyroPlatform,
+    ScribblerPlatform,
+    SimPlatform,
+    ThymioPlatform,
+    TwinPlatform,
+)
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.runs import Condition
 from realitygap.settings import is_hidden
@@ -65,6 +72,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[platform.sim]": SimPlatform,
     "[platform.twin]": TwinPlatform,
     "[platform.scribbler]": ScribblerPlatform,
+    "[platform.thymio]": ThymioPlatform,
     "[platform.enki]": EnkiPlatform,
     "[trials]": TrialsSection,
     "[report]": ReportSection,

@@ -25,7 +25,7 @@ class Witness(Protocol):
     """
 
     def now(self) -> float:
-        """The emulator's time [s], in which `path` is told."""
+        """Return the emulator's time [s], which is that of `path`."""
         ...
 
     def place(self, pose: Pose, seed: int) -> None:

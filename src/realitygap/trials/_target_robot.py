@@ -44,6 +44,8 @@ class PacedRobot(ClosedOnExit):
     def __init__(self, robot: Any, step_s: float, clock: Clock) -> None:
         self._robot, self._clock = robot, clock
         self._robot.step_s = 0.0  # it is waited here
+        if hasattr(robot, "lasts_s"):  # its motors stop by themselves after a command
+            robot.lasts_s = step_s
         self.label: Label = robot.label
         self.step_s = step_s
         self.n_sensors: int = robot.n_sensors

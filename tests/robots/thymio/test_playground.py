@@ -7,24 +7,26 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from realitygap.emulator import Playground, why_not
-from realitygap.errors import RobotError, RobotStopped
-from realitygap.robots import Command
+from realitygap.errors import RecordError, RobotError, RobotStopped
+from realitygap.robots import Command, RecordedRobot, read_recording
 from realitygap.robots.thymio import Thymio
 from realitygap.testing import check_robot
 from realitygap.trials import EndReason, run_trial
-from realitygap.world import Pose
+from realitygap.world import Pose, paper_arena
 
-pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")]
+SPEED = 8.0
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(why_not(SPEED)), reason=why_not(SPEED) or "-")]
 ROW = 0.3048
 
 
 @pytest.fixture(scope="module")
 def shared():
-    with Playground() as started:
+    with Playground(speed=SPEED) as started:
         yield started
 
 
@@ -50,20 +52,24 @@ def test_a_wall_ahead_is_read_as_enki_computes_it(playground):
         assert robot.observe().raw == pytest.approx((2419, 3424, 3704, 3424, 2418, 0, 0), abs=15)
 
 
-def test_commands_move_the_robot_as_far_as_they_say(playground):
-    with Thymio(playground.port, step_s=2.0) as robot:
+def test_commands_move_the_robot_as_far_as_they_say():
+    """At the speed of real time, because a delay of this program counts eight times at `SPEED`."""
+    with (
+        Playground(replace(paper_arena(), start=Pose(0.2, ROW, 0.0))) as playground,
+        Thymio(playground.port, step_s=2.0) as robot,
+    ):
         robot.drive(Command(1.0, 0.0))
         robot.stop()
-        ahead = playground.pose
-        assert ahead.x - 0.2 == pytest.approx(0.199, rel=0.05)
+        ahead = playground.pose()
+        assert ahead.x - 0.2 == pytest.approx(0.199, rel=0.1)
         robot.step_s = 1.0
         robot.drive(Command(0.0, 0.5))
         robot.stop()
-        assert playground.pose.heading - ahead.heading == pytest.approx(1.053, rel=0.08)
+        assert playground.pose().heading - ahead.heading == pytest.approx(1.053, rel=0.15)
         assert robot.sensors()["motor.left.target"] == (0,)
-        stands = playground.pose
+        stands = playground.pose()
         time.sleep(0.2)
-        assert playground.pose == stands
+        assert playground.pose() == stands
 
 
 def test_it_keeps_the_contract_of_a_robot(playground):
@@ -88,32 +94,43 @@ def test_the_button_ends_a_trial_until_the_robot_is_armed_again(playground):
 
 
 DRIVER = """
-import sys
-from realitygap.robots import Command
+import sys, time
+from realitygap.robots import Command, RecordedRobot, read_recording
 from realitygap.robots.thymio import Thymio
 with Thymio(sys.argv[1], step_s=0.1) as robot:
     print("driving", flush=True)
+    if sys.argv[2] == "long life":
+        robot.link.expect_motion()
+        robot.link.emit(0, (100, 300, 30_000))  # the program on board would stop it after ten minutes
+        time.sleep(60)
     while True:
         robot.drive(Command(0.3, 1.0))
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
-def test_the_robot_stands_when_its_program_is_ended(playground, number):
+@pytest.mark.parametrize(
+    ("number", "life"),
+    [
+        (signal.SIGSTOP, "short life"),  # by the program on board
+        (signal.SIGTERM, "short life"),  # by the driver
+        (signal.SIGKILL, "long life"),  # by the guardian
+    ],
+)
+def test_the_robot_stands_when_its_program_is_ended(playground, number, life):
     with subprocess.Popen(
-        [sys.executable, "-c", DRIVER, playground.port], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", DRIVER, playground.port, life], stdout=subprocess.PIPE, text=True
     ) as driver:
         try:
             assert driver.stdout.readline() == "driving\n"
-            time.sleep(0.5)
-            before = playground.pose
-            time.sleep(0.1)
-            assert playground.pose != before
+            time.sleep(0.3)
+            before = playground.pose()
+            time.sleep(0.05)
+            assert playground.pose() != before
             os.kill(driver.pid, number)
             time.sleep(0.6)
-            stands = playground.pose
-            time.sleep(0.3)
-            assert playground.pose == stands
+            stands = playground.pose()
+            time.sleep(0.1)
+            assert playground.pose() == stands
         finally:
             driver.kill()
 
@@ -121,23 +138,80 @@ def test_the_robot_stands_when_its_program_is_ended(playground, number):
 def test_resets_put_the_robot_where_they_say(playground):
     numbers = random.Random(2)
     with Thymio(playground.port) as robot:
-        for _ in range(5):
+        for _ in range(20):
             robot.drive(Command(0.0, 1.0))
             robot.stop()
-            time.sleep(0.1)
             pose = Pose(
                 numbers.uniform(0.2, 0.8), numbers.uniform(0.2, 0.4), numbers.uniform(-math.pi, math.pi)
             )
             playground.place(pose)
-            time.sleep(0.06)
-            assert playground.pose == pytest.approx(pose, abs=1e-5)
+            assert playground.pose() == pytest.approx(pose, abs=1e-6)
+            assert playground.path().shape == (1, 4)
+
+
+def test_a_driving_robot_cannot_be_placed(playground):
+    with Thymio(playground.port) as robot:
+        robot.link.emit(0, (300, 300, 3000))
+        with pytest.raises(RobotError, match="it is driving"):
+            playground.place(Pose(0.5, ROW, 0.0))
+
+
+def test_the_clock_is_that_of_the_simulated_robot(playground):
+    with Thymio(playground.port) as robot:
+        began, real = robot.clock.now(), time.monotonic()
+        robot.clock.sleep(4.0)
+        passed, took = robot.clock.now() - began, time.monotonic() - real
+        assert passed >= 4.0
+        assert took < 2.0  # 0.5 s on an idle machine
+        assert robot.clock.rate > 2.0
+
+
+def test_a_recording_is_played_back_as_it_was(playground, tmp_path):
+    file = tmp_path / "session.jsonl"
+    with Thymio(playground.port, record=file) as robot:
+        robot.reset()
+        seen = [robot.observe()]
+        robot.drive(Command(0.5, -0.25))
+        seen.append(robot.observe())
+        robot.stop()
+    recording = read_recording(file)
+    assert recording.header["robot"]["name"] == "thymio-II"
+    assert {line["name"] for line in recording.lines if line["kind"] == "wire"} == {"send", "receive"}
+    with RecordedRobot(recording) as again:
+        again.reset()
+        assert again.observe() == seen[0]
+        again.drive(Command(0.5, -0.25))
+        assert again.observe().raw == seen[1].raw
+    with pytest.raises(RecordError, match="is there already"):
+        Thymio(playground.port, record=file)
 
 
 def test_a_playground_that_ends_is_a_lost_link():
-    with Playground() as own, Thymio(own.port) as robot:
+    with Playground(speed=SPEED) as own:
+        robot = Thymio(own.port)
         os.kill(own.process_id, signal.SIGKILL)
-        began = time.monotonic()
         with pytest.raises(RobotError, match=r"lost|does not answer"):
-            robot.clock.sleep(10.0)
-        assert time.monotonic() - began < 2.5
-        robot.link.close()
+            robot.clock.sleep(100.0)
+        with pytest.raises(RobotError, match=r"lost|does not answer"):
+            robot.observe()
+        with pytest.raises(RobotError, match=r"lost|does not answer"):
+            robot.close()
+        assert not robot.link.is_open
+        with pytest.raises(RobotError, match=r"ended|does not answer"):
+            own.pose()
+
+
+def test_a_playground_ends_with_the_program_that_started_it():
+    program = "import time, realitygap.emulator as e; p = e.Playground(); print(p.process_id, flush=1); time.sleep(9)"
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as starter:
+        number = int(starter.stdout.readline())
+        os.kill(number, 0)
+        starter.kill()
+    until = time.monotonic() + 10
+    while time.monotonic() < until:
+        try:
+            os.kill(number, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.02)
+    raise AssertionError("the playground still runs")

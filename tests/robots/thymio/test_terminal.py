@@ -56,19 +56,19 @@ def test_a_port_that_cannot_be_opened_has_one_message(port, message):
         open_on(port)
 
 
-@pytest.mark.long
-@pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
+@pytest.mark.slow
+@pytest.mark.skipif(bool(why_not(8.0)), reason=why_not(8.0) or "-")
 def test_commands_work_on_a_playground():
     def run(*words):
         return CliRunner().invoke(robot, list(words))
 
-    with Playground() as playground:
+    with Playground(speed=8.0) as playground:
         port = f"thymio:{playground.port}"
         assert json.loads(run("info", port, "--json").stdout)["name"] == "thymio-II"
         assert len(json.loads(run("sense", port, "--json").stdout)["prox.horizontal"]) == 7
-        before = playground.pose
+        before = playground.pose()
         assert run("drive", port, "--seconds", "0.5", "--", "-0.5").exit_code == 0
-        assert playground.pose.x < before.x - 0.015
+        assert playground.pose().x < before.x - 0.015
         assert run("stop", port).stdout == "The motors are off.\n"
         assert "no reading of its battery" in str(run("battery", port).exception)
         assert "has no picture" in str(run("picture", port).exception)

@@ -11,6 +11,7 @@ from realitygap.calibration._tempering import sample_posterior
 from realitygap.world import Fitted, RobotModel
 
 from ._checks import Independence, independence, predictive_check
+from ._lorentz import LorentzReadings
 from ._mixture import MixtureReadings
 from ._pulses import PulseReadings
 from ._readings import Array, Placement, refuse_response
@@ -94,7 +95,7 @@ def fit_sensor(
     return SensorFit(
         name,
         tuple(_fitted(name, scale, places[:, k], values[:, k]) for k, scale in enumerate(model.scales))
-        + (() if model.places.battery_varied else (_unknown_battery(name),)),
+        + (() if model.places.battery_varied or sensor.response == "lorentz" else (_unknown_battery(name),)),
         {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
         {
             f"{name}.{scale.name}": values[chosen, k]
@@ -111,6 +112,8 @@ def _model(robot: RobotModel, number: int, placements: list[Placement], weight: 
     sensor = robot.range[number]
     if sensor.response == "pulses":
         return PulseReadings(placements, sensor.reach, sensor.pulses, weight, sensor)
+    if sensor.response == "lorentz":
+        return LorentzReadings(placements, sensor.reach, sensor.peak, sensor.cone, weight)
     return MixtureReadings(placements, sensor.reach, weight, sensor)
 
 

@@ -15,6 +15,8 @@ from realitygap.world import RangeSensor
 from ._readings import Array, Placement, Places, logistic
 from ._scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column, scaled
 
+Parts = tuple[Array, Array, Array, Array]
+
 STRAY = 1e-6
 """Probability of any reading, so that one that the model cannot make is unlikely and not impossible."""
 
@@ -106,7 +108,7 @@ class MixtureReadings:
         return np.asarray(np.expm1(c * readings) / c) if c else readings
 
     def _at(self, places: Places, values: Array) -> Array:
-        back, spread, drop, out = _parts(places, self.scales, values, self._incidence)
+        back, spread, drop, out = self.parts(places, values)
         edges = self._light(self._edges)
         below = special.ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
@@ -120,9 +122,7 @@ class MixtureReadings:
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
         """(m,) of (m, d) parameters, with a probability of any reading at all."""
         which, readings, counts = self._rows
-        back, spread, drop, out = (
-            part[:, which] for part in _parts(self.places, self.scales, values, self._incidence)
-        )
+        back, spread, drop, out = (part[:, which] for part in self.parts(self.places, values))
         half = self.step / 2
         upper = np.where(readings >= 1.0, np.inf, self._light(readings + half))
         lower = np.where(readings <= 0.0, -np.inf, self._light(readings - half))
@@ -133,6 +133,17 @@ class MixtureReadings:
         chance = (1.0 - stray) * chance + stray * self.step
         return np.asarray(self.weight * (np.log(chance) @ counts))
 
+    def parts(self, places: Places, values: Array) -> Parts:
+        """Return (m, p) each: response, standard deviation, and probability of nothing and of anything."""
+        amplitude, decay, gain = values[:, :3].T
+        per_volt = column(self.scales, values, BATTERY)
+        incidence = column(self.scales, values, INCIDENCE, self._incidence)
+        back, dim = places.response(amplitude, decay, per_volt, incidence)
+        spread = np.maximum(gain[:, None] * back, 1e-9)
+        drop = logistic(dim, *values[:, 3:6].T)
+        out = np.minimum(logistic(dim, *values[:, 6:9].T), 1.0 - drop)
+        return back, spread, drop, out
+
     def quantiles(
         self, values: Array, distances: Array, cosines: Array, shares: Array
     ) -> tuple[Array, Array]:
@@ -142,20 +153,6 @@ class MixtureReadings:
         summed = np.cumsum(chances, axis=1)
         place = np.array([(summed < share).sum(axis=1) for share in shares])
         return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
-
-
-def _parts(
-    places: Places, scales: tuple[Scale, ...], values: Array, own_incidence: float
-) -> tuple[Array, Array, Array, Array]:
-    """(m, p) each: response, standard deviation, and probability of nothing and of anything."""
-    amplitude, decay, gain = values[:, :3].T
-    per_volt = column(scales, values, BATTERY)
-    incidence = column(scales, values, INCIDENCE, own_incidence)
-    back, dim = places.response(amplitude, decay, per_volt, incidence)
-    spread = np.maximum(gain[:, None] * back, 1e-9)
-    drop = logistic(dim, *values[:, 3:6].T)
-    out = np.minimum(logistic(dim, *values[:, 6:9].T), 1.0 - drop)
-    return back, spread, drop, out
 
 
 def _inner_edges(step: float) -> Array:

@@ -28,10 +28,10 @@ def refuse_response(robot: RobotModel, number: int, response: str) -> None:
     Raises:
         ValueError: It is another.
     """
-    if response not in ("ir", "pulses"):
+    if response not in ("ir", "pulses", "lorentz"):
         raise ValueError(
-            f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir or pulses: of others "
-            "there is no noise to fit."
+            f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir, pulses or lorentz: of "
+            "others there is no noise to fit."
         )
 
 

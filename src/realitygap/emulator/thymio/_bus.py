@@ -16,7 +16,8 @@ from realitygap.errors import RobotError
 
 ANSWER_S = 5.0
 _CALL, _RETURN, _ERROR = 1, 2, 3
-_PATH, _INTERFACE, _MEMBER, _REPLY_TO, _DESTINATION, _SIGNATURE = 1, 2, 3, 5, 6, 8
+_PATH, _INTERFACE, _MEMBER, _ERROR_NAME, _REPLY_TO, _DESTINATION, _SIGNATURE = 1, 2, 3, 4, 5, 6, 8
+_GONE = "org.freedesktop.DBus.Error.ServiceUnknown"
 _NUMBERS = {"y": "B", "b": "I", "n": "h", "q": "H", "i": "i", "u": "I", "x": "q", "t": "Q", "d": "d"}
 _EIGHT = "xtd({"
 """First letters of the types that begin at a multiple of eight bytes."""
@@ -93,15 +94,17 @@ class Bus:
                 fields[_SIGNATURE] = ("g", signature)
             self._socket.sendall(_message(self._serial, fields, _encoded(signature, values)))
             while True:
-                kind, answered, body = self._next()
-                if answered == self._serial:
+                kind, answer, body = self._next()
+                if answer.get(_REPLY_TO) == self._serial:
                     break
         if kind == _ERROR:
+            if answer.get(_ERROR_NAME) == _GONE:
+                raise RobotError("The playground has ended.")
             raise RobotError(f"The playground cannot do {member}: {body[0] if body else 'no reason given'}.")
         return body
 
-    def _next(self) -> tuple[int, int | None, list[Any]]:
-        """The next message: its kind, the number of the call that it answers, and its values."""
+    def _next(self) -> tuple[int, dict[int, Any], list[Any]]:
+        """The next message: its kind, the fields of its header, and its values."""
         head = self._exactly(16)
         order, kind, _, _, body_size, _ = _HEADER.unpack_from(head)
         if order != b"l":
@@ -111,7 +114,7 @@ class Bus:
         fields = dict(_Reader(head[12:16] + rest, 0, base=12).read("a(yv)"))
         signature = str(fields.get(_SIGNATURE, ""))
         reader = _Reader(rest[_padded(fields_size, 8) :], 0)
-        return kind, fields.get(_REPLY_TO), [reader.read(each) for each in _split(signature)]
+        return kind, fields, [reader.read(each) for each in _split(signature)]
 
     def _exactly(self, size: int) -> bytes:
         data = self._file.read(size)

@@ -33,7 +33,10 @@ UNIT_M_S = 0.00033
 MOTOR_S = 0.01
 """Time between two `motor` events [s]; source: Aseba, `thymio-api`."""
 LIFE_MARGIN_S = 0.2
-"""Time for which a command outlives its step, so that the next one finds the motors running [real s]."""
+"""Time for which a command outlives its step, so that the next one finds the motors running [s]."""
+EMULATED_MARGIN_S = 0.06
+"""The same in a playground, two of its steps [s]: a robot that stands for a moment loses no speed there, and a delay of
+this program would take it far if its time is faster than ours."""
 RENEW_S = 0.2
 """Time after which a long command is sent again [s]."""
 START_S = 2.0
@@ -112,6 +115,8 @@ class Thymio:
     """
 
     n_sensors = 7
+    lasts_s = 0.0
+    """Least time for which a command has to last, where somebody else waits for its end [s]."""
     platform: Any = None
     """The platform that opened it, for figures."""
 
@@ -291,6 +296,7 @@ class Thymio:
             _stop(self.link, self.description)
             halted = self.description.first_free + OWN.index("halted")
             self.link.write(self.description, halted, (0,))
+            self._read()
         self._stall = StallRule()
 
     def observe(self) -> Observation:
@@ -328,7 +334,7 @@ class Thymio:
     def drive(self, command: Command) -> None:
         """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
 
-        The robot drives on until the next command, or for 0.2 s.
+        The robot drives on until the next command, or for 0.2 s; in a playground for 0.06 s.
 
         Raises:
             RobotError: The link is lost.
@@ -360,18 +366,19 @@ class Thymio:
     def _send_wheels(self, move: float, turn: float, seconds: float) -> None:
         """Send a command with a life of so much time [s], and a margin."""
         wheels = [round(self.full_speed * min(max(part, -1.0), 1.0)) for part in (move - turn, move + turn)]
-        margin = LIFE_MARGIN_S * max(self.clock.rate, 1.0)  # where its time is faster, ours is scarcer
-        self.link.emit(DRIVE, (*wheels, min(round((seconds + margin) / TICK_S), MOST_LIFE)))
+        margin = LIFE_MARGIN_S if self.label == "REAL" else EMULATED_MARGIN_S
+        life = round((max(seconds, self.lasts_s) + margin) / TICK_S)
+        self.link.emit(DRIVE, (*wheels, min(life, MOST_LIFE)))
 
     def motors(self, left: float, right: float) -> None:
-        """Turn the wheels, each -1 (full back) to 1 (full ahead), until the next command, or for 0.4 s.
+        """Turn the wheels, each -1 (full back) to 1 (full ahead), until the next command, or for 0.4 s at most.
 
         Raises:
             RobotError: The link is lost.
         """
         move, turn = check_command(Command((left + right) / 2, (right - left) / 2))
         self.link.expect_motion()
-        self._send_wheels(move, turn, RENEW_S)
+        self._send_wheels(move, turn, RENEW_S * max(self.clock.rate, 1.0))
 
     def line(self) -> tuple[int, ...]:
         """Return the raw readings of the ground sensors, left and right."""

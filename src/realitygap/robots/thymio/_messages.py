@@ -88,6 +88,11 @@ class Decoder:
         """Drop the bytes of an unfinished message."""
         self._held.clear()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no byte waits for the rest of its message."""
+        return not self._held
+
     def next(self) -> Message | None:
         """Return the next whole message, or None if more bytes are needed.
 

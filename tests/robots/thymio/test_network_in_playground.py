@@ -1,5 +1,8 @@
 """Networks that drive a Thymio of Aseba's playground without a computer, and the same networks at the host."""
 
+import os
+import shutil
+import subprocess
 import time
 
 import numpy as np
@@ -92,3 +95,36 @@ def compare(network, fixed, seen):
     # what a recurrent network remembers adds up
     assert np.median(differences) < 0.001
     assert fixed.is_recurrent or max(differences) < 0.005
+
+
+@pytest.mark.skipif(shutil.which("asebamassloader") is None, reason="needs asebamassloader")
+def test_asebas_own_loader_takes_the_file_and_the_button_starts_and_stops(folder):
+    """The loader needs a locale that may be missing."""
+    aseba.built(folder)
+    file = folder / "network.aesl"
+    network = evolved(KINDS[1], bias=False)[1].network()
+    file.write_text(to_aseba(network, INTERFACE))
+    with Playground(start=Pose(0.5, 0.3, 0.1)) as playground:
+        host, port = playground.port.removeprefix("socket://").split(":")
+        done = subprocess.run(
+            ["asebamassloader", "--once", file, f"tcp:host={host};port={port}"],
+            env={**os.environ, "LOCPATH": str(folder)},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert "bytecodes loaded to target thymio-II" in done.stdout
+        link = Link(open_port(playground.port), playground.port)
+        try:
+            robot = link.find()
+            stands = playground.pose
+            playground.press(2)
+            time.sleep(1.0)
+            assert playground.pose != stands
+            playground.press(2, False)
+            playground.press(2)
+            time.sleep(0.2)
+            assert link.read(robot, robot.offsets["motor.left.target"], 2) == (0, 0)
+        finally:
+            link.close()

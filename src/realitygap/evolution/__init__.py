@@ -2,7 +2,7 @@
 
 from ._archive import NoveltyArchive
 from ._archive_members import Member, archive_members
-from ._aseba import to_aseba
+from ._aseba import aseba_error, to_aseba
 from ._c import to_c
 from ._distances import (
     DISTANCES,
@@ -64,6 +64,7 @@ __all__ = [
     "Population",
     "Sense",
     "archive_members",
+    "aseba_error",
     "behavior_distance",
     "decode_all",
     "distance_kind",

@@ -41,6 +41,8 @@ GROUND_MAX = 1023
 """Largest reading of a ground sensor."""
 N_TRIED = 1000
 """Random sets of inputs from which the error in a program is."""
+LEAST_SHOWN = 1e-6
+"""Errors below it are shown as this one."""
 _N_RANGE, _N_LINE = 7, 2
 _SMALL = range(-0x800, 0x800)
 """Numbers that one word of bytecode pushes; larger ones need two."""
@@ -180,8 +182,19 @@ def to_aseba(
             f"{n_variables:,} of variables, expected at most {MOST_WORDS:,} and {MOST_VARIABLES:,}. Export a smaller "
             "one, or evolve with a smaller `add_node` and `add_link`."
         )
-    head = _head(network, fixed, interface, steps, code.n_words, origin or {})
+    head = _head(network, fixed.n_nodes, interface, steps, code.n_words, origin or {})
     return _FRAME.format(text=escape("\n".join((*head, *code.lines, ""))))
+
+
+def aseba_error(network: Network, interface: ControllerInterface) -> tuple[float, float]:
+    """Return how far outputs in 16-bit integers are from those of the network: the largest and the median difference.
+
+    It is that of 1,000 steps with random inputs; outputs are limited to -1..1.
+
+    Raises:
+        ValueError: The network has no bound in 16 bits.
+    """
+    return errors(network, fixed_point(network), _tried(interface.sensed))
 
 
 def _check_inputs(sensed: Sequence[str]) -> None:
@@ -196,14 +209,14 @@ def _check_inputs(sensed: Sequence[str]) -> None:
 
 def _head(
     network: Network,
-    fixed: FixedNetwork,
+    n_nodes: int,
     interface: ControllerInterface,
     steps: int,
     n_words: int,
     origin: Mapping[str, object],
 ) -> list[str]:
     """Return the comment at the top."""
-    largest, median = errors(network, fixed, _tried(interface.sensed, steps))
+    largest, median = aseba_error(network, interface)
     facts = [f"# {key}: {json.dumps(value)}." for key, value in origin.items()]
     ends = f" It stops by itself after {steps} steps." if "time" in interface.sensed else ""
     return [
@@ -211,16 +224,16 @@ def _head(
         *facts,
         "#",
         f"# The center button starts and stops the robot.{ends}",
-        f"# nodes[0..{fixed.n_nodes - 1}]: inputs, outputs, hidden nodes. {ONE} is 1.",
+        f"# nodes[0..{n_nodes - 1}]: inputs, outputs, hidden nodes. {ONE} is 1.",
         f"# Inputs: {', '.join(interface.sensed)}.",
         f"# Outputs: {', '.join(interface.outputs)}.",
-        f"# In {N_TRIED:,} steps with random inputs, outputs differ from the network's by at most {largest:.2g};",
-        f"# half of them by less than {median:.2g}. The program has {n_words:,} words of bytecode.",
+        f"# In {N_TRIED:,} steps with random inputs, outputs differ from the network's by at most {largest:.1g};",
+        f"# half of them by less than {max(median, LEAST_SHOWN):.1g}. The program has {n_words:,} words of bytecode.",
         "",
     ]
 
 
-def _tried(sensed: Sequence[str], steps: int) -> list[list[int]]:
+def _tried(sensed: Sequence[str]) -> list[list[int]]:
     """Return random inputs as integers."""
     rng = np.random.default_rng(0)
     low = [-ONE if name.startswith("last_") else 0 for name in sensed]

@@ -128,7 +128,7 @@ def tangent(total: int) -> int:
 
 
 def to_one(value: int, bits: int) -> int:
-    """Return a value with so many bits after its point as a share of `ONE`, limited to -`ONE` and `ONE`."""
+    """Return a value with `bits` bits after its point as a share of `ONE`, limited to -`ONE` and `ONE`."""
     if bits < 0:
         return max(min(value, 1), -1) * ONE
     limit = 1 << bits

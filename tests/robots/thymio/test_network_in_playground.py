@@ -1,17 +1,21 @@
 """Networks that drive a Thymio of Aseba's playground without a computer, and the same networks at the host."""
 
+import os
+import shutil
+import subprocess
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from realitygap.platforms.thymio._playground import Playground, why_not
 
+from realitygap.emulator import Playground, why_not
 from realitygap.evolution import ControllerInterface, Network, to_aseba
 from realitygap.evolution._fixed_point import ONE, fixed_point
 from realitygap.robots.thymio import _messages as messages
 from realitygap.robots.thymio._link import Link, open_port
 from realitygap.robots.thymio._messages import Kind
-from realitygap.world import Pose
+from realitygap.world import Pose, paper_arena
 
 from ...evolution.test_export import KINDS, evolved
 from . import aseba
@@ -19,6 +23,7 @@ from . import aseba
 REASON = why_not() or aseba.why_not()
 pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(REASON), reason=REASON or "-")]
 INTERFACE = ControllerInterface(("range.1", "range.2", "range.3"), ("left", "right"))
+ARENA = replace(paper_arena(), start=Pose(0.5, 0.3, 0.1))
 N_STEPS = 60
 STEP_S = 0.1
 
@@ -32,7 +37,7 @@ def folder(tmp_path_factory):
 def test_the_robot_computes_each_step_as_the_network_does(changes, folder):
     network = evolved(changes, bias=False)[1].network()
     fixed = fixed_point(network)
-    with Playground(start=Pose(0.5, 0.3, 0.1)) as playground:
+    with Playground(ARENA) as playground:
         port = open_port(playground.port)
         link = Link(port, playground.port)
         try:
@@ -46,18 +51,18 @@ def test_the_robot_computes_each_step_as_the_network_does(changes, folder):
             port.write(messages.control(Kind.RESET, robot.node))
             port.write(messages.control(Kind.RUN, robot.node))
             time.sleep(0.3)
-            stands = playground.pose
-            assert not any(link.read(robot, robot.first_free, 1 + fixed.n_nodes))
+            stands = playground.pose()
+            assert not any(link.read(robot, (robot.first_free, 1 + fixed.n_nodes))[0])
             playground.press(2)
             seen = watched(link, robot, fixed)
-            assert playground.pose != stands
+            assert playground.pose() != stands
             playground.press(2, False)
             playground.press(2)
             time.sleep(0.1)
-            assert link.read(robot, robot.offsets["motor.left.target"], 2) == (0, 0)
-            stands = playground.pose
+            assert link.read(robot, (robot.offsets["motor.left.target"], 2)) == [(0, 0)]
+            stands = playground.pose()
             time.sleep(0.3)
-            assert playground.pose == stands
+            assert playground.pose() == stands
         finally:
             link.close()
     compare(network, fixed, seen)
@@ -68,7 +73,7 @@ def watched(link, robot, fixed):
     n_read = 1 + fixed.n_nodes * (1 + fixed.is_recurrent)
     seen, until = {}, time.monotonic() + N_STEPS * STEP_S
     while time.monotonic() < until:
-        done, *values = link.read(robot, robot.first_free, n_read)
+        ((done, *values),) = link.read(robot, (robot.first_free, n_read))
         if done:
             assert seen.setdefault(done, values) == values
     assert len(seen) > N_STEPS / 2
@@ -92,3 +97,36 @@ def compare(network, fixed, seen):
     # what a recurrent network remembers adds up
     assert np.median(differences) < 0.001
     assert fixed.is_recurrent or max(differences) < 0.005
+
+
+@pytest.mark.skipif(shutil.which("asebamassloader") is None, reason="needs asebamassloader")
+def test_asebas_own_loader_takes_the_file_and_the_button_starts_and_stops(folder):
+    """The loader needs a locale that may be missing."""
+    aseba.built(folder)
+    file = folder / "network.aesl"
+    network = evolved(KINDS[1], bias=False)[1].network()
+    file.write_text(to_aseba(network, INTERFACE))
+    with Playground(ARENA) as playground:
+        host, port = playground.port.removeprefix("socket://").split(":")
+        done = subprocess.run(
+            ["asebamassloader", "--once", file, f"tcp:host={host};port={port}"],
+            env={**os.environ, "LOCPATH": str(folder)},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert "bytecodes loaded to target thymio-II" in done.stderr
+        link = Link(open_port(playground.port), playground.port)
+        try:
+            robot = link.find()
+            stands = playground.pose()
+            playground.press(2)
+            time.sleep(1.0)
+            assert playground.pose() != stands
+            playground.press(2, False)
+            playground.press(2)
+            time.sleep(0.2)
+            assert link.read(robot, (robot.offsets["motor.left.target"], 2)) == [(0, 0)]
+        finally:
+            link.close()

@@ -97,6 +97,11 @@ class Decoder:
         length: int = _HEADER.unpack_from(self._held)[0]
         return max(_HEADER.size + min(length, MOST_PAYLOAD) - held, 1)
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no byte waits for the rest of its message."""
+        return not self._held
+
     def next(self) -> Message | None:
         """Return the next whole message, or None if more bytes are needed.
 

@@ -4,13 +4,16 @@ Neither the firmware nor Aseba's playground stops the motors when the host is go
 on board in ticks of 20 ms. In Aseba's notation:
 
     timer.period[0] = 20
-    onevent drive                  # user event 0: left, right, life
-      if halted == 0 then
-        motor.left.target = event.args[0]  motor.right.target = event.args[1]  life = event.args[2]
+    onevent drive                  # user event 0: left, right, life, check
+      if event.args[0] + event.args[1] + event.args[2] + 1234 == event.args[3] then
+        if halted == 0 then
+          motor.left.target = event.args[0]  motor.right.target = event.args[1]  life = event.args[2]
+        end
       end
     onevent timer0
       clock = clock + 1
-      if life > 0 then life = life - 1  if life == 0 then motor.left.target = 0  motor.right.target = 0 end end
+      if life > 0 then life = life - 1 end
+      if life == 0 then motor.left.target = 0  motor.right.target = 0 end
     onevent button.center
       halted = 1  motor.left.target = 0  motor.right.target = 0
     onevent tap
@@ -28,7 +31,9 @@ from collections.abc import Mapping, Sequence
 from realitygap.errors import RobotError
 
 DRIVE = 0
-"""User event that sets both motors, for a life in ticks."""
+"""User event that sets both motors, for a life in ticks; its last value is the sum of the others and `CHECK`."""
+CHECK = 1234
+"""What the sum of a command's values begins with; a command that is moved by a byte has another sum."""
 TICK_S = 0.02
 """Duration of a tick of the program's clock [s]."""
 OWN = ("life", "halted", "taps", "left_sum", "right_sum", "clock")
@@ -42,6 +47,11 @@ NEEDED_VARIABLES = (
 )
 _ADD, _SUBTRACT, _EQUAL, _GREATER = 0x2, 0x3, 0xA, 0xC
 _STOP = 0x0000
+
+
+def with_sum(values: Sequence[int]) -> tuple[int, ...]:
+    """Return the values of a user event with the sum of 16 bits that the program on board expects after them."""
+    return (*values, (CHECK + sum(values) + 0x8000) % 0x10000 - 0x8000)
 
 
 def assemble(handlers: Sequence[tuple[int, Sequence[int]]]) -> list[int]:
@@ -73,7 +83,7 @@ def safety_program(offsets: Mapping[str, int], events: Sequence[str], first_free
     left, right, args = offsets["motor.left.target"], offsets["motor.right.target"], offsets["event.args"]
     halt = _put(0, left) + _put(0, right)
     take = _copy(args, left) + _copy(args + 1, right) + _copy(args + 2, life)
-    count_down = _change(life, _SUBTRACT) + _only_if(life, _EQUAL, halt)
+    count_down = _only_if(life, _GREATER, _change(life, _SUBTRACT)) + _only_if(life, _EQUAL, halt)
     sums = _increase(left_sum, offsets["motor.left.speed"]) + _increase(
         right_sum, offsets["motor.right.speed"]
     )
@@ -85,8 +95,8 @@ def safety_program(offsets: Mapping[str, int], events: Sequence[str], first_free
     return assemble(
         [
             (INIT_EVENT, zeros + _put(round(TICK_S * 1000), offsets["timer.period"]) + halt),
-            (DRIVE, _only_if(halted, _EQUAL, take)),
-            (local("timer0"), _change(clock, _ADD) + _only_if(life, _GREATER, count_down)),
+            (DRIVE, _only_if_sum(args, _only_if(halted, _EQUAL, take))),
+            (local("timer0"), _change(clock, _ADD) + count_down),
             (local("button.center"), _put(1, halted) + halt),
             (local("tap"), _change(taps, _ADD)),
             (local("motor"), sums),
@@ -127,3 +137,11 @@ def _increase(offset: int, by: int) -> list[int]:
 def _only_if(offset: int, comparison: int, body: Sequence[int]) -> list[int]:
     """The words that run a body if a variable compares with 0; the distance counts from the branch."""
     return [_load(offset), _push(0), 0xA000 | comparison, len(body) + 2, *body]
+
+
+def _only_if_sum(args: int, body: Sequence[int]) -> list[int]:
+    """The words that run a body if three variables and the constant add up to the fourth."""
+    total = [_push(CHECK)]
+    for k in range(3):
+        total += [_load(args + k), 0x8000 | _ADD]
+    return [*total, _load(args + 3), 0xA000 | _EQUAL, len(body) + 2, *body]

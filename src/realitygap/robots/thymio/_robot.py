@@ -21,7 +21,7 @@ from ._clock import BoardClock
 from ._link import Description, Link, open_port
 from ._messages import set_variables, user_event
 from ._ports import label_of, port_name
-from ._program import DRIVE, OWN, TICK_S
+from ._program import DRIVE, OWN, TICK_S, with_sum
 from ._stall import StallRule
 
 FULL_SCALE = 4505.0
@@ -439,7 +439,7 @@ class Thymio:
 def _stop_messages(robot: Description) -> bytes:
     """The messages that end the life of the last command and set both targets to 0."""
     off = [set_variables(robot.node, robot.variables[name][0], (0,)) for name in _TARGETS]
-    return user_event(DRIVE, (0, 0, 1)) + b"".join(off)
+    return user_event(DRIVE, with_sum((0, 0, 1))) + b"".join(off)
 
 
 def _stop(link: Link, robot: Description) -> None:

@@ -16,6 +16,8 @@ UNREAD_S = 0.25
 """Robot time for which the clock runs on without a reading while somebody waits [s]."""
 PAUSE_S = 1.0
 """Time without a reading after which the clock's origin may move, so that it need not stand [s]."""
+SHORTEST_S = 1e-6
+"""Time that is too short to wait for: rounding may hide that it passed [s]."""
 RATE_S = 2.0
 """Time over which the rate is measured [s]."""
 
@@ -86,7 +88,7 @@ class BoardClock:
             RobotError: The robot does not answer, or its clock stands still.
         """
         until = self.now() + seconds
-        while (left := until - self.now()) > 0:
+        while (left := until - self.now()) > SHORTEST_S:
             if self.unread_s >= UNREAD_S:
                 self._read()
                 continue

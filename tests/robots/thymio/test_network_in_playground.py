@@ -114,7 +114,7 @@ def test_asebas_own_loader_takes_the_file_and_the_button_starts_and_stops(folder
             timeout=60,
             check=False,
         )
-        assert "bytecodes loaded to target thymio-II" in done.stdout
+        assert "bytecodes loaded to target thymio-II" in done.stderr
         link = Link(open_port(playground.port), playground.port)
         try:
             robot = link.find()

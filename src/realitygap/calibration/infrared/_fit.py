@@ -91,7 +91,7 @@ def fit_sensor(
     chosen = rng.choice(len(values), n_draws, replace=n_draws > len(values))
     name = f"range.{number}"
     centers = {scale.name: scale.center(values[:, k]) for k, scale in enumerate(model.scales)}
-    is_own = {scale.name: scale is not BATTERY for scale in model.scales}
+    is_own = {scale.name: scale.name != BATTERY.name for scale in model.scales}
     return SensorFit(
         name,
         tuple(_fitted(name, scale, places[:, k], values[:, k]) for k, scale in enumerate(model.scales))

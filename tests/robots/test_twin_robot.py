@@ -204,6 +204,15 @@ def test_a_wheel_stands_in_its_dead_band():
     assert driven([(0.3, 0.0)] * 4, motors={"dead_band_left": 0.2}).pose.x > 0.08
 
 
+def test_wheel_with_soft_dead_band_starts_from_zero_beyond_it():
+    """Without steps of speed: 0.325 of full speed is (0.325 - 0.1) / 0.9, a quarter, with a dead band of 0.1."""
+    plain, both = {"stepped": False}, {"soft_dead_band_left": 0.1, "soft_dead_band_right": 0.1}
+    soft = driven([(0.325, 0.0)] * 4, motors={**plain, **both}).pose.x
+    assert soft == pytest.approx(driven([(0.25, 0.0)] * 4, motors=plain).pose.x, rel=0.02)
+    assert abs(driven([(-0.09, 0.0)] * 4, motors={**plain, **both}).pose.x) < 1e-4
+    assert turned(driven([(0.2, 0.0)] * 4, motors={**plain, "soft_dead_band_left": 0.1})) > 0.1
+
+
 def test_gains_bend_the_way():
     robot = driven(AHEAD, motors={"gain_left": 0.9})
     assert robot.wheels == pytest.approx([0.9 * 0.45, 0.45], rel=0.01)

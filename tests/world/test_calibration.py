@@ -134,3 +134,19 @@ def test_a_robot_whose_commands_lasted_longer_has_steps_of_that_length(tmp_path)
     assert load_robot(file).step_s == 0.83
     assert SimPlatform(robot=load_calibration(file)).command_s == 0.83
     assert load_robot("scribbler-s2-fluke2").step_s == 0.5
+
+
+def test_estimate_at_the_end_of_its_prior_is_not_identified():
+    """Once an e-puck's decay of 10 mm passed for 30.06 mm, identified: the least that was thought possible."""
+    decay = {"name": "range.0.decay", "prior_low": 0.03, "prior_high": 0.8, "identified": True, "unit": "m"}
+    bound = Fitted(estimate=0.03006, low=0.030003, high=0.0302, **decay)
+    assert not bound.identified
+    assert "The prior binds: the estimate is at an end of 0.03 to 0.8 m" in bound.advice
+    assert not Fitted(estimate=0.79, low=0.77, high=0.7999, **decay).identified
+    assert Fitted(estimate=0.0305, low=0.0303, high=0.0307, **decay).identified
+    assert Fitted(
+        estimate=0.02, low=0.01, high=0.025, **decay
+    ).identified  # a fit that its prior does not cut
+    share = {"name": "range.0.drop_most", "prior_low": 0.0, "prior_high": 1.0, "identified": True}
+    assert Fitted(estimate=0.99, low=0.96, high=0.9999, **share).identified  # nothing is beyond 1
+    assert Fitted(estimate=0.001, low=0.0, high=0.01, **share).identified

@@ -22,6 +22,12 @@ IDENTIFIED = 0.35
 """A parameter is identified if its standard deviation is below this, in scales of its prior: half of what the prior has
 at its peak."""
 
+WIDE = 0.05
+"""Distance over which a curvature is taken, in the same scales."""
+
+FREE = 0.01
+"""Weight of the prior in a first search, in which the log alone decides what it can tell."""
+
 LEAST_CURVATURE = 0.03
 """Of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
 
@@ -284,10 +290,11 @@ class _Problem:
         values["drive.gain_right"] = values["drive.gain"] - values["drive.asymmetry"] / 2
         return values
 
-    def log_posterior(self, standard: Floats) -> Floats:
-        """Return (m,) of (m, p) points."""
+    def log_posterior(self, standard: Floats, weight: float = 1.0) -> Floats:
+        """Return (m,) of (m, p) points, with a weight of the prior."""
         values = self.values(standard)
-        logs = np.sum([one.log_prior(standard[:, k]) for k, one in enumerate(self.free)], axis=0)
+        priors = [one.log_prior(standard[:, k]) for k, one in enumerate(self.free)]
+        logs = weight * np.sum(priors, axis=0)
         steps = wheel_steps(self.log, values)
         if self.log.sees_poses:
             logs = logs + track(self.log, steps, values, _noise(values)).log_likelihood
@@ -295,29 +302,43 @@ class _Problem:
             logs = logs + encoder_likelihood(self.log, steps, _noise(values))
         return np.asarray(logs)
 
+    def down(self, point: Floats, weight: float = 1.0) -> tuple[float, Floats]:
+        """Return the negative log posterior at a point (p,), and its slope."""
+        p = len(point)
+        ends = np.concatenate([point[None], point + STEP * np.eye(p), point - STEP * np.eye(p)])
+        with np.errstate(over="ignore", invalid="ignore"):
+            logs = self.log_posterior(ends, weight)
+        if not np.isfinite(
+            logs
+        ).all():  # a step of the search that went beyond all numbers: back to the middle
+            return BEYOND, point
+        return -float(logs[0]), -(logs[1 : p + 1] - logs[p + 1 :]) / (2 * STEP)
+
     def solve(self) -> tuple[Floats, Floats]:
-        """Return the point of greatest posterior, (p,), and the covariance there, (p, p)."""
-        from scipy.optimize import minimize
+        """Return the point of greatest posterior, (p,), and the covariance there, (p, p).
 
-        p = len(self.free)
-
-        def down(point: Floats) -> tuple[float, Floats]:
-            ends = np.concatenate([point[None], point + STEP * np.eye(p), point - STEP * np.eye(p)])
-            with np.errstate(over="ignore", invalid="ignore"):
-                logs = self.log_posterior(ends)
-            if not np.isfinite(logs).all():  # a step of the search that went beyond all numbers: back to the middle
-                return BEYOND, point
-            return -float(logs[0]), -(logs[1 : p + 1] - logs[p + 1 :]) / (2 * STEP)
-
-        first = np.zeros(p)
+        With a prior of long tails there may be two peaks, one at the robot's own numbers and one where the log is met
+        best: the search starts at both.
+        """
+        first = np.zeros(len(self.free))
         first[[one.kind == "size" for one in self.free]] = 0.1
-        best = np.asarray(minimize(down, first, jac=True, method="BFGS", options={"gtol": 1e-3}).x)
-        wide = 0.05
+        free, _ = self._search(first, FREE)
+        best = min((self._search(start, 1.0) for start in (first, free)), key=lambda found: found[1])[0]
         slopes = np.array(
-            [(down(best + wide * row)[1] - down(best - wide * row)[1]) / (2 * wide) for row in np.eye(p)]
+            [
+                (self.down(best + WIDE * row)[1] - self.down(best - WIDE * row)[1]) / (2 * WIDE)
+                for row in np.eye(len(best))
+            ]
         )
         sizes, directions = np.linalg.eigh((slopes + slopes.T) / 2)
         return best, (directions / np.maximum(sizes, LEAST_CURVATURE)) @ directions.T
+
+    def _search(self, start: Floats, weight: float) -> tuple[Floats, float]:
+        """Return the nearest point of least `down`, and its value."""
+        from scipy.optimize import minimize
+
+        found = minimize(self.down, start, (weight,), jac=True, method="BFGS", options={"gtol": 0.02})
+        return np.asarray(found.x), float(found.fun)
 
     def fitted(self, best: Floats, spread: Floats, drawn: Mapping[str, Floats]) -> list[Fitted]:
         """Return the robot's parameters with intervals."""

@@ -16,7 +16,7 @@ SAME_V = 0.05
 """Voltages that differ by less say nothing of a battery [V]."""
 
 VARIED = 0.05
-"""Difference of mean cosines between placements from which on angles varied."""
+"""Difference of the cosines of a ray between placements from which on angles varied."""
 
 SLANTED = 0.9
 """Cosine of the angle to its normal from which on a wall counts as slanted."""
@@ -106,7 +106,10 @@ class Places:
     @property
     def slants_varied(self) -> bool:
         """Whether incidence can be told from amplitude: walls were met at several angles, some of them slanted."""
-        return self.slanted and float(np.ptp(self.cosines.mean(axis=1))) > VARIED
+        met = self.distances < self.reach
+        most = np.where(met, self.cosines, 0.0).max(axis=0)
+        least = np.where(met, self.cosines, 1.0).min(axis=0)
+        return self.slanted and float((most - least).max()) > VARIED
 
     def response(
         self, amplitude: Array, decay: Array, per_volt: Array, incidence: Array

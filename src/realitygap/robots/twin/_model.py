@@ -360,8 +360,10 @@ class TwinModel(Settings):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A twin without these sensors is written as before there were any."""
+        """A twin without these sensors, or without a soft dead band, is written as before there were any."""
         values: dict[str, Any] = handler(self)
+        soft = [name for name in values["motors"] if name.startswith("soft_") and not values["motors"][name]]
+        values["motors"] = {name: value for name, value in values["motors"].items() if name not in soft}
         return {key: value for key, value in values.items() if value is not None}
 
     def to_toml(self) -> str:

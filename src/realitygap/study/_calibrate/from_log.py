@@ -101,8 +101,8 @@ def _longest(path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_r
         )
     if len(longest.commands) < FEWEST_STEPS:
         raise StudyError(
-            f"{path} has {len(longest.commands)} steps of {longest.step_s:.3g} s, expected at least {FEWEST_STEPS}. Record "
-            "more, or choose a shorter step_s."
+            f"{path} has {len(longest.commands)} steps of {longest.step_s:.3g} s, expected at least {FEWEST_STEPS}. "
+            "Record more, or choose a shorter step_s."
         )
     return longest, n
 

@@ -109,7 +109,11 @@ def labyrinth(found: Mapping[str, Any]) -> str:
         )
         for name in whole["errors"]
     ]
-    caption = f"{LABEL}; whole log: {whole['measure']}, n = {whole['n']}; blocks: {blocks['measure']}, n = {blocks['n']}."
+    measures = [
+        f"{name}: {each['measure']}, n = {each['n']}"
+        for name, each in (("whole log", whole), ("blocks", blocks))
+    ]
+    caption = f"{LABEL}; {'; '.join(measures)}."
     heads = ("prediction", "last half [m]", "at its end [m]", "blocks [m]")
     return _table(heads, rows) + f"\n{caption[0].upper()}{caption[1:]}\n"
 

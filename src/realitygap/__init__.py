@@ -77,6 +77,7 @@ _PACKAGES = {
     "gap",
     "gym",
     "lab",
+    "logs",
     "platforms",
     "playback",
     "records",

@@ -31,6 +31,9 @@ FREE = 0.01
 LEAST_CURVATURE = 0.03
 """Of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
 
+BEYOND = 1e12
+"""Larger than what is minimized can be."""
+
 STEP = 1e-3
 """Of finite differences, in standard deviations of the prior."""
 
@@ -303,7 +306,12 @@ class _Problem:
         """Return the negative log posterior at a point (p,), and its slope."""
         p = len(point)
         ends = np.concatenate([point[None], point + STEP * np.eye(p), point - STEP * np.eye(p)])
-        logs = self.log_posterior(ends, weight)
+        with np.errstate(over="ignore", invalid="ignore"):
+            logs = self.log_posterior(ends, weight)
+        if not np.isfinite(
+            logs
+        ).all():  # a step of the search that went beyond all numbers: back to the middle
+            return BEYOND, point
         return -float(logs[0]), -(logs[1 : p + 1] - logs[p + 1 :]) / (2 * STEP)
 
     def solve(self) -> tuple[Floats, Floats]:

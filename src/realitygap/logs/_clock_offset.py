@@ -24,7 +24,8 @@ class ClockOffset:
 
     Attributes:
         seconds: Positive if the second signal is later [s].
-        low, high: Its 90 % interval [s].
+        low: Lower end of its 90 % interval [s].
+        high: Upper end [s].
         correlation: At this offset, the root of the mean squared correlation of the signals.
     """
 

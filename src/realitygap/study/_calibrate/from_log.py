@@ -22,6 +22,8 @@ from .parts import Parts
 
 BLOCKS = 4
 """Parts of a log, each of which is fitted in its first half and predicted in its second."""
+FEWEST_STEPS = 20
+"""Of a log: fewer tell nothing of a half that is held out."""
 NOISE_DRAWS = 100
 N_SPEEDS = 3
 HARMLESS = ("half track", "double track", "clock", "heading offset")
@@ -96,6 +98,11 @@ def _longest(path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_r
     if longest is None or not (len(longest.poses) or len(longest.wheels)):
         raise StudyError(
             f"{path} has commands alone. Expected poses or encoders, too: add [poses] or [wheels] to the mapping."
+        )
+    if len(longest.commands) < FEWEST_STEPS:
+        raise StudyError(
+            f"{path} has {len(longest.commands)} steps of {longest.step_s:.3g} s, expected at least {FEWEST_STEPS}. "
+            "Record more, or choose a shorter step_s."
         )
     return longest, n
 

@@ -2,8 +2,8 @@
 
     uv run python docs/make_images.py
 
-Runs `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: the paths of a
-typical run next to the best coverage of the nine conditions, a film of the best trial of a typical run, and the
+Runs `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: the paths of
+a typical run next to the best coverage of the nine conditions, a film of the best trial of a typical run, and the
 divergence between `jyro`, `sim` and a twin of the family close.
 """
 

@@ -349,11 +349,11 @@ def command_pages() -> dict[str, str]:
 
 
 def commands_table() -> str:
-    """A table of commands: a link to the page of each, its purpose, and its Python twin."""
+    """A table of commands: a link to the page of each, its purpose, and its function in Python."""
     lines = ["| command | purpose | in Python |", "|---|---|---|"]
     for name, command in commands().items():
         page = f"[`{name}`](../generated/commands/{name.replace(' ', '-')}.md)"
-        twin = re.search(r"In Python: (.*)", command.help)[1]
+        twin = re.search(r"In Python: ([\w.]+)", command.help)[1]
         lines.append(f"| {page} | {escape(command.help.split(chr(10))[0])} | `{twin}` |")
     return "\n".join(lines) + "\n"
 

@@ -90,9 +90,9 @@ class Row(Settings):
 class WallEntry(Row):
     """A straight wall from one point to another."""
 
-    x1: Number = Field(description="Where it begins [m].")
+    x1: Number = Field(description="First end, x [m].")
     y1: Number
-    x2: Number = Field(description="Where it ends [m].")
+    x2: Number = Field(description="Second end, x [m].")
     y2: Number
 
     @model_validator(mode="after")
@@ -105,9 +105,9 @@ class WallEntry(Row):
 class ObstacleEntry(Settings):
     """A box, a convex polygon or a disc."""
 
-    x: Number = Field(0.0, description="Where its own origin is [m].")
-    y: Number = Field(0.0, description="[m].")
-    heading: Number = Field(0.0, description="How far it is turned, counter-clockwise [rad].")
+    x: Number = Field(0.0, description="Origin of the obstacle, x [m].")
+    y: Number = Field(0.0, description="Origin of the obstacle, y [m].")
+    heading: Number = Field(0.0, description="Rotation, counter-clockwise [rad].")
     corner: tuple[Corner, ...] = Field(
         (Corner(x=0.0, y=0.0),),
         min_length=1,
@@ -115,7 +115,7 @@ class ObstacleEntry(Settings):
         description="Corners [x, y] of a polygon around its origin, counter-clockwise, before they are grown; left out "
         "for a disc. box = [length, width] says the outer size of a box.",
     )
-    radius: NotNegative = Field(0.0, description="Of a disc, or of rounded corners [m].")
+    radius: NotNegative = Field(0.0, description="Radius of a disc, or of rounded corners [m].")
 
     @model_validator(mode="before")
     @classmethod
@@ -133,10 +133,10 @@ class ObstacleEntry(Settings):
 class LightEntry(Settings):
     """A light that shines from a point to all sides."""
 
-    x: Number = Field(description="Where [m].")
+    x: Number = Field(description="Position of the light, x [m].")
     y: Number = Field(description="[m].")
     strength: NotNegative = Field(
-        1.0, description="What a light sensor of gain 1 reads that looks at it from 1 m."
+        1.0, description="Reading of a light sensor of gain 1 that points at the light from 1 m."
     )
 
 
@@ -150,24 +150,24 @@ class TapeEntry(Row):
 
 
 class ImageEntry(Settings):
-    """What the floor is printed with."""
+    """A picture on the floor."""
 
     x: float = Field(0.0, description="Lower left corner [m].")
     y: float = Field(0.0, description="[m].")
-    width: float = Field(gt=0, description="How wide it lies there [m]; its pixels are square.")
-    file: str = Field("", description="An image file beside the arena file; its brightness counts.")
-    columns: int = Field(ge=1, le=MOST_PIXELS, description="Of pixels; comes from the file.", **FROM_FILE)
-    rows: int = Field(ge=1, le=MOST_PIXELS, description="Of pixels; comes from the file.", **FROM_FILE)
-    pixels: str = Field(description="The pixels themselves; come from the file.", **FROM_FILE)
+    width: float = Field(gt=0, description="Width of the picture on the floor [m]. Its pixels are square.")
+    file: str = Field("", description="Image file in the folder of the arena file. Its brightness counts.")
+    columns: int = Field(ge=1, le=MOST_PIXELS, description="Columns of pixels, from the file.", **FROM_FILE)
+    rows: int = Field(ge=1, le=MOST_PIXELS, description="Rows of pixels, from the file.", **FROM_FILE)
+    pixels: str = Field(description="Pixels, from the file.", **FROM_FILE)
 
 
 class FloorEntry(Settings):
-    """What is on the floor, which is light otherwise."""
+    """Dark strips and a picture on the floor, which is light elsewhere."""
 
     tape: tuple[TapeEntry, ...] = Field(
         (), max_length=MOST_WALLS, description="Dark strips [x1, y1, x2, y2] along their middles [m]."
     )
-    tape_width: float = Field(TAPE_WIDTH, gt=0, description="Of the strips [m]; 3/4 in is usual.")
+    tape_width: float = Field(TAPE_WIDTH, gt=0, description="Width of the strips [m]. 3/4 in is usual.")
     image: ImageEntry | None = None
 
 
@@ -177,8 +177,10 @@ class GridEntry(Settings):
     x: float = Field(description="Lower left corner [m].")
     y: float = Field(description="[m].")
     cell: float = Field(gt=0, description="Size of a cell [m].")
-    columns: int = Field(ge=1, le=MOST_CELLS, description=f"How many; at most {MOST_CELLS} cells in all.")
-    rows: int = Field(ge=1, le=MOST_CELLS, description="How many.")
+    columns: int = Field(
+        ge=1, le=MOST_CELLS, description=f"Number of columns. The grid has at most {MOST_CELLS} cells."
+    )
+    rows: int = Field(ge=1, le=MOST_CELLS, description="Number of rows.")
 
     @model_validator(mode="after")
     def _has_not_too_many(self) -> Self:
@@ -191,19 +193,19 @@ class GridEntry(Settings):
 
 
 class StartEntry(Row):
-    """Where every trial begins."""
+    """The start of every trial."""
 
     x: Number = Field(description="[m].")
     y: Number = Field(description="[m].")
-    heading: Number = Field(0.0, description="From +x, counter-clockwise [rad].")
+    heading: Number = Field(0.0, description="Heading from +x, counter-clockwise [rad].")
 
 
 class GoalEntry(Row):
-    """What is to be reached."""
+    """The goal of the task `goal`."""
 
     x: Number = Field(description="Center [m].")
     y: Number = Field(description="[m].")
-    radius: Positive = Field(description="How near counts [m].")
+    radius: Positive = Field(description="Largest distance that counts as reached [m].")
 
 
 class ArenaFile(Described):
@@ -213,9 +215,9 @@ class ArenaFile(Described):
         ValueError: A value is unknown, missing or out of its range; every mistake with its place.
     """
 
-    name: str = Field(min_length=1, max_length=80, description="What to call it.")
-    description: str = Field("", max_length=2000, description="What it is, in a sentence.")
-    sources: tuple[str, ...] = Field((), description="Where its numbers come from.")
+    name: str = Field(min_length=1, max_length=80, description="Name of the arena.")
+    description: str = Field("", max_length=2000, description="Description of the arena in one sentence.")
+    sources: tuple[str, ...] = Field((), description="Sources of the numbers.")
     wall: tuple[WallEntry, ...] = Field((), max_length=MOST_WALLS, description="Walls [x1, y1, x2, y2].")
     obstacle: tuple[ObstacleEntry, ...] = Field((), max_length=256)
     light: tuple[LightEntry, ...] = Field((), max_length=64)

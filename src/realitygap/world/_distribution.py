@@ -1,4 +1,4 @@
-"""A number that is drawn anew, as a file or a study states it."""
+"""Distributions of numbers in files and studies."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Pair = tuple[float, float]
 
 
 class Distribution(Settings):
-    """How a number is drawn: one of four kinds, and how often.
+    """The distribution of a number: one of four kinds, and the frequency of its samples.
 
     Written in TOML as { uniform = [a, b] }, { normal = [mean, deviation] }, { log_uniform = [a, b] } or
     { choice = [a, b, c] }, with `per`, `least` and `most` where wanted.
@@ -36,10 +36,10 @@ class Distribution(Settings):
     )
     choice: tuple[float, ...] | None = Field(None, description="One of these, each as likely.")
     per: Literal["trial", "run", "study"] = Field(
-        "trial", description="What each draw holds for: one trial, one run, or the whole study."
+        "trial", description="Scope of each sample: one trial, one run, or the whole study."
     )
-    least: float | None = Field(None, description="What is drawn below it becomes it.")
-    most: float | None = Field(None, description="What is drawn above it becomes it.")
+    least: float | None = Field(None, description="Minimum. Lower samples are set to it.")
+    most: float | None = Field(None, description="Maximum. Higher samples are set to it.")
     together: str = Field(
         "",
         max_length=80,
@@ -78,7 +78,7 @@ class Distribution(Settings):
 
     @property
     def center(self) -> float:
-        """What stands for it, such as in a drawing: the mean; of ratios the geometric one; the first choice."""
+        """Representative value, such as for a drawing: the mean, the geometric mean of ratios, or the first choice."""
         if self.choice is not None:
             return self._limited(self.choice[0])
         if self.normal is not None:
@@ -87,7 +87,7 @@ class Distribution(Settings):
         return self._limited(math.sqrt(low * high) if self.log_uniform is not None else (low + high) / 2)
 
     def of(self, uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is drawn, as a function of uniform random numbers alone; the same bits on every machine.
+        """Return samples as a function of uniform random numbers; the same bits on every machine.
 
         Args:
             uniforms: Any shape, 0 <= u < 1.

@@ -26,74 +26,80 @@ def _without(values: dict[str, Any], unused: dict[str, float]) -> dict[str, Any]
 
 
 class Contact(Settings):
-    """What happens where the body meets something."""
+    """Contact between the body and walls, obstacles, or other robots."""
 
     model: Literal["freeze", "stop", "slide"] = Field(
         "slide",
-        description="freeze: a blocked robot does not move at all, as in Jyro; stop: it turns where its body allows, "
-        "and does not slide; slide: it skids and turns along what it meets.",
+        description="`freeze`: a blocked robot does not move at all, as in Jyro. `stop`: it turns if its body allows, "
+        "and does not slide. `slide`: it skids and turns along the obstacle.",
     )
     friction: NotNegative = Field(
         0.3, description="Between body and wall: mu, the tangent of the friction angle."
     )
-    long: Positive = Field(1.0, description="How easily it is pushed along its heading, against `lat`.")
-    lat: Positive = Field(1.0, description="How easily it is pushed sideways: against its wheels' grip.")
+    long: Positive = Field(1.0, description="Mobility along the heading when pushed, relative to `lat`.")
+    lat: Positive = Field(1.0, description="Mobility sideways when pushed, against the grip of the wheels.")
     ang: Positive = Field(
         171.0,
-        description="How easily it is turned [1/m2]: 1 / r2, as if its grip on the floor lay r from its origin.",
+        description="Mobility of turns when pushed [1/m2]: 1 / r2 for a grip at distance r from the origin.",
     )
     saturation: NotNegative = Field(
         0.0,
-        description="How soon the wheels' grip gives out [s/m]: one over the speed of slip from which on it hardly "
-        "grows; 0 where it grows without end.",
+        description="Saturation of the wheels' grip [s/m]: one over the speed of slip from which on the grip hardly "
+        "grows. 0: it grows without limit.",
     )
 
 
 class Drive(Settings):
-    """How commands, move and turn in -1..1, become motion."""
+    """Motion that follows from the commands move and turn in -1..1."""
 
     mixing: Literal["wheels", "independent"] = Field(
         "wheels",
-        description="wheels: left = move - turn and right = move + turn, each limited to -1..1; independent: move and "
-        "turn are speeds of their own.",
+        description="`wheels`: left = move - turn and right = move + turn, each limited to -1..1. `independent`: move "
+        "and turn set separate speeds.",
     )
     ahead: Literal[1, -1] = Field(
-        1, description="Which way move = 1 goes: 1 towards +x of the body, -1 towards its back."
+        1, description="Direction of move = 1: 1 towards +x of the body, -1 towards its back."
     )
     levels: int = Field(
         0,
         ge=0,
         le=1000,
-        description="How many speeds there are up to full, the nearest counts; 0 for any.",
+        description="Number of speeds up to full. The nearest one is used. 0: any speed.",
     )
-    lowest_level: int = Field(0, ge=0, description="The slowest speed but standing, counted in `levels`.")
-    speed: Positive = Field(description="Of a wheel at full command [m/s].")
-    track: Positive = Field(description="Between the wheels' points of contact [m].")
-    axle: Number = Field(0.0, description="The wheels' axle ahead of the body's origin [m].")
-    turn_rate: Positive = Field(1.0, description="At full turn, with mixing independent [rad/s].")
-    gain_left: Positive = Field(1.0, description="By which the left wheel's speed is off.")
-    gain_right: Positive = Field(1.0, description="Of the right wheel.")
-    bias_left: Number = Field(0.0, description="Added to the left wheel's speed while it is driven [m/s].")
-    bias_right: Number = Field(0.0, description="Of the right wheel [m/s].")
-    dead_band: Share = Field(0.0, description="A wheel stands at commands of less than this.")
-    lag: NotNegative = Field(0.0, description="Time in which a wheel comes within 1/e of its new speed [s].")
+    lowest_level: int = Field(0, ge=0, description="Slowest speed above 0, counted in `levels`.")
+    speed: Positive = Field(description="Speed of a wheel at full command [m/s].")
+    track: Positive = Field(description="Distance between the wheels' points of contact [m].")
+    axle: Number = Field(0.0, description="Position of the wheels' axle ahead of the body's origin [m].")
+    turn_rate: Positive = Field(1.0, description="Turn rate at full turn, with mixing independent [rad/s].")
+    gain_left: Positive = Field(1.0, description="Factor of the left wheel's speed.")
+    gain_right: Positive = Field(1.0, description="Factor of the right wheel's speed.")
+    bias_left: Number = Field(0.0, description="Offset of the left wheel's speed while it is driven [m/s].")
+    bias_right: Number = Field(0.0, description="Offset of the right wheel's speed while it is driven [m/s].")
+    dead_band: Share = Field(0.0, description="Smallest command that moves a wheel.")
+    lag: NotNegative = Field(0.0, description="Time constant of a wheel's approach to its new speed [s].")
     rise: NotNegative = Field(
         0.0,
-        description="Time in which the faster wheel's speed rises evenly from standing to full; it begins anew, with "
-        "the other one's, where either turns the other way [s].",
+        description="Time in which the faster wheel's speed rises linearly from 0 to full [s]. The rise of both wheels "
+        "restarts if either reverses.",
     )
-    delay: NotNegative = Field(0.0, description="From the command until the wheels hear it [s].")
+    delay: NotNegative = Field(0.0, description="Delay from the command to the wheels [s].")
     delay_jitter: NotNegative = Field(
         0.0, description="The delay of a step is delay + delay_jitter * U(-1, 1) [s]."
     )
-    slip: Share = Field(0.0, description="Of a wheel's travel that is lost.")
+    slip: Share = Field(0.0, description="Share of a wheel's travel that is lost.")
     travel_noise_per_m: NotNegative = Field(
         0.0,
-        description="Standard deviation of the way driven, after one meter [m]; grows with the root of the way.",
+        description="Standard deviation of the distance driven, after one meter [m]; grows with its root.",
     )
-    travel_noise_per_s: NotNegative = Field(0.0, description="After one second of driving [m].")
-    heading_noise_per_m: NotNegative = Field(0.0, description="Of the heading, after one meter [rad].")
-    heading_noise_per_s: NotNegative = Field(0.0, description="After one second of driving [rad].")
+    travel_noise_per_s: NotNegative = Field(
+        0.0, description="Standard deviation of the distance driven, after one second of driving [m]."
+    )
+    heading_noise_per_m: NotNegative = Field(
+        0.0, description="Standard deviation of the heading, after one meter [rad]."
+    )
+    heading_noise_per_s: NotNegative = Field(
+        0.0, description="Standard deviation of the heading, after one second of driving [rad]."
+    )
     drift_per_m: Number = Field(0.0, description="Turn to the left in each meter driven [rad].")
     battery_sag: NotNegative = Field(
         0.0, description="Share of the speed that is lost in each second of a trial."
@@ -117,58 +123,59 @@ class Drive(Settings):
 
 
 class Sample(Settings):
-    """What a range sensor answers at one distance."""
+    """Reading of a range sensor at one distance."""
 
-    distance: NotNegative = Field(description="To what is ahead [m].")
-    reading: Share = Field(description="0 (nothing) to 1 (full).")
+    distance: NotNegative = Field(description="Distance to the obstacle [m].")
+    reading: Share = Field(description="Reading, 0 (nothing) to 1 (full).")
 
 
 class RangeSensor(Settings):
     """A sensor that answers to what is near: 0 for nothing, 1 for very near."""
 
-    x: Number = Field(description="Of its mount, ahead of the body's origin [m].")
-    y: Number = Field(description="Of its mount, to the left [m].")
-    direction: Number = Field(0.0, description="In which it looks, positive to the left [rad].")
-    cone: HalfAngle = Field(0.0, description="Half the angle that it sees [rad].")
-    reach: Positive = Field(description="How far it sees [m].")
+    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
+    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
+    direction: Number = Field(0.0, description="Direction of the sensor, positive to the left [rad].")
+    cone: HalfAngle = Field(0.0, description="Half of the viewing angle [rad].")
+    reach: Positive = Field(description="Range of the sensor [m].")
     rays: int = Field(
         1,
         ge=1,
         le=63,
-        description="Spread over the cone: 1, or an odd number; with lorentz 1 or 3. Responses linear and table use "
-        "the nearest one, the others the light of all.",
+        description="Number of rays over the cone: 1, or an odd number; with lorentz 1 or 3. Responses linear and "
+        "table use the nearest ray, the others the light of all rays.",
     )
     response: Literal["linear", "ir", "table", "pulses", "lorentz"] = Field(
         "linear",
-        description="linear: 1 - d / reach; ir: amplitude * exp(-d / decay); table: read from `table`; pulses: the "
-        "share of `pulses` seen, as many as ir states less those missed, each with the probability of drop_*; lorentz: "
-        "amplitude * (W^2 - P^2) / (d^2 - 2 P d + W^2), with W = half_width and P = peak, and 0 from the reach on.",
+        description="`linear`: 1 - d / reach. `ir`: amplitude * exp(-d / decay). `table`: interpolated from `table`. "
+        "`pulses`: the detected share of `pulses`, the reading of `ir` less those missed with the probability of "
+        "drop_*. `lorentz`: amplitude * (W^2 - P^2) / (d^2 - 2 P d + W^2), with W = half_width and P = "
+        "peak, and 0 beyond the reach.",
     )
     amplitude: NotNegative = Field(
         1.0, description="A of ir and pulses: the reading at no distance; of lorentz: at `peak`."
     )
-    decay: Positive = Field(0.1, description="L of ir and pulses: where it has fallen to 1/e [m].")
-    pulses: int = Field(10, ge=1, le=1000, description="Sent for one reading, with response pulses.")
+    decay: Positive = Field(
+        0.1, description="L of ir and pulses: the distance at which the reading has fallen to 1/e [m]."
+    )
+    pulses: int = Field(10, ge=1, le=1000, description="Number of pulses per reading, with response pulses.")
     table: tuple[Sample, ...] = Field(
         (),
         max_length=64,
-        description="Rows [distance, reading] by growing distance, between which lines are drawn.",
+        description="Rows [distance, reading] by increasing distance, with linear interpolation.",
     )
     noise_uniform: NotNegative = Field(0.0, description="a: a * U(-1, 1) is added, as the paper does.")
     noise_gain: NotNegative = Field(0.0, description="Standard deviation by which a reading is multiplied.")
-    drop_most: Share = Field(0.0, description="Probability that it answers 0, far away.")
+    drop_most: Share = Field(0.0, description="Probability of a reading of 0, far away.")
     drop_at: Number = Field(0.1, description="Distance at which this is half as likely [m].")
-    drop_width: Positive = Field(0.02, description="Of the logistic curve between [m].")
+    drop_width: Positive = Field(0.02, description="Width of the logistic curve of this probability [m].")
     outlier_most: Share = Field(0.0, description="Probability of any reading in 0..1, far away.")
     outlier_at: Number = Field(0.1, description="Distance at which this is half as likely [m].")
-    outlier_width: Positive = Field(0.02, description="Of the logistic curve between [m].")
-    burst: Share = Field(
-        0.0, description="Of pulses: how often those of one reading share one fate, their correlation."
-    )
+    outlier_width: Positive = Field(0.02, description="Width of the logistic curve of this probability [m].")
+    burst: Share = Field(0.0, description="Correlation of the pulses of one reading, with response pulses.")
     incidence: NotNegative = Field(
         0.0,
-        description="k of ir and pulses: what a ray meets at an angle a to its normal sends back c / (c + k (1 - c)) "
-        "of the light, c = cos a. 0: all; 1: as a matt surface does (Lambert).",
+        description="Value k of ir and pulses. A surface that a ray meets at an angle a to its normal reflects the "
+        "share c / (c + k (1 - c)), with c = cos a. Value `0`: all; `1`: as a matt surface does (Lambert).",
     )
     half_width: Positive = Field(
         0.1, description="W of lorentz: the distance at which a reading is half of that at a peak of 0 [m]."
@@ -221,11 +228,11 @@ class RangeSensor(Settings):
 class LightSensor(Settings):
     """A sensor that answers to lights: a cosine lobe in its direction."""
 
-    x: Number = Field(description="Of its mount, ahead of the body's origin [m].")
-    y: Number = Field(description="Of its mount, to the left [m].")
-    direction: Number = Field(0.0, description="In which it looks, positive to the left [rad].")
+    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
+    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
+    direction: Number = Field(0.0, description="Direction of the sensor, positive to the left [rad].")
     width: Annotated[Positive, Field(le=math.pi)] = Field(
-        math.pi / 2, description="Half the angle of its lobe, beyond which it sees nothing [rad]."
+        math.pi / 2, description="Half of the angle of its lobe, beyond which the reading is 0 [rad]."
     )
     gain: NotNegative = Field(1.0, description="Reading for a light of strength 1 straight ahead, 1 m away.")
     noise: NotNegative = Field(0.0, description="Standard deviation by which a reading is multiplied.")
@@ -234,21 +241,23 @@ class LightSensor(Settings):
 class LineSensor(Settings):
     """A sensor under the robot that tells dark floor from light floor."""
 
-    x: Number = Field(description="Ahead of the body's origin [m].")
-    y: Number = Field(description="To the left [m].")
+    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
+    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
     threshold: Share = Field(
-        0.5, description="It answers 1 on floor less bright than this: 0 is black, 1 white."
+        0.5, description="Brightness below which the reading is 1: 0 is black, 1 is white."
     )
     noise: NotNegative = Field(0.0, description="Standard deviation added to the brightness.")
-    level: bool = Field(False, description="Whether it answers how dark the floor is, in place of whether.")
+    level: bool = Field(
+        False, description="True: the reading is the darkness of the floor, instead of 0 or 1."
+    )
 
 
 class BumpSensor(Settings):
     """A switch that is closed while the body is touched near it."""
 
-    x: Number = Field(description="Ahead of the body's origin [m].")
-    y: Number = Field(description="To the left [m].")
-    reach: Positive = Field(description="How near the touch must be [m].")
+    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
+    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
+    reach: Positive = Field(description="Largest distance of a touch [m].")
 
 
 class SensorKind(NamedTuple):
@@ -273,39 +282,41 @@ SENSORS = {
 
 
 class Encoders(Settings):
-    """What the robot knows of how far its wheels turned."""
+    """Encoders of the wheels."""
 
-    gain_left: Positive = Field(1.0, description="Way told for each meter that the left wheel went.")
-    gain_right: Positive = Field(1.0, description="Of the right wheel.")
+    gain_left: Positive = Field(1.0, description="Distance reported for each meter of the left wheel.")
+    gain_right: Positive = Field(1.0, description="Distance reported for each meter of the right wheel.")
     noise_per_m: NotNegative = Field(
-        0.0, description="Standard deviation after one meter [m]; grows with the root of the way."
+        0.0, description="Standard deviation after one meter [m]. It grows with the root of the distance."
     )
     drift_per_m: Number = Field(
-        0.0, description="Turn to the left that is reckoned in each meter driven and did not happen [rad]."
+        0.0, description="False turn to the left, as reported for each meter driven [rad]."
     )
 
 
 class Stall(Settings):
-    """How the robot knows that it is held up."""
+    """Detection of stalls."""
 
     kind: Literal["blocked", "idler"] = Field(
         "blocked",
-        description="blocked: whatever held it up in this step; idler: as an S2, a third wheel that turns too little "
-        "for what the drive wheels do.",
+        description="`blocked`: any obstacle in this step. `idler`: as in an S2, a third wheel that turns too little "
+        "for the turns of the drive wheels.",
     )
-    idler: Number = Field(0.0, description="The third wheel, ahead of the body's origin [m].")
-    share: Share = Field(0.5, description="Of the drive wheels' way below which it stalls.")
-    window: NotNegative = Field(1.6, description="Time over which both ways are averaged [s].")
+    idler: Number = Field(0.0, description="Position of the third wheel ahead of the body's origin [m].")
+    share: Share = Field(
+        0.5, description="Share of the drive wheels' distance below which the robot is stalled."
+    )
+    window: NotNegative = Field(1.6, description="Time over which both distances are averaged [s].")
 
 
 class Looks(Settings):
-    """What is only drawn."""
+    """Details that only drawings use."""
 
-    wheel_diameter: float = Field(0.0, ge=0, description="[m]; 0 to draw no wheels.")
-    wheel_width: float = Field(0.0, ge=0, description="[m].")
-    pen: tuple[float, float] | None = Field(None, description="Where a pen is held, x and y [m].")
+    wheel_diameter: float = Field(0.0, ge=0, description="Diameter of the wheels [m]; 0 to draw none.")
+    wheel_width: float = Field(0.0, ge=0, description="Width of the wheels [m].")
+    pen: tuple[float, float] | None = Field(None, description="Position of the pen, x and y [m].")
     caster: tuple[float, float] | None = Field(
-        None, description="Where its third support touches the floor [m]."
+        None, description="Point at which the third support touches the floor [m]."
     )
 
 
@@ -318,16 +329,14 @@ class RobotModel(Described):
         ValueError: A value is unknown, missing or out of its range; every mistake with its place.
     """
 
-    name: str = Field(min_length=1, max_length=80, description="What to call it.")
-    description: str = Field("", max_length=2000, description="What it is, in a sentence.")
-    sources: tuple[str, ...] = Field((), description="Where its numbers come from.")
-    step_s: float = Field(
-        0.1, gt=0, le=60, description="How long one command lasts [s]; a study may say otherwise."
-    )
+    name: str = Field(min_length=1, max_length=80, description="Name of the robot.")
+    description: str = Field("", max_length=2000, description="Description of the robot in one sentence.")
+    sources: tuple[str, ...] = Field((), description="Sources of the numbers.")
+    step_s: float = Field(0.1, gt=0, le=60, description="Duration of a command [s]. A study may change it.")
     body: tuple[Part, ...] = Field(
         min_length=1,
         max_length=16,
-        description="What can collide: one convex part, or several fixed to each other.",
+        description="Outline that can collide: one convex part, or several fixed to each other.",
     )
     contact: Contact = Contact()
     drive: Drive
@@ -335,11 +344,11 @@ class RobotModel(Described):
     light: tuple[LightSensor, ...] = Field((), max_length=MOST_SENSORS, description="Light sensors.")
     line: tuple[LineSensor, ...] = Field((), max_length=MOST_SENSORS, description="Line sensors.")
     bump: tuple[BumpSensor, ...] = Field((), max_length=MOST_SENSORS, description="Bump sensors.")
-    encoder: Encoders | None = Field(None, description="Left out where wheels are not counted.")
+    encoder: Encoders | None = Field(None, description="Encoders of the wheels, if the robot has any.")
     stall: Stall = Stall()
     shadows: Literal["none", "half", "dark"] = Field(
         "dark",
-        description="How much of a light arrives behind walls and obstacles: all, half as in Jyro, or nothing.",
+        description="Light behind walls and obstacles: all, half as in Jyro, or nothing.",
     )
     looks: Looks = Looks()
 

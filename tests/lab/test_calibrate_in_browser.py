@@ -71,7 +71,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         choose(page, "What to calibrate", "Path")
         begin(page, Robot=f"scribbler:{server.name}", Name="led")
         for number in (1, 2):
-            page.get_by_text(f"Trial {number} of").wait_for()
+            page.locator(".lab-question").get_by_text(f"Trial {number} of").wait_for()
             page.get_by_role("button", name="Robot is in place").click()
             page.get_by_label("Turn to the left").wait_for()
             if number == 1:
@@ -88,7 +88,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         assert other.get_by_role("button", name="Robot is in place").count() == 0
         assert other.get_by_role("button", name="Stop calibration").is_disabled()
         page.reload()
-        page.get_by_text("Trial 3 of").wait_for()
+        page.locator(".lab-question").get_by_text("Trial 3 of").wait_for()
         page.get_by_role("button", name="Stop calibration").click()
         page.get_by_text("Recorded trials are saved").wait_for()
     assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2

@@ -207,6 +207,10 @@ class Form:
         """
         for key, field in self._fields.items():
             self._mark(field, problems.get(key, ""))
+            if key in problems:
+                for around in field.input.ancestors():
+                    if isinstance(around, ui.expansion):
+                        around.value = True  # a mistake is never in a closed section
         self._summary.clear()
         self._summary.set_visibility(bool(problems))
         if not problems:

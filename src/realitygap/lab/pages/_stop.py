@@ -39,12 +39,12 @@ class Stop:
         with (
             ui.element("div")
             .classes("lab-stop-bar")
-            .props('role="region" aria-label="Robot in use"') as self._bar
+            .props('role="region" aria-label="Robot in use" aria-live="assertive"') as self._bar
         ):
             self._chip = ui.label("").classes("lab-chip").props('role="status"')
             # One button for the whole life of the page: a press is never lost because the button was drawn again.
             with ui.button("Stop robot", on_click=self._press, color=None) as self._button:
-                ui.label(_LOST).classes("lab-stop-lost").props('role="alert"')
+                ui.label(_LOST).classes("lab-stop-lost")
             self._button.classes("lab-stop").props('unelevated no-caps aria-keyshortcuts="Escape"')
         ui.keyboard(on_key=self._key, repeating=False, ignore=[])
         part = Part(self._state, self._update)

@@ -1,0 +1,80 @@
+"""The state of a study, from its folder and its job; and its figures that were drawn before."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from realitygap.lab import _figure_cache
+from realitygap.lab._figure_cache import keep_figures, read_figures, read_rows
+from realitygap.lab._pace import duration
+from realitygap.lab._standing import standing_of
+from realitygap.lab._studies import StudyState
+
+ROW = {"condition": "a", "label": "SIM", "n": 6, "line_median": 0.25, "line_low": None, "line_high": None}
+
+
+def state(n_done: int = 0, **values: Any) -> StudyState:
+    return StudyState("mine", n_runs=8, n_done=n_done, **values)
+
+
+def job(*, is_over: bool = True, is_failed: bool = False, **values: Any) -> Any:
+    return SimpleNamespace(is_over=is_over, is_failed=is_failed, outcome="disk full", ask=None, **values)
+
+
+PROGRESS = {"n_done": 6, "n_runs": 8, "n_computed": 4, "seconds": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("folder", "work", "word", "progress"),
+    [
+        (state(), None, "Not started", "0/8 runs"),
+        (
+            state(4, used_by="process 1 on here"),
+            job(is_over=False, progress=PROGRESS),
+            "Running",
+            "6/8 runs · 2 runs/s · 1 s left",
+        ),
+        (state(4), job(is_over=False, progress=None), "Running", "4/8 runs"),
+        (state(4, used_by="process 1 on here"), None, "In use", "4/8 runs"),
+        (state(4), job(), "Paused", "4/8 runs"),
+        (state(4), job(is_failed=True), "Failed", "4/8 runs"),
+        (state(8), job(is_failed=True), "Complete", "8 runs"),
+        (state(8, n_driven_runs=1), job(), "Waiting for robot", "8 runs · 0/1 robot runs"),
+        (StudyState("mine", problem="damaged"), None, "Failed", ""),
+    ],
+)
+def test_study_has_one_state(folder, work, word, progress):
+    standing = standing_of(folder, work)
+    assert (standing.word, standing.progress) == (word, progress)
+    assert bool(standing.message) == (word in ("Failed", "In use"))
+    assert standing.can_resume == (word in ("Not started", "Paused", "Failed") and not folder.problem)
+
+
+def test_durations_have_the_unit_that_fits():
+    assert [duration(seconds) for seconds in (0.4, 89, 90, 5399, 5400)] == [
+        "0 s",
+        "89 s",
+        "2 min",
+        "90 min",
+        "1.5 h",
+    ]
+
+
+def test_figures_are_read_only_for_the_runs_and_the_version_they_were_drawn_of(tmp_path, monkeypatch):
+    figure = {"caption": "c", "alt": "a", "wide": "<svg/>", "narrow": "<svg/>"}
+    keep_figures(tmp_path, (8, 0), [ROW], {"coverage": figure})
+    assert read_figures(tmp_path, (8, 0)) == ([ROW], {"coverage": figure})
+    assert read_rows(tmp_path, (8, 0)) == [ROW]
+    assert read_figures(tmp_path, (9, 0)) is None
+    monkeypatch.setattr(_figure_cache, "__version__", "next")
+    assert read_figures(tmp_path, (8, 0)) is None
+
+
+@pytest.mark.parametrize("row", [{**ROW, "line_median": "high"}, {**ROW, "n": None}, [], "text"])
+def test_summary_of_another_form_is_not_read(tmp_path, row):
+    keep_figures(tmp_path, (8, 0), [row], {"coverage": {"caption": 1}})
+    assert read_rows(tmp_path, (8, 0)) is None
+    assert read_figures(tmp_path, (8, 0)) is None

@@ -8,9 +8,11 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
+import realitygap.gym  # noqa: F401  # registers the tasks
 from realitygap.emulator import Playground, connect_witness, why_not
 from realitygap.emulator.thymio import _playground
 from realitygap.errors import RobotError, StudyError
@@ -206,3 +208,21 @@ def test_emulate_serves_the_robot_and_its_witness_to_other_programs():
             _, said = served.communicate(timeout=20)
     assert served.returncode == 0
     assert "no encoders and no stall" in said
+
+
+@pytest.mark.slow
+@needs_playground
+def test_gymnasium_drives_it_step_by_step():
+    env = gymnasium.make(
+        "realitygap/ScribblerCoverage-v1",
+        platform=EMULATED,
+        controller={"inputs": ["range.2", "range.5", "line.1"]},
+    )
+    seen, _ = env.reset(seed=1)
+    assert seen.shape == (3,)
+    for _ in range(3):
+        seen, _, is_over, _, _ = env.step(np.array([1.0, 0.0], np.float32))
+        assert not is_over
+    env.close()
+    with pytest.raises(ValueError, match="cannot place a robot on the floor"):
+        gymnasium.make("realitygap/ScribblerCoverage-v1", platform="thymio:/dev/ttyACM0")

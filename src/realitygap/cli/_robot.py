@@ -247,10 +247,8 @@ def show_recording(
         return
     header = recording.header
     who = header.get("robot", {})
-    typer.echo(
-        f"{header.get('label', 'no robot')} on {header['port']}, {who.get('model')} with Fluke {who.get('fluke')}, "
-        f"{header['started']}"
-    )
+    named = who["name"] if "name" in who else f"{who.get('model')} with Fluke {who.get('fluke')}"
+    typer.echo(f"{header.get('label', 'no robot')} on {header['port']}, {named}, {header['started']}")
     _print_table(("t [s]", "kind", "name", "what"), [_row(line) for line in lines])
     if not recording.is_whole:
         typer.echo("The last line is cut off, as after a crash, and left out.")

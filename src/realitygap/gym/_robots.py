@@ -273,12 +273,13 @@ def _platform(given: GivenPlatform, kind: str) -> Platform:
         )
     try:
         model = class_of(given)
-        if model.is_physical or not model.is_for_studies:
+        platform = platform_of(given)
+        if platform.needs_person or not model.is_for_studies:
             raise ValueError(
-                f"platform is {given!r}, expected a simulated robot or a twin: a robot on a port, emulated or not, is "
-                "driven by `realitygap drive`, not step by step from Gymnasium."
+                f"platform is {given!r}, expected a simulated robot, a twin, or an emulated robot in this program: "
+                "Gymnasium cannot place a robot on the floor. `realitygap drive` leads a person through its trials."
             )
-        return platform_of(given)
+        return platform
     except StudyError as error:
         raise ValueError(f"platform: {error}") from None
 

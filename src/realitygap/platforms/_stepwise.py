@@ -31,6 +31,7 @@ from realitygap.trials import (
     check_plans,
     controller_of,
     counters_of,
+    own_witness,
     run_trial,
 )
 from realitygap.world import Arena, Pose, cells_along
@@ -38,6 +39,8 @@ from realitygap.world import Arena, Pose, cells_along
 from ._fleet import Array, Outline, is_signed, limited_commands
 
 if TYPE_CHECKING:
+    from realitygap.emulator import Witness
+
     from ._platform import Platform
 
 
@@ -82,6 +85,39 @@ class FollowedRobot:
         return cells_along(np.array(self._path), self._arena.grid)
 
 
+class WitnessedRobot:
+    """A `SeenRobot` that is emulated: its witness places it, and knows its pose and its cells.
+
+    Args:
+        robot: The robot.
+        witness: Its witness.
+        arena: Where.
+    """
+
+    def __init__(self, robot: Any, witness: Witness, arena: Arena) -> None:
+        self._robot, self._witness, self._arena = robot, witness, arena
+        self.number = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._robot, name)
+
+    def reset(self, pose: Pose | None = None) -> None:
+        """Begin a trial at a pose, or at the arena's start."""
+        self._robot.stop()
+        self._witness.place(pose or self._arena.start, self.number)
+        self._robot.reset()
+
+    @property
+    def pose(self) -> Pose:
+        """Its present pose."""
+        return self._witness.pose()
+
+    @property
+    def visited_cells(self) -> tuple[int, ...]:
+        """The cells along its line, in order of first visit."""
+        return self._witness.cells()
+
+
 def open_seen(platform: Platform, arena: Arena, noise: float) -> Any:
     """Open a simulated robot that knows its pose and its visited cells.
 
@@ -96,6 +132,9 @@ def open_seen(platform: Platform, arena: Arena, noise: float) -> Any:
         raise StudyError(
             f"Platform {platform.name!r} cannot open its robot: {type(error).__name__}: {error}."
         ) from error
+    witness = own_witness(robot)
+    if not hasattr(robot, "pose") and witness is not None:
+        return WitnessedRobot(robot, witness, arena)
     if not hasattr(robot, "pose"):
         robot.close()
         raise StudyError(

@@ -34,7 +34,7 @@ from ._scene import CM, corner_of, scene_of
 PROGRAMS = {"asebaplayground": "aseba", "dbus-daemon": "dbus", "ip": "iproute2", "unshare": "util-linux"}
 """Programs that are needed, and the Debian packages that have them."""
 FASTEST = 8.0
-"""Largest speed: with it, results were found to be those of real time."""
+"""Largest speed with which a playground was found to keep up, on two cores."""
 LACKS = (
     "Aseba's playground differs from a Thymio: it reports targets as the speeds of the wheels, so there are no "
     "encoders and no stall; at a wall the robot slides and does not turn; infrared sensors do not see colors; its "
@@ -118,7 +118,7 @@ class Playground:
     ) -> None:
         if not 0.1 <= speed <= FASTEST:
             raise RobotError(
-                f"speed is {speed:g}, expected 0.1 to {FASTEST:g}: beyond, results would differ."
+                f"speed is {speed:g}, expected 0.1 to {FASTEST:g}: it may not keep up with more."
             )
         if window and not os.environ.get("DISPLAY"):
             raise RobotError("There is no display for the playground's window. Leave the window out.")

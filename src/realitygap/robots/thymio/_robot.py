@@ -356,7 +356,8 @@ class Thymio:
                 raise RobotStopped("The center button of the Thymio was pressed: its motors are stopped.")
             remaining = until - self.clock.now()
             piece = max(min(remaining, RENEW_S), 0.0)
-            self._send_wheels(move, turn, piece)
+            # a playground may be faster than this program can renew commands
+            self._send_wheels(move, turn, piece if self.label == "REAL" else max(remaining, 0.0))
             if remaining <= 0:
                 return
             self.clock.sleep(piece)

@@ -59,7 +59,22 @@ def words(summary: Summary) -> str:
         f"{word}: {'; '.join(names[met]) or 'none'}."
         for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
     ]
-    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts]) + "\n"
+    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts, *_flagged(summary)]) + "\n"
+
+
+def _flagged(summary: Summary) -> Iterable[str]:
+    """Yield how many calibrations at the budget of the goals the posterior predictive check flags."""
+    for observe in summary["plan"]["observations"]:
+        checked = [
+            after["misspecified"]
+            for sitting in summary["twins"]
+            for after in _at_goal(summary, sitting)
+            if after["observe"] == observe
+        ]
+        yield (
+            f"With `{observe}`, the posterior predictive check flags {sum(checked)} of {len(checked)} calibrations by "
+            f"{summary['budget']} trials: `sim` cannot make what it saw."
+        )
 
 
 def sitting_table(summary: Summary) -> Iterable[Sequence[str]]:

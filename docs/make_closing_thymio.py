@@ -56,7 +56,7 @@ def words(summary: Summary) -> str:
     for goal in summary["goals"]:
         names[goal["met"]].append(goal["name"])
     verdicts = [
-        f"{word}: {'; '.join(names[met]) or 'none'}."
+        f"{word}:\n\n" + "\n".join(f"* {name}" for name in names[met] or ["none"])
         for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
     ]
     return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts, *_flagged(summary)]) + "\n"
@@ -65,15 +65,17 @@ def words(summary: Summary) -> str:
 def _flagged(summary: Summary) -> Iterable[str]:
     """Yield how many calibrations at the budget of the goals the posterior predictive check flags."""
     for observe in summary["plan"]["observations"]:
-        checked = [
-            after["misspecified"]
+        found = [
+            after
             for sitting in summary["twins"]
             for after in _at_goal(summary, sitting)
             if after["observe"] == observe
         ]
+        flagged = sum(after["misspecified"] for after in found)
+        rare = sum((after["misspecification_p"] or 0) < 0.05 for after in found)
         yield (
-            f"With `{observe}`, the posterior predictive check flags {sum(checked)} of {len(checked)} calibrations by "
-            f"{summary['budget']} trials: `sim` cannot make what it saw."
+            f"The posterior predictive check flags {flagged} of {len(found)} calibrations by {summary['budget']} "
+            f"trials with `{observe}`. Its p is below .05 for {rare} of them; their misfit is too small to be flagged."
         )
 
 

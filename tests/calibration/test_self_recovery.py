@@ -9,7 +9,7 @@ from realitygap.calibration import fit_sensor, placements_of, sensor_plans
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.world import load_robot, paper_arena, robot_names
 
-FITTED = ("ir", "pulses")
+FITTED = ("ir", "pulses", "lorentz")
 NEAR = {"amplitude": 0.6, "decay": 0.2, "noise_gain": 0.2}
 """Shares of the file's number by which an estimate may be off."""
 
@@ -42,7 +42,7 @@ def test_sensors_that_cannot_be_fitted_are_refused_before_a_trial() -> None:
     for name in robot_names():
         robot = load_robot(name)
         if any(sensor.response not in FITTED for sensor in robot.range):
-            with pytest.raises(ValueError, match="expected ir or pulses"):
+            with pytest.raises(ValueError, match="expected ir, pulses or lorentz"):
                 sensor_plans(paper_arena(), robot)
 
 

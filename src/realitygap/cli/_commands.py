@@ -50,7 +50,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     "Look at results": (
         Command("report", "Write the HTML report of a study.", "_results", "report"),
         Command("show", "Draw a run, trial, network, arena, or robot.", "_show", "show"),
-        Command("export", "Export a network as JSON, ONNX, C, or a graph.", "_export", "export"),
+        Command("export", "Export a network as JSON, ONNX, C, Aseba, or a graph.", "_export", "export"),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
     ),
     "Measure and close the gap": (

@@ -227,7 +227,7 @@ def _head(
         f"# nodes[0..{n_nodes - 1}]: inputs, outputs, hidden nodes. {ONE} is 1.",
         f"# Inputs: {', '.join(interface.sensed)}.",
         f"# Outputs: {', '.join(interface.outputs)}.",
-        f"# In {N_TRIED:,} steps with random inputs, outputs differ from the network's by at most {largest:.1g};",
+        f"# In {N_TRIED:,} steps with random inputs, outputs are off the network by at most {largest:.1g};",
         f"# half of them by less than {max(median, LEAST_SHOWN):.1g}. The program has {n_words:,} words of bytecode.",
         "",
     ]

@@ -28,7 +28,7 @@ platform = "scribbler"
 """Of two trials of three steps."""
 
 
-def open_fake(port):
+def open_fake(port, arena=None):
     def open_robot(platform):
         robot = FakeRobot(platform.wait_s)
         robot.label = "REAL" if port == "real" else "EMULATED"

@@ -218,7 +218,7 @@ def test_defaults_are_those_of_the_study_of_the_task(kind):
     [
         ({"kind": "python:mine.py:f"}, ValueError, "a Python task scores whole trials"),
         ({"kind": "walls"}, ValueError, "kind is 'walls'. Did you mean 'wall'"),
-        ({"platform": "scribbler:/dev/ttyUSB0"}, ValueError, "a robot on a port"),
+        ({"platform": "scribbler:/dev/ttyUSB0"}, ValueError, "an emulated robot in this program"),
         ({"platform": "twin:nothing.toml"}, Exception, "nothing.toml"),
         (
             {"kind": "avoid", "platform": "jyro", "task": {"inputs": ["range.3"]}},

@@ -190,3 +190,12 @@ def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
     for context in contexts:
         context.close()
     assert complaints == []
+
+
+def open_advanced(page, field) -> None:
+    """Open the section Advanced: a click may come before the page listens, so click until a field in it can be seen."""
+    for _ in range(60):
+        if field.is_visible():
+            return
+        page.get_by_text("Advanced", exact=True).first.click()
+        page.wait_for_timeout(1000)

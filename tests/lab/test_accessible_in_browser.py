@@ -7,7 +7,7 @@ from axe_playwright_python.sync_playwright import Axe
 
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, PHONE
+from .conftest import DESKTOP, PHONE, open_advanced
 from .robot_study import begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
@@ -144,7 +144,7 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
 
 def test_a_calibration_whose_plot_grows(lab, look):
     page = look("calibrate")
-    page.get_by_text("Advanced", exact=True).click()
+    open_advanced(page, page.get_by_label("Number of trials"))
     page.get_by_label("Number of trials").fill("4")
     page.get_by_role("button", name="Calibrate", exact=True).click()
     page.locator(".lab-plot").wait_for()

@@ -9,12 +9,14 @@ import pytest
 from realitygap.lab._gap_work import rounds
 from realitygap.records import read_observations
 
+from .conftest import open_advanced
+
 pytestmark = pytest.mark.slow
 
 
 def measure(page, **fields: str) -> None:
-    if "Name" in fields and not page.get_by_label("Name", exact=True).is_visible():
-        page.get_by_text("Advanced", exact=True).click()
+    if "Name" in fields:
+        open_advanced(page, page.get_by_label("Name", exact=True))
     for label, value in fields.items():
         page.get_by_label(re.compile(f"^{label.replace('_', ' ')}")).first.fill(value)
     page.get_by_role("button", name="Measure the gap").click()

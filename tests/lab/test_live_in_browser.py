@@ -55,6 +55,7 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
         rate = page.evaluate(FRAMES, 2)
         assert rate >= 20, f"{rate} places a second on {platform!r}"
         later = visit("study/seen")  # who comes later sees the line from its beginning
+        later.get_by_role("tab", name="Replay").click()
         later.locator(".rg-live .rg-trail").wait_for()
         first = later.locator(".rg-trail").get_attribute("points").split()[0]
         assert first == page.locator(".rg-trail").get_attribute("points").split()[0]

@@ -14,7 +14,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PATIENCE_MS, PHONE, check_uncovered
+from .conftest import PATIENCE_MS, PHONE, check_uncovered, open_advanced
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
 
@@ -48,7 +48,7 @@ def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, t
         check_uncovered(page.locator(".lab-stop"))
         page.screenshot(path=tmp_path / f"{view}-notices.png")
 
-        page.get_by_text("Advanced", exact=True).click()
+        open_advanced(page, page.get_by_role("combobox", name="Observation level"))
         page.get_by_role("combobox", name="Observation level").click()
         page.get_by_role("option", name="encoders").wait_for()
         page.wait_for_timeout(400)  # until it has moved in

@@ -6,7 +6,7 @@ import pytest
 
 from realitygap.records import ResultsFolder
 
-from .conftest import OUTAGE, PHONE
+from .conftest import OUTAGE, PHONE, open_advanced
 
 TINY = """
 [study]
@@ -37,7 +37,7 @@ def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
     page.get_by_label("Runs per condition").fill("5")
     page.wait_for_timeout(600)  # a field waits a moment for more letters
     page.get_by_role("button", name="Remove condition").last.click()
-    page.get_by_text("Advanced", exact=True).click()
+    open_advanced(page, page.get_by_label("Filter settings"))
     page.get_by_label("Filter settings").fill("generations")
     page.get_by_label("Generations", exact=True).fill("2")
     page.wait_for_timeout(600)  # a field waits a moment for more letters

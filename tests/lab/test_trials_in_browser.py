@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import OUTAGE, PHONE, check_uncovered
+from .conftest import OUTAGE, PHONE, check_uncovered, open_advanced
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
 
 pytestmark = pytest.mark.slow
@@ -213,7 +213,7 @@ def test_codes_alone_are_shown_while_counting_is_blind(lab, visit):
 def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
     make_study(lab.root)
     page = visit(PAGE)
-    page.get_by_text("Advanced", exact=True).click()
+    open_advanced(page, page.get_by_role("combobox", name="Scored by"))
     page.get_by_role("combobox", name="Scored by").click()
     page.get_by_role("option", name="The emulator").click()
     begin_sitting(page)

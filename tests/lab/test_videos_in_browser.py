@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from .conftest import open_advanced
 from .robot_study import begin_sitting, ledger_of, make_study, tap
 from .sheets import drive_paths, film_of, true_cells
 
@@ -48,7 +49,7 @@ def test_a_camera_that_cannot_be_is_told_and_a_sitting_begins_without(lab, visit
     make_study(lab.root)
     page = visit(PAGE)
     field = page.get_by_label("Camera", exact=True)
-    page.get_by_text("Advanced", exact=True).click()
+    open_advanced(page, field)
     field.fill(camera)
     begin_sitting(page)
     page.locator(".lab-problem", has_text=said).wait_for()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from realitygap._limits import parse_json
 from realitygap.errors import LogError, from_extra
 
 from ._source import RECORDED, Batch, check_columns
@@ -128,7 +128,7 @@ class _JsonMessages:
         try:
             with self.path.open("rb") as file:
                 for _, _, message in make_reader(file).iter_messages(topics=[topic]):
-                    yield message.log_time * NS, json.loads(message.data)
+                    yield message.log_time * NS, parse_json(message.data)
         except Exception as error:
             raise _damaged(self.path, error) from error
 

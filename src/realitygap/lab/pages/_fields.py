@@ -44,6 +44,7 @@ class Form:
 
     def __init__(self) -> None:
         self._fields: dict[str, _Field] = {}
+        self._refused: dict[str, tuple[Any, str]] = {}
 
     def summary(self) -> None:
         """Show the place for the summary of mistakes."""
@@ -205,6 +206,11 @@ class Form:
         Args:
             problems: Messages by key; a key that is no field's is shown in the summary only.
         """
+        self._refused = {
+            key: (self._fields[key].input.value, text)
+            for key, text in problems.items()
+            if key in self._fields
+        }
         for key, field in self._fields.items():
             self._mark(field, problems.get(key, ""))
             if key in problems:
@@ -226,6 +232,11 @@ class Form:
                     link.on("click", js_handler=f"(e) => {{ e.preventDefault(); {_focus(target)} }}")
         ui.run_javascript(f"setTimeout(() => {{ {_focus(self._summary.html_id)} }}, 50)")
 
+    def _refused_again(self, key: str) -> str:
+        """Return the message about a value that was refused and has not changed; empty if there is none."""
+        value, text = self._refused.get(key, (None, ""))
+        return text if text and self._fields[key].input.value == value else ""
+
     def _around(self, label: str) -> ui.element:
         box = ui.element("div").classes("lab-field")
         with box:
@@ -241,7 +252,7 @@ class Form:
         problem = ui.label("").classes("lab-problem")
         field = self._fields[key] = _Field(label, element, problem, note, check)
         self._mark(field, "")
-        element.on("blur", lambda: self._mark(field, self._checked(key)))
+        element.on("blur", lambda: self._mark(field, self._checked(key) or self._refused_again(key)))
 
     def _checked(self, key: str) -> str:
         """The mistake in a field; empty if there is none."""

@@ -57,8 +57,8 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
         later = visit("study/seen")  # who comes later sees the line from its beginning
         later.get_by_role("tab", name="Replay").click()
         later.locator(".rg-live .rg-trail").wait_for()
-        first = later.locator(".rg-trail").get_attribute("points").split()[0]
-        assert first == page.locator(".rg-trail").get_attribute("points").split()[0]
+        first = later.locator(".rg-live .rg-trail").get_attribute("points").split()[0]
+        assert first == page.locator(".rg-live .rg-trail").get_attribute("points").split()[0]
         page.get_by_role("button", name="End drive").click()
         page.get_by_text("Stopped.").wait_for()
         for shown in (later, page):

@@ -89,7 +89,7 @@ class BoardClock:
         """
         until = self.now() + seconds
         while (left := until - self.now()) > SHORTEST_S:
-            if self.unread_s >= UNREAD_S:
+            if self.unread_s >= UNREAD_S - SHORTEST_S:
                 self._read()
                 continue
             time.sleep(min(left / self.rate, (UNREAD_S - self.unread_s) / self.rate, HEAR_S))

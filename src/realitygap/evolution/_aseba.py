@@ -37,8 +37,8 @@ FULL_SPEED = 300
 """Target of a wheel for a command of 1."""
 READING_MAX = 4505
 """Reading of an infrared sensor that touches white paper; source: Enki, `Thymio2.cpp`."""
-GROUND_MAX = 1023
-"""Largest reading of a ground sensor."""
+GROUND_WHITE, GROUND_BLACK = 938, 76
+"""Readings of a ground sensor on white and on black; source: means of 3,000 readings each in Enki 1.6.99."""
 N_TRIED = 1000
 """Random sets of inputs from which the error in a program is."""
 LEAST_SHOWN = 1e-6
@@ -335,9 +335,10 @@ def _inputs(code: _Code, sensed: Sequence[str], steps: int, reading_max: int) ->
     for place, sensor, n in _runs(sensed, "range"):
         _scaled(code, place, n, _span("prox.horizontal", sensor, n), reading_max)
     for place, sensor, n in _runs(sensed, "line"):
-        _scaled(code, place, n, _span("prox.ground.delta", sensor, n), GROUND_MAX)
         nodes = _span("nodes", place, n)
-        code.call("math.sub", nodes, _span("weights", 0, n), nodes)
+        code.call("math.fill", nodes, GROUND_WHITE)
+        code.call("math.sub", nodes, nodes, _span("prox.ground.delta", sensor, n))
+        _scaled(code, place, n, nodes, GROUND_WHITE - GROUND_BLACK)
     for place, name in enumerate(sensed):
         if name == "obstacle":
             code.call("math.stat", "prox.horizontal", "low", "high", "mean")

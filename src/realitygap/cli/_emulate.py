@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from realitygap.emulator import Emulator, PlaygroundServer, Server
 
+ROBOTS = ("scribbler", "thymio")
+"""Robots that can be emulated."""
+
 
 def emulate(
     robot: Annotated[
@@ -120,6 +123,8 @@ def emulate(
 
     In Python: realitygap.emulator.serve_pty(realitygap.emulator.Emulator("s2", "2"))
     """
+    if robot not in ROBOTS:
+        raise RobotError(f"Unknown robot {robot!r}. Known: {', '.join(ROBOTS)}.")
     if robot == "thymio":
         given: dict[str, object] = {"--model": model, "--fluke": fluke, "--twin": twin, "--link": link}
         given |= {
@@ -136,8 +141,6 @@ def emulate(
             )
         _emulate_thymio(arena, speed, tcp, witness, window=window, quiet=quiet)
         return
-    if robot != "scribbler":
-        raise RobotError(f"Unknown robot {robot!r}. Known: scribbler, thymio.")
     if window:
         raise RobotError("--window goes with thymio: a Scribbler is shown in the terminal.")
     if speed == 0 and witness is None:

@@ -203,6 +203,24 @@ def test_a_damaged_question_is_one_error_and_the_motors_stop(fault, on_its_clock
     check_faults("to_robot", fault, 7, on_its_clock)
 
 
+def test_a_robot_that_turns_while_its_program_cannot_start_is_stopped(on_its_clock):
+    """Its own remote control may turn the wheels before the program on board runs."""
+    port = on_its_clock(FakePort())
+    answer = port.robot.answer
+
+    def turning(message, now):
+        if message.kind != Kind.RUN:
+            return answer(message, now)
+        port.robot.memory[LEFT] = 100
+        return b""
+
+    port.robot.answer = turning
+    with pytest.raises(RobotError, match="program does not run"):
+        Thymio(port)
+    assert port.robot.motors(port.clock.now()) == STILL
+    assert not port.is_open
+
+
 def test_a_late_answer_is_not_taken_for_that_of_the_next_question(on_its_clock):
     """An answer that came late once put each later reading one question behind."""
     port = on_its_clock(FakePort())

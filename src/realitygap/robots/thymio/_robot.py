@@ -155,12 +155,8 @@ class Thymio:
         try:
             self.description = self.link.find()
             self._check_variables()
-            self.link.write(self.description, self._at(_TARGETS[0]), (0,))
-            self.link.write(self.description, self._at(_TARGETS[1]), (0,))
-            self.link.load(self.description)
-            self._wait_for_program()
+            self._load_program()
             firmware = self._read_one("_fwversion")
-            self.link.guard(_stop_messages(self.description))
         except BaseException as error:
             self._give_up(name, error)
             raise
@@ -218,6 +214,18 @@ class Thymio:
                 raise RobotError(
                     f"The robot does not describe {name}: is it a Thymio II with its own firmware?"
                 )
+
+    def _load_program(self) -> None:
+        """Stop the motors, and load what stops them later; if that fails, stop them without it."""
+        try:
+            _stop(self.link, self.description)
+            self.link.load(self.description)
+            self._wait_for_program()
+            self.link.guard(_stop_messages(self.description))
+        except BaseException:
+            with contextlib.suppress(RobotError):
+                self.link.send(_stop_messages(self.description))
+            raise
 
     def _wait_for_program(self) -> None:
         """Return when the program runs, and its clock has been compared with ours."""

@@ -12,18 +12,12 @@ SOURCES = Path(realitygap.__file__).parent
 PACKAGES = {path.name for path in SOURCES.iterdir() if (path / "__init__.py").exists()}
 
 KNOWN_CYCLES = {
-    # an object knows what it belongs to
-    "robots.jyro._device robots.jyro._robot robots.jyro._world",
-    "platforms.sim._world platforms.sim._world_robot",
-    "myro._current myro._robot myro._sound",
     # a platform is a table of settings, and opens what reads these settings
     "platforms._platform platforms._stepwise",
     "platforms.jyro._fleet platforms.jyro._platform platforms.jyro._robot platforms.jyro._trials",
     "platforms.sim._company platforms.sim._fleet platforms.sim._platform platforms.sim._robot platforms.sim._scene "
     "platforms.sim._trials",
     "platforms.twin._platform platforms.twin._trials",
-    # an arena's numbers are those of its file
-    "world._arena world._arena_file",
 }
 """Modules that import each other, function-level imports and those for type checkers included. Add none."""
 

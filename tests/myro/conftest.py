@@ -3,7 +3,7 @@
 import pytest
 
 from realitygap import myro
-from realitygap.myro import _current
+from realitygap.myro import _robot
 
 SETUPS = {
     "s1": ("s1", "none"),
@@ -17,17 +17,17 @@ SETUPS = {
 def open_robot(model, fluke, more=""):
     """Open an emulated robot by `initialize`; gives Myro's object."""
     myro.initialize(f"emulator://{model}?fluke={fluke}&speed=off&seed=1{more}")
-    return _current.robot_or_none()
+    return _robot.robot_or_none()
 
 
 @pytest.fixture(autouse=True)
 def no_robot_left():
     """Each test begins and ends without a robot."""
     yield
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     if robot is not None:
         robot.close()
-    assert _current.robot_or_none() is None
+    assert _robot.robot_or_none() is None
 
 
 @pytest.fixture(params=SETUPS, ids=list(SETUPS))
@@ -53,4 +53,4 @@ def full():
 @pytest.fixture
 def witness():
     """Sees the robot that is open."""
-    return lambda: _current.robot_or_none().driver.port.witness
+    return lambda: _robot.robot_or_none().driver.port.witness

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from realitygap import myro
-from realitygap.myro import MyroError, _current, timer, timeRemaining
+from realitygap.myro import MyroError, _robot, timer, timeRemaining
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def clock(monkeypatch):
             self.time += seconds
 
     ticking = Ticking()
-    monkeypatch.setattr(_current, "_WALL", ticking)
+    monkeypatch.setattr(_robot, "_WALL", ticking)
     return ticking
 
 

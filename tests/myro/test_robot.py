@@ -6,7 +6,7 @@ import pytest
 
 from realitygap import myro
 from realitygap.errors import RobotError
-from realitygap.myro import MyroError, _current
+from realitygap.myro import MyroError, _robot
 from realitygap.myro._catalog import DONE
 
 from .conftest import open_robot
@@ -47,7 +47,7 @@ def test_the_robot_greets_and_is_known_as_robot(setup, capsys):
 def test_opening_another_robot_lets_go_of_the_first(full):
     first = full
     second = open_robot("s1", "none")
-    assert _current.robot_or_none() is second
+    assert _robot.robot_or_none() is second
     assert not first._driver.link.is_open
 
 
@@ -55,7 +55,7 @@ def test_a_robot_is_an_object_too():
     with myro.Scribbler("emulator://s2?speed=off") as own:
         own.forward(1, 0.5)
         assert "s2" in repr(own)
-    assert _current.robot_or_none() is None
+    assert _robot.robot_or_none() is None
     made = myro.makeRobot("Scribbler", "emulator://s1?speed=off")
     assert made.driver.info.model == "s1"
     with pytest.raises(MyroError, match="makeRobot: the kind is 'Create'"):
@@ -92,7 +92,7 @@ def test_without_an_argument_the_port_is_asked_for(monkeypatch):
 def test_a_port_that_cannot_be_opened_is_said_plainly(port, message):
     with pytest.raises(MyroError, match=message):
         myro.initialize(port)
-    assert _current.robot_or_none() is None
+    assert _robot.robot_or_none() is None
 
 
 def test_options_of_the_simulator_are_refused_for_other_ports():

@@ -9,12 +9,12 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 
 from realitygap import myro
-from realitygap.myro import MyroError, _current, _view
+from realitygap.myro import MyroError, _robot, _view
 
 
 def open_sim(**options):
     myro.initialize("sim", **({"speed": "off"} | options))
-    return _current.robot_or_none().simulation
+    return _robot.robot_or_none().simulation
 
 
 def test_a_simulated_robot_is_a_scribbler_2_with_a_fluke_2():
@@ -170,7 +170,7 @@ def test_a_notebook_shows_a_robot_without_a_clock_of_its_own_whenever_the_progra
     myro.forward(0.5, 1)
     myro.wait(1)
     assert len(screen) > before
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     robot.close()
     last = len(screen)
     assert "visited" in screen[-1]

@@ -344,7 +344,7 @@ TABLE = st.dictionaries(
     )
 )
 def test_whatever_values_come_there_is_an_arena_or_a_message(values):
-    arena = made_or_told(lambda: ArenaFile(name="x", **values).arena())
+    arena = made_or_told(lambda: Arena.from_file(ArenaFile(name="x", **values)))
     assert arena, "a mistake is told in words"
     if not isinstance(arena, str):
         assert Arena.from_dict(json.loads(json.dumps(arena.to_dict()))) == arena

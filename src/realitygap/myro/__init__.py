@@ -20,6 +20,7 @@ from ._ask import ask, askQuestion, pickAColor, pickAFile, pickAFolder
 from ._catalog import LEFT_OUT, names
 from ._chance import even, flipCoin, heads, odd, pickOne, pickOneInRange, randomNumber, tails
 from ._colors import *
+from ._computer import Computer, beepScale, computer
 from ._functions import *
 from ._graphics import (
     Circle,
@@ -51,7 +52,6 @@ from ._pictures import *
 from ._robot import Scribbler, SimScribbler, init, initialize, makeRobot, simulator, stop, stop_robot
 from ._show import forget_cells, repaint, show
 from ._songs import getNoteFromFrequency, makeSong, readSong, saveSong, song2text, text2song
-from ._sound import Computer, beepScale, computer
 from ._speech import makeStory, numberGame, speak, stopSpeaking
 from ._time import currentTime, timer, timeRemaining, wait
 from ._together import doTogether, getFilenames, loop

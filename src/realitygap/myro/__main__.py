@@ -18,7 +18,7 @@ from typing import Any
 import realitygap.myro as myro
 from realitygap.errors import RealityGapError
 
-from . import _current
+from . import _robot
 from ._base import TimeUp
 from ._mistakes import explanation
 from ._ports import force_port
@@ -161,7 +161,7 @@ def _said_at_exit(end: SystemExit) -> str | None:
 
 
 def _end() -> None:
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     if robot is not None:
         _finished.append((robot.simulation, robot.clock.now()))
         robot.close()
@@ -215,18 +215,18 @@ def _on_the_robots_clock() -> Iterator[None]:
 
 
 def _is_untimed() -> bool:
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     return robot is not None and robot.simulation is not None and not robot.simulation.is_timed
 
 
 @contextlib.contextmanager
 def _limited(limit: float | None) -> Iterator[None]:
     """Give each robot that is opened so many seconds."""
-    _current.set_limit(limit)
+    _robot.set_limit(limit)
     try:
         yield
     finally:
-        _current.set_limit(None)
+        _robot.set_limit(None)
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import builtins
 from typing import Any
 
-from . import _current
-from ._current import of_robot
+from . import _robot
+from ._computer import computer
 from ._mistakes import MyroError
-from ._robot import Scribbler
-from ._sound import computer
+from ._robot import Scribbler, of_robot
 
 forward = of_robot(Scribbler.forward)
 backward = of_robot(Scribbler.backward)
@@ -105,7 +104,7 @@ def beep(duration: Any = 0.5, frequency1: Any = None, frequency2: Any = None) ->
         frequency1: [Hz]; one by chance where none is given; a list plays each in turn.
         frequency2: Of a second tone at the same time [Hz].
     """
-    (_current.robot_or_none() or computer).beep(duration, frequency1, frequency2)
+    (_robot.robot_or_none() or computer).beep(duration, frequency1, frequency2)
 
 
 def scaleUp(loopCount: int) -> None:
@@ -120,7 +119,7 @@ def scaleDown(loopCount: int) -> None:
 
 def getInfo(*item: str) -> Any:
     """What the robot says of itself, by name; without a robot only Myro's version."""
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     if robot is not None:
         return robot.getInfo(*item)
     from realitygap._version import __version__
@@ -142,4 +141,4 @@ def set(*args: Any) -> Any:
         raise MyroError(
             f"set() was given {len(args)} values, expected an item, a position and perhaps a value."
         )
-    return _current.robot_for("set").set(*args)
+    return _robot.robot_for("set").set(*args)

@@ -1,14 +1,18 @@
-"""Myro's robot: what programs call `robot`, and what Myro's functions speak to."""
+"""Myro's robot, the one in use and its clock, and how a method of a robot becomes a function of Myro."""
 
 from __future__ import annotations
 
+import builtins
 import contextlib
-from typing import Any
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
+from realitygap.robots import SystemClock
 
-from . import _current
 from ._base import Base
 from ._camera import Camera
 from ._driving import Driving
@@ -20,6 +24,13 @@ from ._paths import Paths
 from ._ports import open_port
 from ._senses import Senses
 from ._sound import Sound
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+_WALL = SystemClock()
+_in_use: Scribbler | None = None
+_limit_s: float | None = None
 
 _HELLO = (784, 880, 698, 349, 523)
 """The tones of a robot that was just opened [Hz], each of 30 ms: Myro's."""
@@ -40,13 +51,13 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
     """
 
     def __init__(self, port: str | int | None = None, **options: Any) -> None:
-        before = _current.robot_or_none()
+        before = robot_or_none()
         if before is not None:
             with contextlib.suppress(RobotError):  # a robot that is gone shall not keep the next one away
                 before.close()
         self._port, self._options = port, options
         self.openConnection()
-        _current.use(self)
+        use(self)
         self.restart()
 
     def __repr__(self) -> str:
@@ -62,8 +73,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         """
         self._driver, self.simulation = open_port(self._port, **self._options)
         self.clock = self._driver.clock
-        limit = _current.limit()
-        self.deadline = None if limit is None else self.clock.now() + limit
+        self.deadline = None if _limit_s is None else self.clock.now() + _limit_s
 
     open = openConnection
 
@@ -78,8 +88,8 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         try:
             self.closeConnection()
         finally:
-            if _current.robot_or_none() is self:
-                _current.use(None)
+            if robot_or_none() is self:
+                use(None)
 
     def restart(self) -> None:
         """Stop the robot, switch its lights off, let it play its five tones and greet."""
@@ -92,14 +102,14 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         print(f"Hello, I'm {self.getName()}!")
 
     def reboot(self) -> None:
-        """Let the robot start anew, as its reset button does."""
+        """Restart the robot, as its reset button does."""
         self.driver.reset_robot()
 
     def update(self) -> None:
-        """Do nothing: readings are always asked for anew. Kept because programs call it."""
+        """Do nothing: each reading asks the robot. Programs call it."""
 
     def requestStop(self) -> None:
-        """Stop the robot, from wherever in a program."""
+        """Stop the robot, from anywhere in a program."""
         self.stop()
 
     def set(self, item: str, position: Any, value: Any = None) -> None:
@@ -154,6 +164,67 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         }
 
 
+def robot_or_none() -> Scribbler | None:
+    """The robot in use; None before `initialize` and after it was closed."""
+    return _in_use
+
+
+def use(robot: Scribbler | None) -> None:
+    """From now on Myro's functions speak to this robot, which programs also know as `robot`."""
+    global _in_use
+    _in_use = robot
+    builtins.robot = robot  # type: ignore[attr-defined]  # as in Myro: programs just say robot.forward()
+
+
+def set_limit(seconds: float | None) -> None:
+    """Limit the time of a program with each robot that it opens from now on [s]; None for no limit."""
+    global _limit_s
+    _limit_s = seconds
+
+
+def robot_for(function: str) -> Scribbler:
+    """The robot in use.
+
+    Raises:
+        MyroError: There is none; the text says how to get one.
+    """
+    if _in_use is None:
+        raise MyroError(
+            f'{function}() needs a robot, and there is none yet. Call initialize("sim") for a simulated one, or '
+            'initialize("/dev/rfcomm0") (on Windows initialize("COM3")) with the port of yours.'
+        )
+    return _in_use
+
+
+def now() -> float:
+    """The time on the robot's clock [s]; on the computer's where there is no robot."""
+    return _WALL.now() if _in_use is None else _in_use.now()
+
+
+def sleep(seconds: float) -> None:
+    """Let time pass [s]: a simulated robot moves on meanwhile."""
+    if _in_use is None:
+        _WALL.sleep(seconds)
+    else:
+        _in_use.pause(seconds)
+
+
+def of_robot(method: Callable[Concatenate[Scribbler, P], T]) -> Callable[P, T]:
+    """Myro's function of the name of a method: it does the same with the robot in use."""
+    name = method.__name__
+
+    @functools.wraps(method)
+    def function(*args: P.args, **kwargs: P.kwargs) -> T:
+        return method(robot_for(name), *args, **kwargs)
+
+    signature = inspect.signature(method)
+    function.__signature__ = signature.replace(  # type: ignore[attr-defined]  # what help() shows
+        parameters=list(signature.parameters.values())[1:]
+    )
+    function.__qualname__ = name
+    return function
+
+
 def initialize(id: str | int | None = None, **options: Any) -> None:
     """Open a robot, which from now on obeys Myro's functions, and greet.
 
@@ -200,7 +271,7 @@ def SimScribbler(id: object = None, **options: Any) -> Scribbler:
 
 def stop() -> None:
     """Stop both wheels; without a robot nothing happens, as in Myro."""
-    robot = _current.robot_or_none()
+    robot = robot_or_none()
     if robot is not None:
         robot.stop()
 

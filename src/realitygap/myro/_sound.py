@@ -1,13 +1,11 @@
-"""Tones and songs, from the robot or from the computer."""
+"""Tones, notes and songs, and the speaker of the robot."""
 
 from __future__ import annotations
 
 import random
-import sys
 from collections.abc import Sequence
 from typing import Any
 
-from . import _current
 from ._base import Base
 from ._mistakes import MyroError, is_on, number, whole
 from ._songs import Note
@@ -108,32 +106,3 @@ class Sound(Plays, Base):
     def getStartSong(self) -> str:
         """The name that `setStartSong` remembered; "tada" before."""
         return self._start_song
-
-
-class Computer(Plays):
-    """The computer as a player of tones: it rings the terminal's bell and waits as long as the tone lasts."""
-
-    def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
-        if hz:
-            sys.stdout.write("\a")
-            sys.stdout.flush()
-        _current.sleep(duration)
-
-    def speak(self, message: object, async_: bool = False) -> None:
-        """Print what the computer would say."""
-        print(message)
-
-
-computer = Computer()
-
-
-def beepScale(duration: float, start: float, stop: float, factor: float = 2) -> None:
-    """Let the computer play tones from one frequency to another, each so many times the one before."""
-    if number("beepScale: the factor", factor) <= 1 or number("beepScale: the start", start) <= 0:
-        raise MyroError(
-            f"beepScale: starts at {start!r} and grows by {factor!r}, expected a start above 0 and a factor above 1."
-        )
-    hz = start
-    while hz <= stop:
-        computer.beep(duration, hz)
-        hz *= factor

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from types import CodeType, FrameType
 
-from . import _current
+from . import _robot
 from ._mistakes import number
 
 _Site = tuple[CodeType, int]  # a line of a program
@@ -19,12 +19,12 @@ def wait(seconds: float) -> None:
     Raises:
         MyroError: It is not a number of at least 0.
     """
-    _current.sleep(number("wait: the seconds", seconds, 0))
+    _robot.sleep(number("wait: the seconds", seconds, 0))
 
 
 def currentTime() -> float:
     """The time [s]; only differences mean something."""
-    return _current.now()
+    return _robot.now()
 
 
 def timer(seconds: float = 0) -> Iterator[float]:
@@ -37,9 +37,9 @@ def timer(seconds: float = 0) -> Iterator[float]:
         MyroError: It is not a number of at least 0.
     """
     duration = number("timer: the seconds", seconds, 0)
-    start = _current.now()
+    start = _robot.now()
     while True:
-        passed = _current.now() - start
+        passed = _robot.now() - start
         if duration and passed > duration:
             return
         yield round(passed, 3)
@@ -64,7 +64,7 @@ def timeRemaining(seconds: float = 0) -> bool:
         return True
     caller = sys._getframe(1)
     site = (caller.f_code, caller.f_lineno)  # Python compiles the test of a loop twice, on one line
-    now = _current.now()
+    now = _robot.now()
     frame, start, before = _timers.get(site, (None, now, duration))
     if frame is not caller or before != duration:
         _timers[site] = (caller, now, duration)

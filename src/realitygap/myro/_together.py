@@ -7,7 +7,7 @@ from collections.abc import Callable
 from inspect import signature
 from typing import Any
 
-from . import _current
+from . import _robot
 from ._base import Part
 from ._mistakes import MyroError, whole
 from ._robot import stop_robot
@@ -35,7 +35,7 @@ def loop(*functions: Any) -> str:
             print(f"   loop #{turn}: running {_name(step)}()... ", end="")
             result = step(turn) if signature(step).parameters else step()
             print(f" => {result}" if result else "")
-    robot = _current.robot_or_none()
+    robot = _robot.robot_or_none()
     if robot is not None:
         robot.stop()
     return "ok"

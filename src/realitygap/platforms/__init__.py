@@ -37,8 +37,7 @@ from .sim._platform import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform, as_numbers,
 from .sim._robot import SimRobot
 from .sim._scene import SimScene, sim_scene
 from .sim._trials import SimTrials
-from .sim._world import SimWorld
-from .sim._world_robot import SimWorldRobot
+from .sim._world import SimWorld, SimWorldRobot
 from .thymio._platform import ThymioPlatform
 from .twin._open import SimTwin, open_twin
 from .twin._platform import TwinPlatform

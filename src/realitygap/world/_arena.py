@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from realitygap.drawing import picture_of
 
+from ._arena_file import ArenaFile
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor
 from ._obstacle import Goal, Light, Obstacle, Segment
@@ -16,6 +17,8 @@ from ._units import INCH
 
 MOST_ROBOTS = 16
 """Robots in an arena at once, at most."""
+
+PREFIX = "arena."
 
 
 class Pose(NamedTuple):
@@ -150,9 +153,7 @@ class Arena:
 
     def numbers(self) -> dict[str, float | Distribution]:
         """Every number that may be drawn, by its dotted name: "arena.start.x" and so on."""
-        from ._arena_file import ArenaFile
-
-        return ArenaFile.of(self).arena_numbers()
+        return {PREFIX + name: value for name, value in self._file().numbers().items()}
 
     def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Arena:
         """The same arena with other numbers.
@@ -163,9 +164,47 @@ class Arena:
         Raises:
             ValueError: There is no such number, or it cannot be this; every mistake.
         """
-        from ._arena_file import ArenaFile
+        wrong = [
+            f"{name}: expected a name that begins with {PREFIX!r}."
+            for name in values
+            if not name.startswith(PREFIX)
+        ]
+        if wrong:
+            raise ValueError("\n".join(wrong))
+        own = {name.removeprefix(PREFIX): value for name, value in values.items()}
+        return replace(Arena.from_file(self._file().with_numbers(own)), others=self.others)
 
-        return replace(ArenaFile.of(self).with_arena_numbers(values).arena(), others=self.others)
+    def _file(self) -> ArenaFile:
+        """The arena in the form of a file."""
+        return ArenaFile(
+            name=self.name,
+            wall=[list(wall) for wall in self.walls],
+            obstacle=[
+                {"corner" if key == "corners" else key: value for key, value in asdict(obstacle).items()}
+                for obstacle in self.obstacles
+            ],
+            light=[asdict(light) for light in self.lights],
+            floor=self.floor.to_dict(),
+            grid=asdict(self.grid),
+            start=self.start._asdict(),
+            goal=None if self.goal is None else asdict(self.goal),
+            vary={name.removeprefix(PREFIX): drawn for name, drawn in self.vary.items()},
+        )
+
+    @classmethod
+    def from_file(cls, file: ArenaFile) -> Arena:
+        """Return the arena that a file describes."""
+        return cls(
+            file.name,
+            tuple((wall.x1, wall.y1, wall.x2, wall.y2) for wall in file.wall),
+            Grid(**file.resolved_grid().model_dump()),
+            Pose(file.start.x, file.start.y, file.start.heading),
+            tuple(entry.obstacle() for entry in file.obstacle),
+            tuple(Light(light.x, light.y, light.strength) for light in file.light),
+            file.floor.floor(),
+            None if file.goal is None else Goal(file.goal.x, file.goal.y, file.goal.radius),
+            {PREFIX + name: drawn for name, drawn in file.vary.items()},
+        )
 
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg()

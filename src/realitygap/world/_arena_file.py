@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
 from realitygap.settings import Settings, shown
 
-from ._arena import Arena, Grid, Pose
 from ._distribution import Distribution
 from ._floor import MOST_PIXELS, Floor, FloorImage
 from ._numbers import Described, NotNegative, Number, Positive, in_si
-from ._obstacle import TAPE_WIDTH, Goal, Light, Obstacle
+from ._obstacle import TAPE_WIDTH, Obstacle
 from ._part import Corner, box_as_corners, why_no_part
 from ._units import INCH
 
 MOST_CELLS = 256
 MOST_WALLS = 2048
 FARTHEST = 10_000.0  # from the origin [m]: beyond, 32 bit do not tell millimeters apart
-PREFIX = "arena."
 FROM_FILE: dict[str, Any] = {"json_schema_extra": {"hidden": True}}
 
 
@@ -129,6 +126,11 @@ class ObstacleEntry(Settings):
             raise ValueError(problem)
         return self
 
+    def obstacle(self) -> Obstacle:
+        """Return the obstacle that it describes."""
+        corners = tuple((corner.x, corner.y) for corner in self.corner)
+        return Obstacle(self.x, self.y, self.heading, corners, self.radius)
+
 
 class LightEntry(Settings):
     """A light that shines from a point to all sides."""
@@ -169,6 +171,12 @@ class FloorEntry(Settings):
     )
     tape_width: float = Field(TAPE_WIDTH, gt=0, description="Width of the strips [m]. 3/4 in is usual.")
     image: ImageEntry | None = None
+
+    def floor(self) -> Floor:
+        """Return the floor that it describes."""
+        tape = tuple((strip.x1, strip.y1, strip.x2, strip.y2) for strip in self.tape)
+        image = None if self.image is None else FloorImage(**self.image.model_dump(exclude={"file"}))
+        return Floor(tape, self.tape_width, image)
 
 
 class GridEntry(Settings):
@@ -238,85 +246,20 @@ class ArenaFile(Described):
 
     @model_validator(mode="after")
     def _begins_beside_obstacles(self) -> Self:
-        arena = self.arena()
-        for k, obstacle in enumerate(arena.obstacles):
-            if obstacle.distance(arena.start.x, arena.start.y) < 0:
+        for k, entry in enumerate(self.obstacle):
+            if entry.obstacle().distance(self.start.x, self.start.y) < 0:
                 raise ValueError(f"start: lies within obstacle {k}. Move one of the two")
         return self
 
-    @classmethod
-    def of(cls, arena: Arena) -> Self:
-        """An arena in the form of a file."""
-        obstacles = [
-            {
-                "x": each.x,
-                "y": each.y,
-                "heading": each.heading,
-                "corner": list(each.corners),
-                "radius": each.radius,
-            }
-            for each in arena.obstacles
-        ]
-        return cls(
-            name=arena.name,
-            wall=[list(wall) for wall in arena.walls],
-            obstacle=obstacles,
-            light=[asdict(light) for light in arena.lights],
-            floor=arena.floor.to_dict(),
-            grid=asdict(arena.grid),
-            start=arena.start._asdict(),
-            goal=None if arena.goal is None else asdict(arena.goal),
-            vary={name.removeprefix(PREFIX): drawn for name, drawn in arena.vary.items()},
-        )
-
-    def arena(self) -> Arena:
-        """The arena that it describes."""
-        return Arena(
-            self.name,
-            tuple((wall.x1, wall.y1, wall.x2, wall.y2) for wall in self.wall),
-            self._grid(),
-            Pose(self.start.x, self.start.y, self.start.heading),
-            tuple(
-                Obstacle(each.x, each.y, each.heading, tuple((c.x, c.y) for c in each.corner), each.radius)
-                for each in self.obstacle
-            ),
-            tuple(Light(each.x, each.y, each.strength) for each in self.light),
-            self._floor(),
-            None if self.goal is None else Goal(self.goal.x, self.goal.y, self.goal.radius),
-            {PREFIX + name: drawn for name, drawn in self.vary.items()},
-        )
-
-    def arena_numbers(self) -> dict[str, float | Distribution]:
-        """Every number by its dotted name, which begins with "arena."."""
-        return {PREFIX + name: value for name, value in self.numbers().items()}
-
-    def with_arena_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Self:
-        """The same with other numbers, by names that begin with "arena."."""
-        wrong = [name for name in values if not name.startswith(PREFIX)]
-        if wrong:
-            raise ValueError(
-                "\n".join(f"{name}: expected a name that begins with {PREFIX!r}." for name in wrong)
-            )
-        return self.with_numbers({name.removeprefix(PREFIX): value for name, value in values.items()})
-
-    def _grid(self) -> Grid:
+    def resolved_grid(self) -> GridEntry:
+        """Return the grid; where the file has none, 16 cells along the longer side of the walls, in their middle."""
         if self.grid is not None:
-            return Grid(self.grid.x, self.grid.y, self.grid.cell, self.grid.columns, self.grid.rows)
+            return self.grid
         xs = [x for wall in self.wall for x in (wall.x1, wall.x2)] or [self.start.x - 0.5, self.start.x + 0.5]
         ys = [y for wall in self.wall for y in (wall.y1, wall.y2)] or [self.start.y - 0.5, self.start.y + 0.5]
         across, up = max(xs) - min(xs), max(ys) - min(ys)
         cell = max(across, up) / 16 or 1.0 / 16
         columns, rows = (max(1, math.floor(size / cell + 0.5)) for size in (across, up))
-        return Grid(
-            (min(xs) + max(xs) - columns * cell) / 2,
-            (min(ys) + max(ys) - rows * cell) / 2,
-            cell,
-            columns,
-            rows,
-        )
-
-    def _floor(self) -> Floor:
-        tape = tuple((each.x1, each.y1, each.x2, each.y2) for each in self.floor.tape)
-        image = self.floor.image
-        picture = None if image is None else FloorImage(**image.model_dump(exclude={"file"}))
-        return Floor(tape, self.floor.tape_width, picture)
+        x = (min(xs) + max(xs) - columns * cell) / 2
+        y = (min(ys) + max(ys) - rows * cell) / 2
+        return GridEntry(x=x, y=y, cell=cell, columns=columns, rows=rows)

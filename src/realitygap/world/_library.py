@@ -231,7 +231,7 @@ def load_arena(arena: str | Path) -> Arena:
         values = _checked(origin, lambda: in_meters(_in_present_words(written)))
         _read_image(values, origin)
     values.setdefault("name", Path(origin).stem)
-    return _checked(origin, lambda: ArenaFile(**values)).arena()
+    return Arena.from_file(_checked(origin, lambda: ArenaFile(**values)))
 
 
 def _in_present_words(values: dict[str, Any]) -> dict[str, Any]:

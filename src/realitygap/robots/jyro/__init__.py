@@ -7,13 +7,12 @@ your own is a class of a few lines (`Device`). Studies with many trials use the 
 
 from . import _picture  # noqa: F401  # registers the picture of a world
 from ._camera import Camera, Column, DepthCamera, LampSeen
-from ._device import Device, Edge, Mount
 from ._driven import DrivenRobot
 from ._gripper import Gripper
 from ._light import LightMode, LightSensor
 from ._mounted import MountedSensors
 from ._range import Bumper, RangeSensor
-from ._robot import SceneRobot
+from ._robot import Device, Edge, Lamp, Mount, SceneRobot
 from ._robots import Blimp, Pioneer, Puck, Scribbler
 from ._stock import (
     MyroBumper,
@@ -27,7 +26,7 @@ from ._stock import (
     PioneerFrontSonar,
     PioneerFrontSonars,
 )
-from ._world import Area, JyroWorld, Lamp
+from ._world import Area, JyroWorld
 
 __all__ = [
     "Area",

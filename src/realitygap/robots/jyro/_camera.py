@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Shape, rgb_of
 
-from ._device import Device
+from ._robot import Device
 
 if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from realitygap.drawing import Ink, Line, Shape
 from realitygap.world import Pose
 
-from ._device import Device, Edge
-
-if TYPE_CHECKING:
-    from ._robot import SceneRobot
+from ._robot import Device, Edge, SceneRobot
 
 LENGTH = 0.2  # of the paddles [m]
 MOUNT = 0.225  # where they begin, ahead of the robot's center [m]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._device import Device
+from ._robot import Device
 
 
 class MountedSensors(Device):

@@ -1,10 +1,11 @@
-"""A robot in a `JyroWorld`: where it is, how it is driven, what it carries."""
+"""A robot in a `JyroWorld`, the devices that it carries, and what both ask of the world."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +15,105 @@ from realitygap.errors import RobotError
 from realitygap.kernels.jyro.scene import START_ENERGY
 from realitygap.world import Pose
 
-from ._device import Device, Edge
-
-if TYPE_CHECKING:
-    from ._world import JyroWorld
-
+Edge = tuple[float, float, float, float]
+"""Forward and left of one end, then of the other, on a robot [m]."""
+Mount = tuple[float, float, float]
+"""Forward [m], left [m], direction [rad, positive to the left], on a robot."""
 Part = Literal["trails", "rays", "bodies", "devices", "speech"]
 """What a robot is drawn of."""
 _PORTRAIT = 1.0  # side of the picture of one robot [m]
+
+
+@dataclass
+class Lamp:
+    """A lamp: x, y [m], brightness (1 is usual), color; all may be changed, a reset puts them back."""
+
+    x: float
+    y: float
+    brightness: float = 1.0
+    color: str = "yellow"
+
+
+class Surroundings(Protocol):
+    """The world of a robot, as the robot and its devices see it; `JyroWorld` describes the members."""
+
+    step_s: float
+    lights: list[Lamp]
+    light_above_walls: bool
+    random: np.random.Generator
+
+    def look(
+        self, robot: SceneRobot, mounts: NDArray[np.float64], reach: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
+
+    def what(self, hit: int) -> tuple[str, SceneRobot | None]: ...
+
+    def light_at(
+        self, robot: SceneRobot, mounts: NDArray[np.float64], mode: int, reach: float, stops: int
+    ) -> NDArray[np.float64]: ...
+
+    def step(self) -> None: ...
+
+    def reset(self) -> None: ...
+
+    def _is_placed(self, robot: SceneRobot) -> None: ...
+
+    def _has_changed(self) -> None: ...
+
+
+class Device:
+    """Something that a robot carries and that is read, or moves, once in each step.
+
+    A device of your own overrides what it needs of `read`, `move`, `edges`, `shapes` and `reset`:
+
+        class Compass(Device):
+            kind = "compass"
+
+            def read(self):
+                self.heading = self.robot.pose.heading
+
+    Attributes:
+        kind: What `robot[kind]` finds it by; the last added of a kind is found.
+        active: Whether it is read; an inactive one keeps its readings. It still moves and is in the way.
+        robot: Which robot carries it; known once it has been added.
+    """
+
+    kind = "device"
+    robot: SceneRobot
+
+    def __init__(self) -> None:
+        self.active = True
+
+    def read(self) -> None:
+        """Refresh the readings; at the end of each step, when all robots have moved."""
+
+    def move(self) -> None:
+        """Advance by one step; right after the robot moved, and not when it was blocked."""
+
+    def reset(self) -> None:
+        """Back to what it was at first."""
+
+    def edges(self, *, ahead: bool) -> Sequence[Edge]:
+        """Edges that it adds to the robot's body, always as many.
+
+        Args:
+            ahead: Whether as they will be after the next `move`; else as they are.
+        """
+        return ()
+
+    def rays(self) -> list[Shape]:
+        """Shapes of its sight, drawn below the robot, in the world's coordinates [m]."""
+        return []
+
+    def shapes(self) -> list[Shape]:
+        """Shapes of the device, drawn above the robot, in the world's coordinates [m]."""
+        return []
+
+    def to_dict(self) -> dict[str, Any]:
+        """Kind, whether it is active, and readings, as plain values."""
+        return {"kind": self.kind, "active": self.active}
+
+
 AnyDevice = TypeVar("AnyDevice", bound=Device)
 
 
@@ -77,14 +169,14 @@ class SceneRobot:
         self._segments = _segments(segments)
         self._start = Pose(float(x), float(y), float(heading))
         self._row = to_jyro(self._start)
-        self._world: JyroWorld | None = None
+        self._world: Surroundings | None = None
         self.reset()
 
     # where it is
 
     @property
-    def world(self) -> JyroWorld:
-        """The world it is in; asking for it where there is none is a RobotError."""
+    def world(self) -> Surroundings:
+        """The world that it is in; a RobotError if it is in none."""
         if self._world is None:
             raise RobotError(
                 f"The {self.kind} {self.name or ''} is in no world: call world.add(robot) first."
@@ -93,11 +185,11 @@ class SceneRobot:
 
     @property
     def pose(self) -> Pose:
-        """Where it is; the heading lies in -pi..pi."""
+        """Its pose; the heading lies in -pi..pi."""
         return from_jyro(self._row)
 
     def place(self, pose: Sequence[float]) -> None:
-        """Put it somewhere, whatever stands there; odometry does not notice."""
+        """Put it at a pose, into other things, too; odometry stays."""
         self._row[:] = to_jyro(pose)
         self._row[2] %= 2 * math.pi
         if self._world is not None:
@@ -105,7 +197,7 @@ class SceneRobot:
         self._leave_trail()
 
     def point(self, forward: float, left: float) -> Point:
-        """Where a point of the robot is in the world [m]."""
+        """Position in the world of a point of the robot [m]."""
         return self.pose.point(forward, left)
 
     @property
@@ -137,7 +229,7 @@ class SceneRobot:
         self.sideways = 0.0
 
     def say(self, text: str) -> None:
-        """Show a text beside it in pictures; nothing is shown for an empty one."""
+        """Show a text next to it in pictures; an empty one removes it."""
         self.speech = text
 
     def reset(self) -> None:
@@ -221,7 +313,7 @@ class SceneRobot:
         return Line(points, line, 0.8, closed=True, fill=hex_of(fill))
 
     def parts(self) -> dict[Part, list[Shape]]:
-        """What it looks like, part by part, from the hindmost to the foremost."""
+        """Its shapes, part by part, from the hindmost to the foremost."""
         return {
             "trails": self._trail_shapes(),
             "rays": [shape for device in self.devices if device.active for shape in device.rays()],
@@ -259,7 +351,7 @@ class SceneRobot:
         return Picture(self.kind, about, x - half, y - half, x + half, y + half, shapes).to_svg(180.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """What it is and does, devices and their readings included, as plain values."""
+        """State of the robot, with its devices and their readings, as plain values."""
         return {
             "name": self.name,
             "kind": self.kind,

@@ -18,20 +18,10 @@ from realitygap.kernels.jyro import scene as kernel
 from realitygap.world import Arena
 
 from ._files import save_movie, save_picture
-from ._robot import SceneRobot
+from ._robot import Lamp, SceneRobot
 
 AnyRobot = TypeVar("AnyRobot", bound=SceneRobot)
 STEP_S = 0.1
-
-
-@dataclass
-class Lamp:
-    """A lamp: x, y [m], brightness (1 is usual), color; all may be changed, a reset puts them back."""
-
-    x: float
-    y: float
-    brightness: float = 1.0
-    color: str = "yellow"
 
 
 @dataclass(frozen=True)

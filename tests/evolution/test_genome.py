@@ -49,7 +49,7 @@ def test_a_first_genome_is_inputs_wired_to_outputs() -> None:
     links = [(gene.innovation, gene.source, gene.target) for gene in genome.connections]
     assert links == [(0, 0, 3), (1, 1, 3), (2, 2, 3), (3, 0, 4), (4, 1, 4), (5, 2, 4)]
     assert (genome.n_hidden, genome.n_enabled) == (0, 6)
-    assert repr(genome) == "Genome(5 nodes, 6 of 6 connections enabled)"
+    assert repr(genome) == "Genome(2→2, 0 hidden nodes, 6 connections)"
     assert all(node.kind != "bias" for node in evolved(0, bias=False).ask()[0].nodes)
 
 

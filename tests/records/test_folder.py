@@ -36,16 +36,16 @@ READERS = {
 def test_repr_says_which_study_and_how_much_of_it(tmp_path):
     folder = ResultsFolder.create(tmp_path / "r", DESCRIPTION | {"replicates": 5})
     folder.publish("coverage", 0, make_rows(n=3), HASH)
-    expected = f"<ResultsFolder '{tmp_path / 'r'}': study 'example', 2 conditions, 3 of 10 runs>"
+    expected = f"ResultsFolder('{tmp_path / 'r'}', 2 conditions, 3/10 runs)"
     assert repr(folder) == repr(ResultsFolder.open(folder.path)) == expected
     (folder.path / "trials" / "photo.jpg").touch()
-    assert repr(folder) == f"<ResultsFolder '{tmp_path / 'r'}': study 'example', damaged>"
+    assert repr(folder) == f"ResultsFolder('{tmp_path / 'r'}', damaged)"
 
 
 def test_repr_does_without_a_number_of_replicates(tmp_path):
     folder = ResultsFolder.create(tmp_path / "r", {"conditions": ["coverage"]})
     folder.publish("coverage", 0, make_rows(n=3), HASH)
-    assert repr(folder).endswith("study None, 1 condition, 3 runs>")
+    assert repr(folder).endswith(", 1 condition, 3 runs)")
 
 
 def test_create_makes_a_folder_that_open_finds(tmp_path):

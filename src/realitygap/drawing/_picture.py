@@ -14,7 +14,7 @@ FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sa
 
 Point = tuple[float, float]
 
-_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """What a user's text may hold and XML may not."""
 
 
@@ -150,7 +150,7 @@ def _number(value: float) -> str:
 
 
 def _text(text: str) -> str:
-    return html.escape(_NOT_XML.sub("", text))
+    return html.escape(NOT_XML.sub("", text))
 
 
 def _line(line: Line, points: list[Point]) -> str:

@@ -1,10 +1,11 @@
-"""The picture of an object, without an import of what draws it."""
+"""The picture, the card, and the widget of an object, without an import of what draws it."""
 
 from __future__ import annotations
 
 import functools
 from typing import Any
 
+from ._card import Card
 from ._picture import Picture
 
 
@@ -16,3 +17,19 @@ def picture_of(shown: Any, **options: Any) -> Picture:
         TypeError: Nothing draws this type.
     """
     raise TypeError(f"Nothing draws {type(shown).__name__}.")
+
+
+@functools.singledispatch
+def card_of(shown: Any) -> Card:
+    """Return the card of an object. A module that describes a type registers its function here.
+
+    Raises:
+        TypeError: Nothing describes this type.
+    """
+    raise TypeError(f"Nothing describes {type(shown).__name__}.")
+
+
+@functools.singledispatch
+def widget_of(shown: Any) -> Any:
+    """Return the widget of an object; None if it has none, or what shows it is not installed."""
+    return None

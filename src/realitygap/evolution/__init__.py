@@ -1,5 +1,6 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
+from . import _cards  # noqa: F401  # what notebooks show
 from ._archive import NoveltyArchive
 from ._archive_members import Member, archive_members
 from ._aseba import aseba_error, to_aseba

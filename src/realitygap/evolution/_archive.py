@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.drawing import card_of
 from realitygap.kernels.neat import distances
 from realitygap.kernels.neat import novelty as novelty_kernels
 
@@ -40,6 +41,17 @@ class NoveltyArchive:
 
     def __len__(self) -> int:
         return int(self._state[0]) if self._paper is None else len(self._paper)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.settings.kind!r}, {len(self)} behaviors)"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+    @property
+    def grid_size(self) -> tuple[int, int]:
+        """Columns and rows of the grid."""
+        return self._columns, self._rows
 
     @property
     def packed(self) -> distances.Behaviors:

@@ -11,7 +11,7 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.drawing import picture_of
+from realitygap.drawing import card_of, picture_of
 from realitygap.errors import ControllerError, RecordError
 from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels.neat.network import Networks, activate, decode_rows, make_networks
@@ -364,6 +364,9 @@ class Genome:
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg(300.0)
 
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Genome):
             return NotImplemented
@@ -373,7 +376,12 @@ class Genome:
     __hash__ = None  # type: ignore[assignment]  # arrays behind it may be large; compare, do not index
 
     def __repr__(self) -> str:
-        return f"Genome({len(self.nodes)} nodes, {self.n_enabled} of {len(self.connections)} connections enabled)"
+        n_inputs = self.rules.n_inputs - (self.rules.bias_input >= 0)
+        hidden = f"{self.n_hidden} hidden node{'s' * (self.n_hidden != 1)}"
+        n_off = len(self.connections) - self.n_enabled
+        off = f", {n_off} disabled" if n_off else ""
+        connections = f"{self.n_enabled} connection{'s' * (self.n_enabled != 1)}"
+        return f"Genome({n_inputs}→{self.rules.n_outputs}, {hidden}, {connections}{off})"
 
 
 _OF_NO_ROW = {"full", "reached", "cursor", "ends"}

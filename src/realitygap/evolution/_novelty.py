@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from realitygap.drawing import card_of
 from realitygap.kernels.neat import novelty as novelty_kernels
 from realitygap.settings import Settings
 
@@ -128,6 +129,17 @@ class PaperArchive:
     def __len__(self) -> int:
         return int(self._archive.state[0])
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} of {self.settings.archive_size} behaviors)"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+    @property
+    def grid_size(self) -> tuple[int, int]:
+        """Columns and rows of the grid."""
+        return self._columns, self._rows
+
     def update(self, behaviors: Sequence[Cells] | ArrayLike) -> NDArray[np.float64]:
         """Novelty of one generation, which the archive then takes in.
 
@@ -198,6 +210,12 @@ class NearestArchive:
 
     def __len__(self) -> int:
         return len(self.behaviors)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} behaviors, k={self._k}, threshold={self.threshold:.4g})"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     @property
     def threshold(self) -> float:

@@ -4,6 +4,7 @@
 """
 
 from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means
+from ._card import gap_card, pairs_picture
 from ._correlation import attenuated, reliability, spearman, trials_for_reliability
 from ._coverage_map import CoverageMaps, coverage_maps
 from ._energy import energy_distances, energy_test, smallest_energy_p
@@ -75,6 +76,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "plan_correlation",
     "spread_of_differences",
     "trial_reliability",
+    # what notebooks show
+    "gap_card",
+    "pairs_picture",
     # means of a few
     "mean_of",
     "difference_of_groups",

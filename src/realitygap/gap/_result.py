@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from realitygap.drawing import card_of
+
 from ._estimate import Estimate
 
 COVERAGE = "coverage"
@@ -146,6 +148,13 @@ class GapResult:
     reevolved: Estimate = field(default_factory=lambda: Estimate.refusal(0, "Nothing was evolved apart."))
     notes: tuple[str, ...] = ()
     score: str = COVERAGE
+
+    def __repr__(self) -> str:
+        n = f"n={self.rms.n}×{self.trials[1]}"
+        return f"{type(self).__name__}({self.source} → {self.target}: RMS {self.rms}, {n})"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     @property
     def excludes_no_gap(self) -> bool:

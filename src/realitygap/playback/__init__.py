@@ -3,6 +3,7 @@
 A `MovingTrial` is what a trial looks like whatever platform it was on; `in_motion` makes one of a trajectory.
 """
 
+from . import _card  # noqa: F401  # what notebooks show
 from ._divergence import Divergence, measure_divergence, own_divergence
 from ._live import Page, WatchedRobot
 from ._movie import WIDTH, save_movie

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.drawing import card_of, widget_of
 from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
 from realitygap.world import (
     Arena,
@@ -135,6 +136,18 @@ class MovingTrial:
         cells, rows, _ = first_visits(poses, arena.grid)
         visited = tuple(cells.tolist()), tuple(rows.tolist())
         return cls(title, label, arena, shape, step_s, poses, rays, stalled, *visited, parts)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.title!r}, {self.label}, {self.n_steps} steps, {len(self.cells)} cells)"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+    def _repr_mimebundle_(self, **options: Any) -> dict[str, Any]:
+        widget = widget_of(self)
+        bundle: Any = {} if widget is None else widget._repr_mimebundle_()
+        data = bundle[0] if isinstance(bundle, tuple) else bundle  # with metadata, or without
+        return {kind: content for kind, content in data.items() if kind.startswith("application/")}
 
     @property
     def n_steps(self) -> int:

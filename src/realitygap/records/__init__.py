@@ -6,6 +6,7 @@ outside the digest. A `Ledger` beside them, `ledger.sqlite`, has the trials that
 plain dicts, arrays and polars frames. It knows nothing of genomes or studies.
 """
 
+from realitygap.records import _cards  # noqa: F401  # what notebooks show
 from realitygap.records._checkpoint import read_checkpoint, write_checkpoint
 from realitygap.records._chunk import Chunk
 from realitygap.records._columns import (

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from realitygap.drawing import card_of
+
 TrialState = Literal["planned", "running", "driven", "scored", "void"]
 ScoreRole = Literal["score", "second", "correction"]
 
@@ -83,6 +85,13 @@ class Trial:
     stalls: int | None
     cells: tuple[int, ...] | None
     is_closed: bool
+
+    def __repr__(self) -> str:
+        cells = "" if self.cells is None else f", {len(self.cells)} cells"
+        return f"Trial({self.trial}: {self.name}, {self.state}{cells})"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     @property
     def name(self) -> str:

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from realitygap._closing import ClosedOnExit
 from realitygap._limits import parse_json
+from realitygap.drawing import card_of
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
@@ -42,6 +43,24 @@ class LedgerReader(ClosedOnExit):
     def open(cls, path: str | Path, *, writable: bool = True) -> Self:
         """The ledger in a file."""
         return cls(Path(path), connect(Path(path), writable=writable))
+
+    def __repr__(self) -> str:
+        where = f"{type(self).__name__}({str(self.path)!r}"
+        try:
+            conditions = self.conditions()
+            states = [row["state"] for row in self._all("SELECT state FROM trials")]
+        except (LedgerError, sqlite3.Error):
+            return f"{where}, damaged or closed)"
+        labels = dict.fromkeys(str(about["label"]) for about in conditions.values() if about["label"])
+        n_scored, n_whole = states.count("scored"), len(states) - states.count("void")
+        shown = [
+            f"{len(conditions)} condition{'s' * (len(conditions) != 1)}",
+            f"{n_scored:,}/{n_whole:,} trials scored",
+        ]
+        return ", ".join([where, *shown, *(["+".join(labels)] if labels else [])]) + ")"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     def close(self) -> None:
         """Let go of the file."""

@@ -66,6 +66,10 @@ class ObservedTrial:
     last_readings: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     last_stalled: bool = False
 
+    def __repr__(self) -> str:
+        steps = f"{len(self.commands)} steps of {self.step_s:g} s"
+        return f"{type(self).__name__}({self.number}, {self.purpose}, {steps}, observed: {self.observe})"
+
     @property
     def observe(self) -> Observe:
         """How much is seen of it; cells where it has neither wheels nor poses, counted or not."""

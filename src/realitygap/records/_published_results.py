@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import polars as pl
 
+from realitygap.drawing import card_of
 from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
 from realitygap.records._chunk import (
     MAX_REPLICATE,
@@ -77,14 +78,19 @@ class PublishedResults:
     # what it is
 
     def __repr__(self) -> str:
-        what = f"{type(self).__name__} {str(self._path)!r}: study {self._description.study.get('name')!r}"
+        where = f"{type(self).__name__}({str(self._path)!r}"
         try:
             n_conditions = len(self.conditions)
-            n_there, n_runs = self._count_runs()
-        except (RecordError, ValueError):  # it is shown in messages, too
-            return f"<{what}, damaged>"
-        of = "" if n_runs is None else f" of {n_runs:,}"
-        return f"<{what}, {n_conditions} condition{'s' * (n_conditions != 1)}, {n_there:,}{of} runs>"
+            n_there, n_runs = self.count_runs()
+            labels = self.labels
+        except Exception:  # messages and debuggers show it, whatever is in the folder
+            return f"{where}, damaged)"
+        of = "" if n_runs is None else f"/{n_runs:,}"
+        shown = [f"{n_conditions} condition{'s' * (n_conditions != 1)}", f"{n_there:,}{of} runs"]
+        return ", ".join([where, *shown, *(["+".join(labels)] if labels else [])]) + ")"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     @property
     def path(self) -> Path:
@@ -100,6 +106,19 @@ class PublishedResults:
     def conditions(self) -> list[str]:
         """Names of the conditions, in the description's order."""
         return self._description.conditions
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """SIM, TWIN, EMULATED, or REAL of the conditions, each once; the ledger has that of a robot.
+
+        Raises:
+            RecordError: The ledger is damaged.
+        """
+        told = [each.get("label") for each in self._description.study["conditions"] if isinstance(each, dict)]
+        if (self._path / LEDGER_NAME).exists():
+            with self._ledger() as ledger:
+                told += [about["label"] for about in ledger.conditions().values()]
+        return tuple(dict.fromkeys(str(label) for label in told if label))
 
     @property
     def results_version(self) -> int:
@@ -119,7 +138,7 @@ class PublishedResults:
     @property
     def missing_note(self) -> str | None:
         """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
-        n_there, n_runs = self._count_runs()
+        n_there, n_runs = self.count_runs()
         if n_runs is None or n_there >= n_runs:
             return None
         return (
@@ -127,15 +146,36 @@ class PublishedResults:
             "goes on with what is missing."
         )
 
-    def _count_runs(self) -> tuple[int, int | None]:
-        """Runs that are there, by the names of chunks, and of how many; None if the description does not say."""
+    def count_runs(self) -> tuple[int, int | None]:
+        """Return the number of finished runs by the names of files, and of planned runs, None if it is unknown.
+
+        Raises:
+            RecordError: A file in `trials/` is foreign or in the wrong place, or the ledger is damaged.
+        """
         replicates = self._description.study.get("replicates")
         n = replicates if isinstance(replicates, int) else MAX_REPLICATE + 1
         n_there = sum(max(0, min(name.last + 1, n) - name.first) for name in self._names())
         n_there += sum(run < n for runs in self._complete_runs().values() for run in runs)
         return n_there, replicates * len(self.conditions) if isinstance(replicates, int) else None
 
+    def count_of(self, condition: str) -> int:
+        """Return the number of finished runs of a condition by the names of files.
+
+        Raises:
+            RecordError: As `count_runs`.
+        """
+        n_there = sum(name.last + 1 - name.first for name in self._names(condition))
+        return n_there + len(self._complete_runs().get(condition, []))
+
     # chunks
+
+    def files(self) -> list[tuple[ChunkName, Path]]:
+        """Return the name and the path of each published file in key order, whose bytes are not checked.
+
+        Raises:
+            RecordError: As `count_runs`.
+        """
+        return [(name, self._trials / str(name)) for name in self._names()]
 
     def chunks(self, condition: str | None = None) -> list[Chunk]:
         """All published chunks, or those of one condition, in key order; every byte of them was checked.
@@ -180,7 +220,7 @@ class PublishedResults:
         physical = self._complete_runs()
         for name in self.conditions:
             if name in physical:
-                parts += [frame.lazy() for frame in self._driven(name)]
+                parts += [frame.lazy() for frame in self.driven_frames(name)]
             elif paths := [chunk.path for chunk in self.chunks(name)]:
                 parts.append(pl.scan_parquet(paths, glob=False, hive_partitioning=False))
         return pl.concat(parts, how="diagonal") if parts else pl.LazyFrame(schema=SCHEMA)
@@ -361,7 +401,7 @@ class PublishedResults:
         physical = self._complete_runs()
         for name in self.conditions if condition is None else [condition]:
             if name in physical:
-                for frame in self._driven(name):
+                for frame in self.driven_frames(name):
                     there = set(frame.columns)
                     lacking = [
                         pl.lit(None, dtype).alias(extra)
@@ -386,8 +426,14 @@ class PublishedResults:
                     hashes[name] = about["hash"]
         return hashes
 
-    def _driven(self, condition: str) -> Iterator[pl.DataFrame]:
-        """The rows of the complete runs that a robot drove; nothing where there are none."""
+    def driven_frames(self, condition: str) -> Iterator[pl.DataFrame]:
+        """Yield the rows of the complete runs that a robot drove, nothing if it drove none.
+
+        Raises:
+            RecordError: The ledger is damaged.
+        """
+        if not (self._path / LEDGER_NAME).exists():
+            return
         with self._ledger() as ledger:
             frame = ledger_frame(ledger, condition)
         if frame.height:

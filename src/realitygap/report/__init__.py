@@ -5,6 +5,14 @@ Only records are read; nothing here runs a study. Trials that are drawn are reco
 SVG with the caption that says what was drawn.
 """
 
+from realitygap._medians import (
+    Interval,
+    IntervalRanks,
+    Quartiles,
+    interval_ranks,
+    median_interval,
+    quartiles,
+)
 from realitygap.report._agreement import Agreement, measure_agreement
 from realitygap.report._archive_figure import draw_archive
 from realitygap.report._audit import (
@@ -73,14 +81,6 @@ from realitygap.report._score_figure import draw_scores
 from realitygap.report._sensor_figure import save_sensor_figure
 from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
-from realitygap.report._statistics import (
-    Interval,
-    IntervalRanks,
-    Quartiles,
-    interval_ranks,
-    median_interval,
-    quartiles,
-)
 from realitygap.report._summary import SUMMARY_SCHEMA, summarize
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks

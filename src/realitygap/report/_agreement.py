@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._medians import CONFIDENCE
 from realitygap.errors import LedgerError
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.report._effects import BCA_SMALLEST_N, RESAMPLES
 from realitygap.report._permutation import SEED
-from realitygap.report._statistics import CONFIDENCE
 
 
 @dataclass(frozen=True)

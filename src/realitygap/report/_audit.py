@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
+from realitygap._medians import SMALLEST_N, Interval, median_interval
 from realitygap.errors import TableError, whole_number
 from realitygap.report._effects import (
     POWER,
@@ -33,7 +34,6 @@ from realitygap.report._effects import (
     share_above,
 )
 from realitygap.report._permutation import ALPHA, holm, permutation_p, runs_for_a_claim, smallest_p
-from realitygap.report._statistics import SMALLEST_N, Interval, median_interval
 
 COLUMNS = ("condition", "run", "value")
 _MOST_MISTAKES = 20

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._medians import Interval
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.platforms import retry_genomes
 from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
-from realitygap.report._statistics import Interval
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, genome_of, partners_of
 from realitygap.trials import NoiseKey

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
+from realitygap._medians import CONFIDENCE, Interval
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
     RESAMPLES,
@@ -32,7 +33,6 @@ from realitygap.report._permutation import (
     sign_flip_p,
     smallest_p,
 )
-from realitygap.report._statistics import CONFIDENCE, Interval
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 _MOST_RUNS_NAMED = 100_000

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._medians import SMALLEST_N, median_interval, quartiles
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     Drawing,
@@ -20,7 +21,6 @@ from realitygap.report._drawing import (
     wrap,
     write,
 )
-from realitygap.report._statistics import SMALLEST_N, median_interval, quartiles
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:

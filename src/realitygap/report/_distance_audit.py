@@ -13,12 +13,12 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap import _special as special
+from realitygap._medians import CONFIDENCE
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, CellOrder, behavior_distance, measure_of, pack_behaviors
 from realitygap.kernels.neat import distances
 from realitygap.records import ResultsFolder
 from realitygap.report._questions import grid_of
-from realitygap.report._statistics import CONFIDENCE
 from realitygap.report._tally import label_of
 
 Values = npt.NDArray[np.float64]

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
+from realitygap._medians import CONFIDENCE, Interval
 from realitygap.gap import fewest
 from realitygap.kernels.math.resampling import count_drawn
 from realitygap.report._permutation import ALPHA, SEED
-from realitygap.report._statistics import CONFIDENCE, Interval
 
 Values = npt.NDArray[np.float64]
 Statistic = Callable[[Values, Values, Values], Values]

@@ -14,6 +14,7 @@ from typing import Any
 
 import polars as pl
 
+from realitygap._medians import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError, RecordError, RecordVersionError
 from realitygap.platforms import described_platform, is_physical
@@ -38,7 +39,6 @@ from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._replay import content as replay_content
 from realitygap.report._score_figure import draw_scores
-from realitygap.report._statistics import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap import _special as special
+from realitygap._medians import CONFIDENCE, Interval
 from realitygap.evolution import largest_cell_distance
 from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
@@ -23,7 +24,6 @@ from realitygap.report._effects import (
     robust_spread,
 )
 from realitygap.report._permutation import SEED, lattice
-from realitygap.report._statistics import CONFIDENCE, Interval
 from realitygap.report._tally import Results, Tally, read_tally, settings_of
 from realitygap.world import ArenaSettings
 

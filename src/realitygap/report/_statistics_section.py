@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._medians import Interval
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_champions
 from realitygap.report._comparisons import (
@@ -33,7 +34,6 @@ from realitygap.report._questions import (
     plateaus,
     spreads,
 )
-from realitygap.report._statistics import Interval
 from realitygap.report._tally import Tally, label_of, settings_of
 
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from realitygap.report._statistics import interval_ranks, median_interval, quartiles
+from realitygap._medians import interval_ranks, median_interval, quartiles
 from realitygap.report._tally import Measure, Results, Tally, label_of, read_tally
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._medians import median_interval, quartiles
 from realitygap.records import ResultsFolder
-from realitygap.report._statistics import median_interval, quartiles
 from realitygap.report._tally import bests_of, label_of, labeled_conditions, task_of
 
 TASK_SCHEMA = pl.Schema(

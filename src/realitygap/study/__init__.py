@@ -2,6 +2,7 @@
 
 from realitygap.platforms import open_target
 
+from . import _cards  # noqa: F401  # what notebooks show
 from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table

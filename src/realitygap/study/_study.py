@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from realitygap._version import __version__
+from realitygap.drawing import card_of
 from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import Settings
 
@@ -132,6 +133,19 @@ class Study(Settings):
                     f"study's: {self.about.seed} and {self.about.pair}"
                 )
         return self
+
+    def __repr__(self) -> str:
+        n, labels = len(self.conditions), "+".join(self.labels)
+        runs = f"{n} condition{'s' * (n != 1)} × {self.about.replicates:,} runs"
+        return f"{type(self).__name__}({self.about.name!r}, {runs}, {labels})"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the conditions, such as SIM, each once."""
+        return tuple(dict.fromkeys(str(condition.label) for condition in self.conditions))
 
     @property
     def n_runs(self) -> int:

@@ -132,6 +132,10 @@ class Trajectory:
         """Number of blocked steps of all robots."""
         return sum(int(robot.stalled.sum()) for robot in self.robots)
 
+    def __repr__(self) -> str:
+        steps = f"{len(self.commands)} steps of {self.step_s:g} s, {self.n_stalls} blocked"
+        return f"{type(self).__name__}({steps}, coverage {self.coverage_line:.3f})"
+
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg(360.0)
 

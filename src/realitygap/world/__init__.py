@@ -1,5 +1,6 @@
 """Plain descriptions of arenas, bodies and sensors; nothing here moves."""
 
+from . import _calibration_card  # noqa: F401  # what notebooks show
 from ._arena import (
     MOST_ROBOTS,
     NAMED_STARTS,

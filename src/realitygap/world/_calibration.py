@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from realitygap.drawing import card_of
 from realitygap.settings import Settings
 
 from ._toml import toml_table
@@ -127,6 +128,15 @@ class Calibration(Settings):
         if lengths and not 1 <= max(lengths) <= MOST_DRAWS:
             raise ValueError(f"draws: expected 1 to {MOST_DRAWS:,} of each number, came {max(lengths):,}")
         return self
+
+    def __repr__(self) -> str:
+        n_identified = sum(each.identified for each in self.fitted)
+        state = "rejected" if self.misspecified else "ok"
+        counts = f"{self.trials} trials, {n_identified}/{len(self.fitted)} identified"
+        return f"{type(self).__name__}({self.kind!r}, {counts}, {state})"
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     @property
     def step(self) -> dict[str, float]:

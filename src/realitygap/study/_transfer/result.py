@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap import _special as special
+from realitygap.drawing import card_of
 from realitygap.gap import CONFIDENCE, COVERAGE, Estimate
 
 
@@ -89,6 +90,16 @@ class TransferResult:
     best_known: float
     champions: tuple[Transferred, ...]
     score: str = COVERAGE
+
+    def __repr__(self) -> str:
+        n = len({each.strategy for each in self.strategies})
+        counts = f"{n} strateg{'y' if n == 1 else 'ies'}, {self.replicates} replicates"
+        return (
+            f"{type(self).__name__}({self.study}, {self.condition} → {self.target}: {counts}, {self.label})"
+        )
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain values, for JSON; `strategies` has `quality` and `regret` with `estimate`, `low`, `high`, `n`.

@@ -51,7 +51,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Quartiles:
-    """What splits ordered values into four equal parts, in the unit of the values."""
+    """Three values that split ordered values into four equal parts, in their unit."""
 
     q25: float
     median: float

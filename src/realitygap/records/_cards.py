@@ -1,0 +1,205 @@
+"""Cards of results, ledgers, and trials, for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import polars as pl
+
+from realitygap._medians import median_interval
+from realitygap.drawing import Card, Spark, Table, card_of
+from realitygap.errors import RealityGapError
+from realitygap.records._chunk import ChunkName, read_rows
+from realitygap.records._ledger_kinds import Trial
+from realitygap.records._ledger_reader import LedgerReader
+from realitygap.records._published_results import PublishedResults
+
+MOST_READ_BYTES = 24_000_000
+MOST_READ_FILES = 64
+"""Size and number of the result files that a card reads for medians: more take over half a second."""
+
+MOST_SPARK = 60
+"""Points of a line of medians."""
+
+_KEYS = ["replicate", "generation"]
+
+
+@dataclass(frozen=True)
+class _Best:
+    """The best of each generation in a file, and the size and time of the file that it was read from."""
+
+    identity: tuple[int, int]
+    frame: pl.DataFrame
+
+
+_read: WeakKeyDictionary[PublishedResults, dict[str, _Best]] = WeakKeyDictionary()
+
+
+@card_of.register(PublishedResults)
+def folder_card(folder: PublishedResults) -> Card:
+    """Return the conditions of a study with the medians of their runs; it never raises."""
+    try:
+        return _folder_card(folder)
+    except Exception as error:  # a notebook shows the object all the same
+        return Card(repr(folder), warning=f"These results cannot be read. {_message(error)}")
+
+
+def _folder_card(folder: PublishedResults) -> Card:
+    description = folder.description
+    n_there, n_runs = folder.count_runs()
+    name = str(description.get("title") or description.get("name") or folder.path)
+    if n_runs is None:
+        state = f"{n_there:,} runs"
+    else:
+        state = f"{'Complete' if n_there >= n_runs else 'Not complete'}: {n_there:,} of {n_runs:,} runs"
+    path = str(folder.path)
+    code = [
+        f"folder = realitygap.ResultsFolder.open({path!r})",
+        "realitygap.summarize(folder)",
+        "folder.scan()",
+    ]
+    parts: list[Table | str] = [_conditions_table(folder, description)]
+    if folder.version_note:
+        parts.append(folder.version_note)
+    return Card(
+        name,
+        folder.labels,
+        f"{state} in {path}",
+        parts=parts,
+        code=[*code, f"realitygap.write_report({path!r})"],
+    )
+
+
+def _conditions_table(folder: PublishedResults, description: Mapping[str, Any]) -> Table:
+    files = folder.files()
+    n_bytes = sum(path.stat().st_size for _, path in files)
+    is_small = n_bytes <= MOST_READ_BYTES and len(files) <= MOST_READ_FILES
+    rows = []
+    bests = {
+        name: _bests(folder, name, files, description) if is_small else None for name in folder.conditions
+    }
+    lines = {name: _line(best) for name, best in bests.items()}
+    ends = [value for line in lines.values() for value in line]
+    for name in folder.conditions:
+        best = bests[name]
+        n = folder.count_of(name)
+        spark = Spark(lines[name], min(ends), max(ends)) if lines[name] else ""
+        rows.append([name, f"{n:,}", _median(best), spark])
+    note = "" if is_small else "Medians of so many runs: realitygap.summarize(folder)."
+    heads = ["condition", "runs", "median best of a run [95 % interval]", "best by generation"]
+    if not is_small:
+        heads, rows = heads[:2], [row[:2] for row in rows]
+    return Table(heads, rows, note)
+
+
+def _bests(
+    folder: PublishedResults,
+    condition: str,
+    files: Iterable[tuple[ChunkName, Any]],
+    description: Mapping[str, Any],
+) -> pl.DataFrame | None:
+    """Return the best of each generation of each run of a condition, None if nobody scored it."""
+    column = _score_column(condition, description)
+    known = _read.setdefault(folder, {})
+    frames = []
+    for name, path in files:
+        if name.condition != condition:
+            continue
+        status = path.stat()
+        identity = (status.st_size, status.st_mtime_ns)
+        best = known.get(str(name))
+        if best is None or best.identity != identity:
+            frame = read_rows(path, [*_KEYS, column])[1]
+            known[str(name)] = best = _Best(identity, _best_of(frame, column))
+        frames.append(best.frame)
+    frames += [_best_of(frame, column) for frame in folder.driven_frames(condition)]
+    best_of_all = pl.concat(frames) if frames else None
+    return None if best_of_all is None or best_of_all["best"].null_count() else best_of_all
+
+
+def _best_of(frame: pl.DataFrame, column: str) -> pl.DataFrame:
+    return frame.group_by(_KEYS, maintain_order=True).agg(pl.col(column).cast(pl.Float64).max().alias("best"))
+
+
+def _score_column(condition: str, description: Mapping[str, Any]) -> str:
+    """Return the column that selection is by: the score of another task, or the coverage that is counted."""
+    kinds, cells = {}, set()
+    for each in description["conditions"]:
+        settings = each.get("settings") if isinstance(each, dict) else None
+        task = (settings or {}).get("task", {})
+        if isinstance(each, dict):
+            kinds[each["name"]] = task.get("kind", "coverage")
+        cells.add(task.get("cells"))
+    if kinds.get(condition, "coverage") != "coverage":
+        return "task_fitness"
+    return "coverage_ends" if cells == {"ends"} else "coverage_line"
+
+
+def _median(best: pl.DataFrame | None) -> str:
+    if best is None:
+        return "–"
+    of_runs = best.group_by("replicate").agg(pl.col("best").max())["best"].to_numpy()
+    if not np.isfinite(of_runs).all():
+        return "–"
+    interval = median_interval(of_runs)
+    ends = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
+    return f"{np.median(of_runs):.3f}{ends}"
+
+
+def _line(best: pl.DataFrame | None) -> tuple[float, ...]:
+    """Return the median over runs of the best of each generation."""
+    if best is None:
+        return ()
+    medians = best.group_by("generation").agg(pl.col("best").median()).sort("generation")["best"].to_numpy()
+    if not np.isfinite(medians).all():
+        return ()
+    chosen = np.unique(np.linspace(0, len(medians) - 1, min(len(medians), MOST_SPARK)).round().astype(int))
+    return tuple(float(value) for value in medians[chosen])
+
+
+@card_of.register(LedgerReader)
+def ledger_card(ledger: LedgerReader) -> Card:
+    """Return the conditions of a ledger and how far their trials are; it never raises."""
+    try:
+        conditions, trials = ledger.conditions(), ledger.trials()
+    except Exception as error:
+        return Card(repr(ledger), warning=f"This ledger cannot be read. {_message(error)}")
+    rows = []
+    for name, about in conditions.items():
+        own = [trial for trial in trials if trial.condition == name]
+        states = [
+            sum(trial.state == state for trial in own) for state in ("planned", "driven", "scored", "void")
+        ]
+        rows.append([name, about["label"] or "–", *(f"{n:,}" for n in states)])
+    labels = dict.fromkeys(str(about["label"]) for about in conditions.values() if about["label"])
+    heads = ["condition", "label", "planned", "driven", "scored", "void"]
+    lead = "No trials yet." if not trials else f"{len(trials):,} trials in {ledger.path}"
+    return Card("Ledger of physical trials", tuple(labels), lead, parts=[Table(heads, rows)])
+
+
+@card_of.register(Trial)
+def trial_card(trial: Trial) -> Card:
+    """Return what a ledger has of a trial."""
+    facts = {
+        "state": trial.state,
+        "code": trial.code,
+        "sheet, pen": f"{trial.sheet}, {trial.pen}",
+        "steps": "–" if trial.n_steps is None else f"{trial.n_steps:,}",
+        "blocked steps": "–" if trial.stalls is None else f"{trial.stalls:,}",
+        "crossed cells": "–" if trial.cells is None else f"{len(trial.cells):,}",
+        "end": trial.end or "–",
+    }
+    problem = trial.problem or trial.reason or ""
+    return Card(
+        f"Trial {trial.trial}: {trial.name}",
+        warning=problem,
+        parts=[Table(["", ""], [[key, value] for key, value in facts.items()])],
+    )
+
+
+def _message(error: Exception) -> str:
+    return str(error) if isinstance(error, RealityGapError) else f"{type(error).__name__}: {error}"

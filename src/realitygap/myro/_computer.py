@@ -27,7 +27,7 @@ computer = Computer()
 
 
 def beepScale(duration: float, start: float, stop: float, factor: float = 2) -> None:
-    """Let the computer play tones from one frequency to another, each so many times the one before."""
+    """Let the computer play tones from one frequency to another; `factor` is the ratio of neighboring tones."""
     if number("beepScale: the factor", factor) <= 1 or number("beepScale: the start", start) <= 0:
         raise MyroError(
             f"beepScale: starts at {start!r} and grows by {factor!r}, expected a start above 0 and a factor above 1."

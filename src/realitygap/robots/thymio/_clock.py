@@ -89,7 +89,8 @@ class BoardClock:
         """
         until = self.now() + seconds
         while (left := until - self.now()) > SHORTEST_S:
-            if self.unread_s >= UNREAD_S - SHORTEST_S:
+            unheard = UNREAD_S - self.unread_s  # once: time passes between two looks at the clock
+            if unheard <= SHORTEST_S:
                 self._read()
                 continue
-            time.sleep(min(left / self.rate, (UNREAD_S - self.unread_s) / self.rate, HEAR_S))
+            time.sleep(min(left / self.rate, unheard / self.rate, HEAR_S))

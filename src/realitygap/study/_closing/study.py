@@ -7,13 +7,14 @@ import multiprocessing
 import os
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RobotError, from_extra, whole_number
+from realitygap.errors import RealityGapError, RobotError, from_extra, whole_number
 from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
 from realitygap.trials import Target
@@ -171,6 +172,8 @@ def _report(pipe: Connection, plan: ClosingPlan, name: TwinName, folder: Path) -
     try:
         _carry_out(plan, name, folder)
     except BaseException as error:
+        if not isinstance(error, RealityGapError):
+            error.add_note(traceback.format_exc())  # the pipe carries no traceback
         problem = error
     pipe.send(problem)
 

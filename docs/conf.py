@@ -23,10 +23,16 @@ author = "the realitygap authors"
 copyright = author
 version = release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_design"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_design"]
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build", "generated/parts"]
+exclude_patterns = ["_build", "generated/parts", "jupyter_execute"]
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_timeout = 300  # of a cell [s]: kernels may have to be compiled
+nb_execution_raise_on_error = True
+nb_ipywidgets_js = {}  # which would be fetched from a network
+nb_mime_priority_overrides = [("html", "application/vnd.jupyter.widget-view+json", None)]
 root_doc = "index"
 html_theme = "furo"
 html_title = f"realitygap {__version__}"

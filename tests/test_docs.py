@@ -589,3 +589,10 @@ def test_page_on_robots_of_other_people_shows_missed_goals_first():
         assert f"../generated/{name}" in page
         assert "nan" not in text
     assert "REAL (others' robots)" in make_real_data.page_parts()["parts/real-goals.md"]
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.rglob("tutorials/*.ipynb")), ids=lambda path: path.name)
+def test_notebooks_are_stored_without_outputs(path):
+    cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
+    assert cells
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in cells)

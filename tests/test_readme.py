@@ -43,7 +43,7 @@ def test_first_screen_leads_to_a_result():
 
 
 def test_table_of_the_readme_has_the_numbers_that_the_tutorial_prints():
-    printed = (ROOT / "docs" / "tutorials" / "paper.md").read_text("utf-8")
+    printed = (ROOT / "docs" / "tutorials" / "first-study.md").read_text("utf-8")
     rows = {"Novelty": "novelty-50", "Coverage": "coverage-50", "Random networks": "random-50"}
     for title, condition in rows.items():
         median, low, high = re.search(

@@ -60,6 +60,7 @@ def _folder_card(folder: PublishedResults) -> Card:
     code = [
         f"folder = realitygap.ResultsFolder.open({path!r})",
         "realitygap.summarize(folder)",
+        "folder.digest()",
         "folder.scan()",
     ]
     parts: list[Table | str] = [_conditions_table(folder, description)]

@@ -249,7 +249,7 @@ def _refuse_other_readings(trials: Sequence[ObservedTrial], robot: RobotModel) -
         )
 
 
-def save_calibration(path: Path, calibration: Calibration) -> None:
+def save_calibration(path: str | Path, calibration: Calibration) -> None:
     """Write a calibration, whole: the file that was there or the new one, and nothing between.
 
     A robot's file that it builds on is named as it is found from the folder of `path`.
@@ -257,6 +257,7 @@ def save_calibration(path: Path, calibration: Calibration) -> None:
     Raises:
         RecordError: It cannot be written.
     """
+    path = Path(path)
     robot = calibration.robot
     if Path(robot).is_file():
         robot = os.path.relpath(Path(robot).resolve(), path.resolve().parent)

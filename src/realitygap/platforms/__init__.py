@@ -12,6 +12,7 @@ from ._registry import (
     study_platforms,
 )
 from ._repeats import retry_genomes, score_genomes
+from ._settings import PlatformSettings
 from ._simulated import SimTarget, SimulatedPlatform
 from ._spec import (
     class_of,
@@ -26,16 +27,18 @@ from ._spec import (
 from ._try import open_trials, scores_of, trace_genome, trace_genomes, traced_at_once, try_genomes
 from .enki._build import build_enki, harness_path
 from .enki._platform import EnkiPlatform
-from .jyro._platform import STEP_S, JyroPlatform
+from .jyro._platform import JyroPlatform
 from .jyro._robot import JyroRobot
+from .jyro._settings import STEP_S, JyroSettings
 from .jyro._trials import JyroTrials, jyro_rules, jyro_scene
 from .recorded._platform import RecordedPlatform
 from .recorded._target import RecordedTarget
 from .scribbler._platform import ScribblerPlatform
 from .sim._ensemble import Play, Rehearsal, SimEnsemble
-from .sim._platform import ARENA, DEFAULT_ROBOT, NOISE, SimPlatform, as_numbers, as_sim
+from .sim._platform import SimPlatform, as_sim
 from .sim._robot import SimRobot
 from .sim._scene import SimScene, sim_scene
+from .sim._settings import ARENA, DEFAULT_ROBOT, NOISE, SimSettings, as_numbers
 from .sim._trials import SimTrials
 from .sim._world import SimWorld, SimWorldRobot
 from .thymio._platform import ThymioPlatform
@@ -57,10 +60,12 @@ __all__ = [
     "Fleet",
     "JyroPlatform",
     "JyroRobot",
+    "JyroSettings",
     "JyroTrials",
     "Opening",
     "Outline",
     "Platform",
+    "PlatformSettings",
     "Play",
     "Points",
     "RecordedPlatform",
@@ -71,6 +76,7 @@ __all__ = [
     "SimPlatform",
     "SimRobot",
     "SimScene",
+    "SimSettings",
     "SimTarget",
     "SimTrials",
     "SimTwin",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap._closing import ClosedOnExit
-from realitygap.errors import RealityGapError, RobotError, StudyError
+from realitygap.errors import RobotError
 from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface, Network, inputs_of_robot
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
@@ -31,17 +31,15 @@ from realitygap.trials import (
     check_plans,
     controller_of,
     counters_of,
-    own_witness,
     run_trial,
 )
 from realitygap.world import Arena, Pose, cells_along
 
 from ._fleet import Array, Outline, is_signed, limited_commands
+from ._settings import PlatformSettings
 
 if TYPE_CHECKING:
     from realitygap.emulator import Witness
-
-    from ._platform import Platform
 
 
 class FollowedRobot:
@@ -118,32 +116,6 @@ class WitnessedRobot:
         return self._witness.cells()
 
 
-def open_seen(platform: Platform, arena: Arena, noise: float) -> Any:
-    """Open a simulated robot that knows its pose and its visited cells.
-
-    Raises:
-        StudyError: It does not know its pose.
-    """
-    try:
-        robot: Any = platform.open_robot(arena, noise=noise)
-    except (RealityGapError, ValueError):
-        raise
-    except Exception as error:  # whatever an outside package does
-        raise StudyError(
-            f"Platform {platform.name!r} cannot open its robot: {type(error).__name__}: {error}."
-        ) from error
-    witness = own_witness(robot)
-    if not hasattr(robot, "pose") and witness is not None:
-        return WitnessedRobot(robot, witness, arena)
-    if not hasattr(robot, "pose"):
-        robot.close()
-        raise StudyError(
-            f"A robot of platform {platform.name!r} does not know its pose: expected an attribute `pose`, or "
-            "is_physical = True, so that somebody places it and reports the cells that it crossed."
-        )
-    return robot if hasattr(robot, "visited_cells") else FollowedRobot(robot, arena)
-
-
 def choose_number(robot: Any, number: int) -> None:
     """Choose the noise of the trial that the next `reset` begins, where the robot has a choice."""
     if hasattr(robot, "number"):
@@ -211,8 +183,8 @@ class StepwiseTrials:
         platform: Its settings.
         arena: Where.
         rules: NEAT's rules, of which only the network's kind counts.
+        robot: One that knows its pose, with `visited_cells`.
         inputs: Names of the network's inputs, in order.
-        noise: Level a.
         bias_value: Value of the constant input.
     """
 
@@ -221,25 +193,21 @@ class StepwiseTrials:
 
     def __init__(
         self,
-        platform: Platform,
+        platform: PlatformSettings,
         arena: Arena,
         rules: NeatRules,
+        robot: Any,
         *,
         inputs: Sequence[str],
-        noise: float,
         bias_value: float,
     ) -> None:
         self.arena, self.n_steps = arena, platform.steps
         self._reach = platform.sensors.max_range
         self._rules, self._bias_value = rules, bias_value
         self._interface = ControllerInterface(tuple(inputs), WHEELS if rules.drives_wheels else OUTPUTS)
-        self.step_s, n_sensors = self._open(platform, noise)
-        self.sensors = tuple(f"range.{k}" for k in range(n_sensors))
-
-    def _open(self, platform: Platform, noise: float) -> tuple[float, int]:
-        """Open the robot; return the duration of its commands [s] and its number of range sensors."""
-        self._robot = open_seen(platform, self.arena, noise)
-        return self._robot.step_s, self._robot.n_sensors
+        self._robot = robot
+        self.step_s: float = robot.step_s
+        self.sensors = tuple(f"range.{k}" for k in range(robot.n_sensors))
 
     def _run(self, asked: list[dict[str, Any]]) -> Iterable[dict[str, Any]]:
         for each in asked:
@@ -434,7 +402,7 @@ class StepwiseFleet:
     """
 
     def __init__(
-        self, platform: Platform, arena: Arena, inputs: Sequence[str], robots: Robots, n: int
+        self, platform: PlatformSettings, arena: Arena, inputs: Sequence[str], robots: Robots, n: int
     ) -> None:
         self._robots = robots
         interface = ControllerInterface(tuple(inputs))
@@ -523,21 +491,21 @@ class StepwiseTarget(ClosedOnExit):
     Args:
         platform: Its settings.
         arena: Where.
-        noise: Level a.
+        robot: One that knows its pose, with `visited_cells`.
+        noise: Level a, with which the robot was opened.
         name: As the user named it.
-
-    Raises:
-        StudyError: The robot does not know its pose.
     """
 
     observes: Observe = "track"
 
-    def __init__(self, platform: Platform, arena: Arena, noise: float, *, name: str) -> None:
+    def __init__(
+        self, platform: PlatformSettings, arena: Arena, robot: Any, noise: float, *, name: str
+    ) -> None:
         self.name, self.arena, self.is_paced = name, arena, platform.is_paced
-        self._robot = open_seen(platform, arena, noise)
-        self.label: Label = self._robot.label
-        self.step_s: float = self._robot.step_s
-        self.n_sensors: int = self._robot.n_sensors
+        self._robot = robot
+        self.label: Label = robot.label
+        self.step_s: float = robot.step_s
+        self.n_sensors: int = robot.n_sensors
         settings = json.dumps(platform.model_dump(mode="json"), sort_keys=True)
         digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
         self.identity = f"{platform.name} {digest} {platform.version}, noise {noise:g}"

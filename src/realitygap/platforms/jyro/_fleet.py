@@ -15,7 +15,7 @@ from realitygap.trials import NoiseKey, counters_of, poses_of
 from realitygap.world import Arena, check_start
 
 from .._fleet import Array, Outline
-from ._platform import STEP_S, JyroPlatform
+from ._settings import STEP_S, JyroSettings
 from ._trials import jyro_rules, jyro_scene
 
 
@@ -29,7 +29,7 @@ class JyroFleet:
     step_s = STEP_S
 
     def __init__(
-        self, platform: JyroPlatform, arena: Arena, inputs: Sequence[str], noise: float, n: int
+        self, platform: JyroSettings, arena: Arena, inputs: Sequence[str], noise: float, n: int
     ) -> None:
         self._scene = jyro_scene(platform, arena)
         check_start(arena, platform.body)
@@ -108,7 +108,7 @@ def _by_robot(blocks: NDArray[Any], n: int) -> Array:
 
 
 def noisy_readings(
-    platform: JyroPlatform,
+    platform: JyroSettings,
     arena: Arena,
     fractions: NDArray[np.floating],
     counters: NDArray[np.uint32],

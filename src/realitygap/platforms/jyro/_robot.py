@@ -11,7 +11,7 @@ from realitygap.robots import Command, Label, Observation, ProgramRobot, check_c
 from realitygap.trials import NoiseKey, counters_of, poses_of
 from realitygap.world import Arena, Pose, paper_arena
 
-from ._platform import STEP_S, JyroPlatform
+from ._settings import STEP_S, JyroSettings
 from ._trials import jyro_rules, jyro_scene
 
 
@@ -44,13 +44,13 @@ class JyroRobot(ProgramRobot):
 
     def __init__(
         self,
-        platform: JyroPlatform | None = None,
+        platform: JyroSettings | None = None,
         arena: Arena | None = None,
         *,
         noise: float = 0.0,
         noise_key: NoiseKey | None = None,
     ) -> None:
-        self.platform = platform or JyroPlatform(precision="double")
+        self.platform = platform or JyroSettings(precision="double")
         self.arena = arena or paper_arena()
         self.noise_key = noise_key or NoiseKey(0)
         self.n_sensors = len(self.platform.sensors.mounts)

@@ -25,7 +25,7 @@ from realitygap.tasks import TraceArrays
 from realitygap.trials import REAL, TrialBatch, Tried
 from realitygap.world import Arena
 
-from ._platform import STEP_S, JyroPlatform
+from ._settings import STEP_S, JyroSettings
 
 # How near to a border of cells [cells] is on it: beyond what rounding does to a position in a long trial.
 SNAP = {"single": 1e-5, "double": 1e-9}
@@ -42,7 +42,7 @@ def _normals(walls: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([normals, offsets])
 
 
-def is_enclosed(platform: JyroPlatform, walls: NDArray[np.float64], heading: float) -> bool:
+def is_enclosed(platform: JyroSettings, walls: NDArray[np.float64], heading: float) -> bool:
     """Whether a trial may take each wall for the whole line through it.
 
     So it is where the walls close a convex room around the robot at its start, every sensor is mounted
@@ -82,7 +82,7 @@ def is_enclosed(platform: JyroPlatform, walls: NDArray[np.float64], heading: flo
     return bool(platform.speed * STEP_S < 2 * -inside[:, 2].max())
 
 
-def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
+def jyro_scene(platform: JyroSettings, arena: Arena) -> TrialScene:
     """Arena, body and sensors in the form that kernels read.
 
     Raises:
@@ -114,7 +114,7 @@ def jyro_scene(platform: JyroPlatform, arena: Arena) -> TrialScene:
 
 
 def jyro_rules(
-    platform: JyroPlatform,
+    platform: JyroSettings,
     *,
     noise: float,
     bias_input: bool,
@@ -168,7 +168,7 @@ class JyroTrials:
 
     def __init__(
         self,
-        platform: JyroPlatform,
+        platform: JyroSettings,
         arena: Arena,
         rules: NeatRules,
         *,

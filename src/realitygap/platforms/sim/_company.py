@@ -20,8 +20,8 @@ from realitygap.trials import REAL, Draws, TrialBatch, Tried, counters_of_robot
 from realitygap.world import MOST_ROBOTS, Arena, Obstacle, check_drawn_starts
 
 from ._overlap import overlaps
-from ._platform import ARENA, SimPlatform
 from ._scene import SimScene, sim_scene
+from ._settings import ARENA, SimSettings
 from ._trials import sensor_names, sim_rules
 
 
@@ -47,7 +47,7 @@ class SimCompany:
 
     def __init__(
         self,
-        platform: SimPlatform,
+        platform: SimSettings,
         arena: Arena,
         rules: NeatRules,
         *,
@@ -135,7 +135,7 @@ class SimCompany:
 
 
 def company_scenes(
-    platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise: float
+    platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float
 ) -> list[SimScene]:
     """Return the scene of each robot: the outlines of the others are its last obstacles.
 

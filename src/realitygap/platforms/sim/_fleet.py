@@ -17,8 +17,8 @@ from realitygap.trials import REAL, Draws, NoiseKey, counters_of, poses_of
 from realitygap.world import Arena, check_drawn_starts
 
 from .._fleet import Array, Outline, is_signed, limited_commands
-from ._platform import SimPlatform
 from ._scene import sim_scene
+from ._settings import SimSettings
 from ._trials import sim_rules
 
 
@@ -30,7 +30,7 @@ class SimFleet:
     """
 
     def __init__(
-        self, platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise: float, n: int
+        self, platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float, n: int
     ) -> None:
         self._scene = sim_scene(platform, arena, inputs, noise)
         check_drawn_starts(self._scene.arena, self._scene.robot)

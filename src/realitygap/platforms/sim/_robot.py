@@ -18,8 +18,8 @@ from realitygap.robots import Command, Label, Observation, ProgramRobot, check_c
 from realitygap.trials import REAL, Draws, NoiseKey, counters_of, poses_of
 from realitygap.world import Arena, Pose, paper_arena
 
-from ._platform import SimPlatform
 from ._scene import sim_inputs, sim_scene
+from ._settings import SimSettings
 from ._trials import sensor_names, sim_rules
 
 
@@ -52,13 +52,13 @@ class SimRobot(ProgramRobot):
 
     def __init__(
         self,
-        platform: SimPlatform | None = None,
+        platform: SimSettings | None = None,
         arena: Arena | None = None,
         *,
         noise: float = 0.0,
         noise_key: NoiseKey | None = None,
     ) -> None:
-        self.platform = platform or SimPlatform()
+        self.platform = platform or SimSettings()
         self.arena = arena or paper_arena()
         self.noise = noise
         self.noise_key = noise_key or NoiseKey(0)
@@ -75,7 +75,7 @@ class SimRobot(ProgramRobot):
         # Networks are not asked here: one without hidden nodes will do.
         self._neat = NeatSettings.named("default").rules(max(len(names), 1), 2)
 
-    def _begin(self, platform: SimPlatform, arena: Arena) -> None:
+    def _begin(self, platform: SimSettings, arena: Arena) -> None:
         self._read = self._selected
         self._scene = sim_scene(platform, arena, self._read or ("stall",), self.noise)
         self._rules = sim_rules(self._scene, 1.0)

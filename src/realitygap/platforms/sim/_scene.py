@@ -24,7 +24,7 @@ from realitygap.kernels.sim.shape import (
 from realitygap.trials import REAL
 from realitygap.world import SENSORS, Arena, Distribution, FloorImage, Obstacle, RobotModel
 
-from ._platform import ARENA, SimPlatform
+from ._settings import ARENA, SimSettings
 
 Numbers = Mapping[str, float | Distribution]
 
@@ -42,7 +42,7 @@ class SimScene:
         rows: Where each is in the table.
     """
 
-    platform: SimPlatform
+    platform: SimSettings
     robot: RobotModel
     arena: Arena
     shape: SimShape
@@ -76,7 +76,7 @@ class SimScene:
         }
 
 
-def sim_scene(platform: SimPlatform, arena: Arena, inputs: Sequence[str], noise: float) -> SimScene:
+def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float) -> SimScene:
     """Robot and arena with all settings, and what networks see of them.
 
     Args:

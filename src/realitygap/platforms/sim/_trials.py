@@ -17,8 +17,8 @@ from realitygap.trials import REAL, Draws, TrialBatch, Tried
 from realitygap.world import SENSORS, Arena
 
 from ..jyro._trials import SNAP
-from ._platform import SimPlatform
 from ._scene import SimScene, sim_scene
+from ._settings import SimSettings
 
 
 class SimTrials:
@@ -37,7 +37,7 @@ class SimTrials:
 
     def __init__(
         self,
-        platform: SimPlatform,
+        platform: SimSettings,
         arena: Arena,
         rules: NeatRules,
         *,

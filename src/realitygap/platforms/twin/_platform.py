@@ -9,16 +9,20 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
+from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.robots import Robot
 from realitygap.trials import PlatformTrials, Target
 from realitygap.world import Arena
 
+from .._fleet import Fleet
 from .._platform import Opening, Platform
+from .._stepwise import StepwiseFleet
+from ._robots import TwinRobots
+from ._target import TwinTarget
+from ._trials import TwinTrials, shared_pool
 
 if TYPE_CHECKING:
     from realitygap.kernels.neat.genome import NeatRules
-
-    from .._fleet import Fleet
 
 _HASH = """
 import hashlib, sys
@@ -89,24 +93,20 @@ class TwinPlatform(Platform):
 
     def open(self, arena: Arena, how: Opening) -> Target:
         """Open the twin for trials one by one, in separate processes."""
-        from ._target import TwinTarget
-
         return TwinTarget(self.file, arena, how.processes, name=how.name)
 
     def prepare(
         self, arena: Arena, rules: NeatRules, *, inputs: Sequence[str], noise: float, bias_value: float
     ) -> PlatformTrials:
         """Set the twin up for many trials, shared among processes."""
-        from ._trials import TwinTrials
-
         self.check_noise(noise)
-        return TwinTrials(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
+        pool = shared_pool(self.file, self.sha256, arena)
+        known = inputs_of_robot(pool.n_sensors, pool.channels)
+        ControllerInterface(tuple(inputs)).check(known, "A network", f"twin {self.file}")
+        return TwinTrials(self, arena, rules, pool, inputs=inputs, bias_value=bias_value)
 
     def fleet(self, arena: Arena, inputs: Sequence[str], noise: float, n: int) -> Fleet:
         """Open n robots that are driven step by step, in a separate process."""
-        from .._stepwise import StepwiseFleet
-        from ._robots import TwinRobots
-
         self.check_noise(noise)
         self.check_starts(arena)
         return StepwiseFleet(self, arena, inputs, TwinRobots(self.file, arena, n), n)

@@ -63,6 +63,28 @@ def test_arrow_keys_drive_and_escape_stops(visit):
     page.get_by_text("Standing", exact=True).wait_for()
 
 
+def test_a_gamepad_drives_while_the_handle_has_the_focus(visit):
+    page = visit("robot")
+    connect(page)
+    page.evaluate(
+        "() => { window.pad = {axes: [0, -1], buttons: [{pressed: false}], connected: true};"
+        "Object.defineProperty(navigator, 'getGamepads', {value: () => [null, window.pad]}); }"
+    )
+    page.wait_for_timeout(300)
+    page.get_by_text("Standing", exact=True).wait_for()
+    page.bring_to_front()
+    page.locator(".lab-pad").focus()
+    page.get_by_text("Driving", exact=True).wait_for()
+    page.evaluate("() => { window.pad.buttons[0].pressed = true; }")
+    page.get_by_text("Standing", exact=True).wait_for()
+    page.evaluate("() => { window.pad.axes = [0, 0]; window.pad.buttons[0].pressed = false; }")
+    page.wait_for_timeout(200)
+    page.evaluate("() => { window.pad.axes = [1, 0]; }")
+    page.get_by_text("Driving", exact=True).wait_for()
+    page.locator(".lab-pad").blur()
+    page.get_by_text("Standing", exact=True).wait_for()
+
+
 def test_who_watches_can_stop_it_and_cannot_drive_it(visit):
     page = visit("robot")
     connect(page)

@@ -12,6 +12,7 @@ CELLS = {
     "after error": "wait(1); print(robot.simulation.witness.motors() == (0, 0))",
     "show": "show(makePicture(5, 5, red)); repaint(makePicture(5, 5, blue))",
     "picture": "makePicture(5, 5, red)",
+    "joystick": "joystick()",
     "window": "win = GraphWin('A', 50, 50); Circle(Point(20, 20), 5).draw(win)",
 }
 
@@ -68,6 +69,14 @@ def test_a_cell_that_ends_with_an_error_stops_the_robot(notebook):
     cells, _ = notebook
     assert cells["error"].outputs[-1]["ename"] == "ZeroDivisionError"
     assert text(cells["after error"]) == "True\n"
+
+
+def test_a_joystick_appears_below_its_cell(notebook):
+    cells, _ = notebook
+    assert any(
+        "application/vnd.jupyter.widget-view+json" in output.get("data", {})
+        for output in cells["joystick"].outputs
+    )
 
 
 def test_pictures_and_windows_appear_below_the_cell(notebook):

@@ -1,4 +1,4 @@
-"""A page that shows a player as a notebook does: its module, its style, and a model with the kernel's values."""
+"""A page that shows a widget as a notebook does: its module, its style, and a model with the kernel's values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ window.model = {
   save_changes: () => {},
   on: (name, listener) => { (listeners[name] = listeners[name] || []).push(listener); },
   off: (name, listener) => { listeners[name] = (listeners[name] || []).filter((one) => one !== listener); },
-  send: (message) => { window.sent.push(message); },
+  send: (message) => { window.sent.push(message); if (window.kernel) window.kernel(message).then(window.answer); },
+};
+window.answer = ([values, replies]) => {
+  for (const [name, value] of Object.entries(values)) window.model.set(name, value);
+  replies.forEach(window.tell);
 };
 window.tell = (message) => { for (const listener of listeners["msg:custom"] || []) listener(message); };
 window.heard = () => Object.values(listeners).flat().length;
@@ -29,15 +33,19 @@ window.cleanup = widget.render({ model: window.model, el: document.getElementByI
 """
 
 
-def page_of(widget: Any, path: Path, width: int = 820) -> Path:
-    """The page of a player, written to a file."""
+PLAYER = ("scene", "trials", "speed", "live", "was_live")
+PANEL = ("title", "svg", "camera", "clock", "problem", "robots", "has_time")
+
+
+def page_of(widget: Any, path: Path, width: int = 820, *, kind: str = "player") -> Path:
+    """The page of a player or a panel, written to a file."""
     files = resources.files("realitygap.playback")
     module = (
-        files.joinpath("player.js")
+        files.joinpath(f"{kind}.js")
         .read_text("utf-8")
         .replace("export default { render };", "const widget = { render };")
     )
-    values = {name: getattr(widget, name) for name in ("scene", "trials", "speed", "live", "was_live")}
-    style = files.joinpath("player.css").read_text("utf-8")
+    values = {name: getattr(widget, name) for name in (PLAYER if kind == "player" else PANEL)}
+    style = files.joinpath(f"{kind}.css").read_text("utf-8")
     path.write_text(PAGE % (style, width, module, json.dumps(values, allow_nan=False)), "utf-8")
     return path

@@ -46,6 +46,7 @@ from ._graphics import (
     makeWindow,
     undraw,
 )
+from ._joystick import Joystick, gamepad, joyStick, joystick
 from ._left_out import left_out
 from ._mistakes import MyroError, show_mistakes_plainly
 from ._pictures import *

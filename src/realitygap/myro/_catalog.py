@@ -15,6 +15,7 @@ DONE: dict[str, tuple[str, ...]] = {
     "Moving": (
         "forward", "backward", "turnLeft", "turnRight", "turn", "move", "translate", "rotate", "motors", "stop",
     ),
+    "Driving by hand, in a notebook": ("joyStick", "Joystick", "joystick", "gamepad"),
     "Senses": (
         "getLight", "getIR", "getLine", "getStall", "getObstacle", "getBright", "getBlob", "getBattery",
         "getDistance", "getMicEnvelope", "getAll", "get", "senses", "wall",
@@ -68,9 +69,7 @@ DONE: dict[str, tuple[str, ...]] = {
 """What is done, by subject."""
 
 _WINDOW = "It opens a window of its own, which a notebook and a server have no screen for. {instead}"
-_GAMEPAD = (
-    "It needs a gamepad and the package pygame. Drive from the program, or by the keys that ask() reads."
-)
+_GAMEPAD = "A cell that runs hears nothing from the page that reads the gamepad. Drive by gamepad()."
 _VOICE = "No voice comes with realitygap: speak() prints what it would say."
 _FILE_SOUND = (
     "It plays a file of sound on the computer's speaker. Play notes with playSong() or computer.playSong()."
@@ -90,9 +89,6 @@ _OTHER_ROBOT = (
 _INSIDE = "It is a part of Myro's inside that programs of a course do not call."
 
 LEFT_OUT: dict[str, str] = {
-    "joyStick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
-    "Joystick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
-    "joystick": _WINDOW.format(instead="Call forward(1, .5), turnLeft(1, .5) and so on."),
     "getKeyPressed": _WINDOW.format(instead="Ask with ask() what to do next."),
     "penUp": _PEN,
     "penDown": _PEN,
@@ -104,7 +100,6 @@ LEFT_OUT: dict[str, str] = {
     "moveToTop": _WINDOW.format(instead="Nothing has to be moved to the top."),
     "Pixmap": "It is a picture of the window system. Use makePicture() and Image(point, picture).",
     "makePixmap": "It is a picture of the window system. Use makePicture() and Image(point, picture).",
-    "gamepad": _GAMEPAD,
     "getGamepad": _GAMEPAD,
     "getGamepadNow": _GAMEPAD,
     "setVoice": _VOICE,

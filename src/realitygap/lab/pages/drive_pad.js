@@ -1,4 +1,6 @@
 // A dead man's handle: while it is held, where to is said ten times a second; let go, it says so once.
+// A gamepad holds it, too, while the handle has the focus; each of its buttons lets go until the stick was in its middle.
+const DEAD_ZONE = 0.15;
 export default {
   props: { disabled: Boolean, name: String, stops: Number },
   template: `
@@ -10,13 +12,15 @@ export default {
       <path d="M -1 0 L -0.78 0.14 L -0.78 -0.14 Z M 1 0 L 0.78 0.14 L 0.78 -0.14 Z" class="lab-pad-way" />
       <circle :cx="-turn" :cy="-ahead" r="0.3" class="lab-pad-knob" />
     </svg>`,
-  data() { return { ahead: 0, turn: 0, timer: null, knows: 0, keys: new Set() }; },
+  data() { return { ahead: 0, turn: 0, timer: null, knows: 0, keys: new Set(), isGamepad: false, isLetGo: false, beat: null }; },
   mounted() {
+    this.beat = setInterval(this.readGamepad, 50);
     this.away = () => this.release();
     document.addEventListener("visibilitychange", this.away);
     window.addEventListener("pagehide", this.away);
   },
   unmounted() {
+    clearInterval(this.beat);
     this.release();
     document.removeEventListener("visibilitychange", this.away);
     window.removeEventListener("pagehide", this.away);
@@ -34,6 +38,7 @@ export default {
     tell() { this.$emit("drive", { move: this.ahead, turn: this.turn, stops: this.knows }); },
     release() {
       this.keys.clear();
+      this.isGamepad = false;
       if (this.timer === null) return;
       clearInterval(this.timer);
       this.timer = null;
@@ -54,6 +59,17 @@ export default {
       event.preventDefault();
     },
     move(event) { if (this.timer !== null && event.buttons) this.follow(event); },
+    readGamepad() {
+      const hasFocus = document.activeElement === this.$refs.pad && document.hasFocus() && !this.disabled;
+      const gamepad = hasFocus && [...navigator.getGamepads()].find((each) => each && each.connected);
+      const [x = 0, y = 0] = gamepad ? gamepad.axes.map((value) => (Math.abs(value) < DEAD_ZONE ? 0 : value)) : [];
+      if (!x && !y) this.isLetGo = false;
+      else if (gamepad.buttons.some((each) => each.pressed)) this.isLetGo = true;
+      if ((x || y) && !this.isLetGo) {
+        this.isGamepad = true;
+        this.hold(-y, -x);
+      } else if (this.isGamepad) this.release();
+    },
     key(event) {
       if (!event.key.startsWith("Arrow") || this.disabled) return;
       event.preventDefault();

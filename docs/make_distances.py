@@ -143,8 +143,8 @@ def coverage(study: ResultsFolder) -> str:
         "mean less paper’s",
         "A12",
         "p (Holm)",
-        "finds",
-        "What may be said",
+        "detectable",
+        "Conclusion",
         "Equivalence",
     ]
     return _csv(head, rows)

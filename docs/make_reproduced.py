@@ -118,7 +118,7 @@ def comparisons(folder: ResultsFolder) -> str:
         "difference",
         "95 % interval",
         "p (Holm)",
-        "What may be said",
+        "Conclusion",
         "Equivalence",
     ]
     return _csv(head, rows)

@@ -195,7 +195,9 @@ def published_generalization(rows: list[dict[str, str]]) -> str:
     published = CLASSICAL_TASKS[ours[0]["task"]].published
     n = published["n"]
     interval = mean_with_interval({**published, "sd_generalization": spread}, n, "generalization")
-    return f"No spread is published of the starts passed; with our larger one, {n} runs give {interval}."
+    return (
+        f"The spread of the starts passed is not published. With our larger spread, {n} runs give {interval}."
+    )
 
 
 def open_choices() -> str:

@@ -354,14 +354,14 @@ def test_what_the_page_of_the_paper_says_of_the_constant_input_is_what_the_numbe
     for row in _rows("constant-input"):
         one, other = (row[side].split("-") for side in ("First", "Second"))
         if one[0] == other[0]:  # with the input and without it
-            assert row["What may be said"] == f"{row['First']} above {row['Second']}"
+            assert row["Conclusion"] == f"{row['First']} above {row['Second']}"
         else:  # the two searches, with the same inputs
             assert one[2] == other[2]
-            assert row["What may be said"].startswith("not shown")
+            assert row["Conclusion"].startswith("not shown")
 
 
 def test_what_the_page_of_the_paper_says_of_noise_and_selection_is_what_the_numbers_say():
-    said = {(row["First"], row["Second"]): row["What may be said"] for row in _rows("table-3")}
+    said = {(row["First"], row["Second"]): row["Conclusion"] for row in _rows("table-3")}
     for selection in ("coverage", "novelty", "random"):
         for level in ("50", "80"):
             one, other = f"{selection}-{level}", f"{selection}-10"

@@ -125,8 +125,8 @@ def by_draws(rows: Sequence[Row]) -> str:
 def intervals(rows: Sequence[Row]) -> str:
     """How many intervals hold the truth, and how many estimates are near it."""
     lines = [
-        "| observed | robots | 90 % intervals that hold the truth | 95 % interval, over robots | identified parameters "
-        "near it | by the draws |",
+        "| observed | robots | 90 % intervals with the true value | 95 % interval, over robots | identified parameters "
+        "near it | expected |",
         "|---|---|---|---|---|---|",
     ]
     for observe in ("track", "cells"):
@@ -167,7 +167,7 @@ def flagged(rows: Sequence[Row], closing: Row) -> str:
     same = [row["excludes_no_gap"] for row in rows if row["what"] == "same"]
     return "\n".join(
         [
-            "| of | what | how many |",
+            "| robots | result | number |",
             "|---|---|---|",
             f"| twins `alien` | flagged | {sum(alien)} of {len(alien)} |",
             f"| twins of [closing the gap](closing-the-gap.md) | flagged | {sum(others)} of {len(others)} |",

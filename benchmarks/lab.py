@@ -184,12 +184,11 @@ class Served:
 
     def _drawing(self) -> float:
         """Processor time of the process that draws [s]."""
-        watcher = self.lab.watchers.get("watched")
-        child = None if watcher is None else watcher._child
-        if child is None:
+        number = self.lab.drawer.process_id
+        if number is None:
             return 0.0
         try:
-            fields = Path(f"/proc/{child._process.pid}/stat").read_text().rpartition(")")[2].split()
+            fields = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()
         except OSError:
             return 0.0
         return (int(fields[11]) + int(fields[12])) / TICKS

@@ -106,8 +106,7 @@ def test_a_study_that_is_watched_and_played(lab, look):
     page = look("study/seen")
     page.locator(".lab-figure img").nth(4).wait_for()
     page.get_by_role("tab", name="Replay").click()
-    page.get_by_role("button", name="Show trials").click()
-    page.locator(".rg-player").wait_for()
+    page.locator(".lab-replay").locator(".rg-player").wait_for()
     assert faults(page) == []
     home = look("")
     home.locator('[data-study="seen"]').wait_for()

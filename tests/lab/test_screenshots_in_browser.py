@@ -67,11 +67,14 @@ def test_studies_and_one_that_is_watched(lab, visit):
     )
     keep(page, "watch")
     page.get_by_role("tab", name="Replay").click()
-    page.get_by_label("Trials", exact=True).click()
-    page.get_by_text("The best of each generation").click()
-    page.get_by_role("button", name="Show trials").click()
-    player = page.locator(".rg-player")
+    replay = page.locator(".lab-replay")
+    player = replay.locator(".rg-player")
     player.wait_for()
+    for number in (2, 3):
+        replay.get_by_label("Run", exact=True).fill(str(number))
+        page.wait_for_timeout(600)  # a field waits a moment for more letters
+        replay.get_by_role("button", name="Compare").click()
+        player.locator(".rg-names > *").nth(number - 1).wait_for()
     player.get_by_role("slider", name="Step").fill("40")
     rays = player.locator(".rg-ray:visible")
     assert rays.count() >= 3

@@ -6,7 +6,9 @@ import json
 
 import pytest
 
-from .conftest import OUTAGE, PHONE
+import realitygap
+
+from .conftest import DESKTOP, OUTAGE, PHONE
 from .test_hand import wait_for
 
 pytestmark = pytest.mark.slow
@@ -16,7 +18,7 @@ RECORD = """() => {
   setInterval(() => {
     const words = [...document.querySelectorAll(".lab-state")].map((it) => it.textContent);
     const now = JSON.stringify([words, document.body.innerText.match(/[\\d,]+\\/[\\d,]+ runs/)?.[0] || "",
-      document.body.innerText.includes("No runs yet")]);
+      /No runs yet|Drawing figures/.exec(document.body.innerText)?.[0] || ""]);
     if (seen.at(-1) !== now) sessionStorage.seen = JSON.stringify([...seen, now]), seen.push(now);
   }, 50);
 }"""
@@ -35,9 +37,9 @@ def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
     page.get_by_text("has the highest median best coverage: 0.4").wait_for()
     page.locator(".lab-figure img").first.wait_for()
     seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
-    for words, progress, is_empty in seen:
+    for words, progress, waiting in seen:
         assert len(words) <= 1, seen
-        assert words != ["Complete"] or (progress == "" and not is_empty), seen
+        assert words != ["Complete"] or (progress == "" and waiting != "No runs yet"), seen
     assert [words for words, _, _ in seen if words == ["In use"]] == []
     assert page.get_by_text(LAST).count()
     page.locator(".lab-figure img").nth(4).wait_for()
@@ -47,6 +49,19 @@ def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
     again = visit("study/paper", size=PHONE)  # from the folder: no process draws
     again.locator(".lab-figure img").nth(4).wait_for()
     assert str(lab.root) not in again.locator("body").inner_text()
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_complete_study_never_seems_empty_while_its_figures_are_drawn(lab, visit, size):
+    realitygap.run_study("paper", lab.root / "paper", replicates=50)
+    page = visit(size=size, forgive=OUTAGE)
+    page.context.add_init_script(f"addEventListener('DOMContentLoaded', {RECORD})")
+    page.goto(lab.address + "study/paper")
+    page.locator(".lab-curves polyline").first.wait_for()
+    page.locator(".lab-figure img").nth(4).wait_for()
+    seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
+    assert {waiting for _, _, waiting in seen} <= {"", "Drawing figures"}
+    assert all(words in ([], ["Complete"]) for words, _, _ in seen), seen
 
 
 def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from realitygap.study import parse_study, run_study
 
-from .conftest import PHONE
+from .conftest import DESKTOP, PHONE
 from .robot_study import SLOW, begin_sitting, make_study, start_trial
 
 pytestmark = pytest.mark.slow
@@ -41,27 +42,59 @@ def test_a_study_is_shown_in_figures_and_its_trials_are_played(lab, visit):
         page.wait_for_function("image => image.naturalWidth > 0", arg=image.element_handle())
         assert "narrow" in image.evaluate("image => image.currentSrc")
     page.get_by_role("tab", name="Replay").click()  # the typical run plays without a wish
-    player = page.locator(".rg-player")
+    player = page.locator(".lab-replay").locator(".rg-player")
     player.wait_for()
-    page.wait_for_function("() => document.querySelector('.rg-clock').textContent.match(/step [1-9]/)")
+    player.locator(".rg-clock", has_text=re.compile("step [1-9]")).wait_for()
     slider = player.get_by_role("slider", name="Step")
     slider.fill("87")
     assert "step 87 of 87" in player.locator(".rg-clock").text_content()
 
 
-def test_several_trials_are_played_together_and_a_wish_that_cannot_be_is_told(lab, visit):
+def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
     carry_out(lab.root)
     page = visit("study/seen")
     page.get_by_role("tab", name="Replay").click()
-    page.get_by_label("Trials", exact=True).click()
-    page.get_by_text("The best of each condition").click()
-    page.get_by_role("button", name="Show trials").click()
-    page.locator(".rg-names > *").nth(1).wait_for()
-    assert page.locator(".rg-names > *").count() == 2
-    page.get_by_label("Run", exact=True).fill("99")
-    page.get_by_label("Run", exact=True).press("Tab")
-    page.get_by_role("button", name="Show trials").click()
+    replay = page.locator(".lab-replay")
+    replay.locator(".rg-player").wait_for()
+    assert replay.locator(".rg-names > *").count() == 0  # one trial at first
+    run, compare = page.get_by_label("Run", exact=True), page.get_by_role("button", name="Compare")
+
+    def choose(number: int) -> None:
+        run.fill(str(number))
+        run.press("Tab")
+        page.wait_for_timeout(600)  # a field waits a moment for more letters
+        compare.click()
+
+    for number in (1, 2, 3):
+        choose(number)
+        replay.locator(".rg-names > *").nth(number).wait_for()
+    choose(4)
+    page.get_by_role("alert").filter(has_text="4 trials are shown.").wait_for()
+    assert replay.locator(".rg-names > *").count() == 4
+    run.fill("99")
+    run.press("Tab")
+    page.wait_for_timeout(600)
+    page.get_by_role("button", name="Show trial").click()
     page.locator(".lab-problem", has_text="99").wait_for()
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_condition_of_the_table_filters_both_panels(lab, visit, size):
+    carry_out(lab.root)
+    page = visit("study/seen", size=size)
+    page.locator(".lab-curves polyline").nth(1).wait_for()
+    page.locator(".lab-panel .rg-player").wait_for()
+    row = page.locator(".lab-choosable tbody tr").nth(1)
+    name = row.get_by_role("button").inner_text()
+    row.get_by_role("button").click()
+    page.get_by_text(f"Showing {name}.").wait_for()
+    page.locator(".lab-panel .rg-head", has_text=name).wait_for()
+    assert page.locator(".lab-curves g.lab-curve-off").count() == 1
+    page.locator(".lab-curves > svg").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.locator(".lab-curves-words").inner_text().startswith(f"{name}, generation 0: 0.")
+    row.locator("td").last.click()  # the whole row works; a second press shows all
+    page.get_by_text(f"Showing {name}.").wait_for(state="detached")
 
 
 def test_report_is_written_and_works_in_its_sandbox(lab, visit):

@@ -52,6 +52,11 @@ class Child:
         """Whether it works still."""
         return self._process.poll() is None
 
+    @property
+    def process_id(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
     def tell(self, message: Mapping[str, Any]) -> None:
         """Say something to it; nothing where it has ended."""
         self._lines.put(json.dumps(message, separators=(",", ":")) + "\n")

@@ -19,6 +19,7 @@ from realitygap.settings import shown
 from ._calibration_job import CalibrationJob
 from ._checks import Checks
 from ._counts import Counts
+from ._drawer import Drawer
 from ._files import refuse_camera, refuse_outside, refuse_platform, refuse_port
 from ._gap_job import GapJob
 from ._hand import Hand
@@ -82,6 +83,7 @@ class Lab:
         studies: In it.
         checks: Study files that are being checked.
         jobs: Studies that go on, or went on since the lab was opened, by name.
+        drawer: The process that draws the figures of all studies.
         watchers: The figures of studies that somebody has watched, by name.
         hand: The robot that is driven by hand, or was last; None before.
         gap: The gap that is measured or planned, or was last; None before.
@@ -105,6 +107,7 @@ class Lab:
         self.hand: Hand | None = None
         self.gap: GapJob | None = None
         self.calibration: CalibrationJob | None = None
+        self.drawer = Drawer(root)
         self.watchers: dict[str, Watcher] = {}
         self._counts: dict[str, Counts] = {}
         self._photos: dict[str, Photos] = {}
@@ -193,7 +196,7 @@ class Lab:
         path = self.studies.path(name)
         with self._lock:
             if name not in self.watchers:
-                self.watchers[name] = Watcher(path, self.root, self.changed)
+                self.watchers[name] = Watcher(path, self.drawer, self.changed)
             return self.watchers[name]
 
     def start_new(self, name: str, text: str) -> None:
@@ -543,8 +546,7 @@ class Lab:
             job.ask_to_end()
         for job in going:
             job.end()
-        for watcher in self.watchers.values():
-            watcher.end()
+        self.drawer.end()
         for photos in self._photos.values():
             photos.end()
         self.checks.end()

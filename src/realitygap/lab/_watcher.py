@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ._child import Child
+from ._drawer import Drawer
 from ._figure_cache import read_figures
 
 LEAST_S = 1.0
@@ -27,37 +27,39 @@ MOST_REPLAYS = 64
 
 
 class Watcher:
-    """Figures of a study; one process draws for all pages.
+    """Figures of a study, drawn once for all pages.
 
     Attributes:
         figures: Figures by name: caption, alt, and the two drawings (SVG, gzip); or why there is none.
         n_drawn: Counts drawings.
         rows: Condition, label, number of runs, median best coverage, and its interval, for each condition.
+        curves: Best coverage of each condition by generation, as `curves_of` returns it.
         replays: What was asked to be played, by the key of who asked; or why it cannot be.
         report_said: Why no report could be written; empty otherwise.
         report_stamp: Changes whenever one was written, or could not be.
 
     Args:
         folder: Of the study.
-        root: Where the process works.
+        drawer: The process that draws.
         changed: Called after each change, from another thread.
     """
 
-    def __init__(self, folder: Path, root: Path, changed: Callable[[], None]) -> None:
+    def __init__(self, folder: Path, drawer: Drawer, changed: Callable[[], None]) -> None:
         self.figures: dict[str, dict[str, Any]] = {}
         self.n_drawn = 0
         self.rows: list[dict[str, Any]] = []
+        self.curves: list[dict[str, Any]] = []
         self.replays: dict[str, dict[str, Any]] = {}
         self.report_said = ""
         self.report_stamp = 0
-        self._folder, self._root, self._changed = folder, root, changed
-        self._child: Child | None = None
+        self._folder, self._drawer, self._changed = folder, drawer, changed
         self._lock = threading.Lock()
         self._stamp: Any = None
         self._due = 0.0
         self._since = time.monotonic()
         self._not_before = 0.0
         self._is_drawing = False
+        self._typical: set[str] = set()
 
     def look(self, done: tuple[int, int], *, is_running: bool = False) -> None:
         """Have the figures drawn again if the study has changed, but not too often while it runs.
@@ -72,41 +74,47 @@ class Watcher:
             return
         if self._stamp is None and (kept := read_figures(self._folder, done)) is not None:
             self._stamp = stamp
-            self.rows = kept[0]
-            self.figures = {name: _packed(figure) for name, figure in kept[1].items()}
+            self.rows, self.curves, figures = kept
+            self.figures = {name: _packed(figure) for name, figure in figures.items()}
             self.n_drawn += 1
             self._changed()
             return
         self._stamp, self._is_drawing = stamp, True
         self._want(what="figures", names=list(LIVE) if is_running else None, done=list(done))
 
-    def prepare(self) -> None:
-        """Have a process ready that draws: starting it takes longer than drawing."""
-        self._want(what="nothing")
+    def typical(self, condition: str, done: int) -> dict[str, Any] | None:
+        """Return the typical run of a condition to be played, or why it cannot be; ask for it and return None before.
 
-    def replay(self, key: str, **wish: Any) -> None:
+        Args:
+            condition: Name of the condition.
+            done: Number of complete runs. Another number asks again.
+        """
+        key = f"typical {done} {condition}"
+        with self._lock:
+            found = self.replays.get(key)
+            if found is not None or key in self._typical:
+                return found
+            self._typical.add(key)
+        self.replay(key, [{"condition": condition}])
+        return None
+
+    def replay(self, key: str, choices: list[dict[str, Any]]) -> None:
         """Ask for trials to be played; they come into `replays` under the key."""
         with self._lock:
             self.replays.pop(key, None)
             while len(self.replays) >= MOST_REPLAYS:
-                self.replays.pop(next(iter(self.replays)))
-        self._want(what="replay", key=key, **wish)
+                oldest = next(iter(self.replays))
+                del self.replays[oldest]
+                self._typical.discard(oldest)
+        self._want(what="replay", key=key, choices=choices)
 
     def write_report(self) -> None:
         """Ask for the report to be written."""
         self.report_said = ""
         self._want(what="report", key="report")
 
-    def end(self) -> None:
-        """End the process."""
-        if self._child is not None:
-            self._child.end()
-
     def _want(self, **wish: Any) -> None:
-        with self._lock:
-            if self._child is None or not self._child.is_alive:
-                self._child = Child({"work": "watch", "folder": str(self._folder)}, self._root, self._hear)
-            self._child.tell({"do": "want", **wish})
+        self._drawer.want(self._folder, self._hear, **wish)
 
     def _hear(self, message: dict[str, Any]) -> None:
         kind = message.get("kind")
@@ -120,7 +128,7 @@ class Watcher:
                 pause = min(SHARE * message["seconds"], GROWTH * (now - self._since))
                 self._due = now + max(LEAST_S, pause)
             elif kind == "summary":
-                self.rows = message["rows"]
+                self.rows, self.curves = message["rows"], message["curves"]
             elif kind == "replay":
                 self.replays[message["key"]] = message
             elif kind == "report":
@@ -130,11 +138,12 @@ class Watcher:
                 self.report_stamp += 1
             elif kind == "refused" and message["key"]:
                 self.replays[message["key"]] = message
-            elif kind == "ended" and self._is_drawing:  # it ended before it had drawn what was asked for
-                self._stamp, self._is_drawing = None, False
-                self._not_before = time.monotonic() + RETRY_S
-        if kind != "figure":
-            self._changed()
+            elif kind == "ended":
+                self._typical.intersection_update(self.replays)
+                if self._is_drawing:  # it ended before it had drawn what was asked for
+                    self._stamp, self._is_drawing = None, False
+                    self._not_before = time.monotonic() + RETRY_S
+        self._changed()
 
 
 def _packed(figure: dict[str, Any]) -> dict[str, Any]:

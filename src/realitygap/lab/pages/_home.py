@@ -30,6 +30,8 @@ def add_home(lab: Lab) -> None:
     @ui.page("/", response_timeout=30)
     async def home() -> None:
         standings = list(await run.io_bound(lab.standings) or ())
+        if any(standing.n_done for standing in standings):
+            lab.drawer.prepare()  # the page of a study then has its figures sooner
         with framed(lab, "Studies", "/", is_wide=True):
             _Page(lab, standings).show()
 

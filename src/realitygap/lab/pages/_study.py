@@ -10,7 +10,7 @@ from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from realitygap.errors import RealityGapError
+from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
@@ -19,6 +19,7 @@ from realitygap.lab._study_job import StudyJob
 from realitygap.lab._watcher import Watcher
 from realitygap.platforms import emulated_robots
 
+from ._curves import Curves
 from ._driving import Driving
 from ._fields import Form
 from ._frame import framed, hint, section
@@ -34,18 +35,26 @@ LOOK_S = 0.5
 
 _TITLES = {
     "scores": "Best score by generation",
-    "coverage": "Best coverage by generation",
-    "paths": "Best paths",
+    "coverage": "Coverage of every run",
+    "paths": "Best path of each generation",
     "networks": "Networks",
     "species": "Species",
     "archive": "Archive of novelty search",
 }
-_EACH = {
-    "": "One trial",
-    "individual": "Each individual of a generation",
-    "generation": "The best of each generation",
-    "condition": "The best of each condition",
-}
+MOST_TRIALS = 4
+"""Number of trials that are played together: more robots cover each other."""
+_GROWING = ("Running", "In use")
+"""States in which runs are published."""
+_CONDITION = """
+<q-td :props="props">
+  <q-btn flat dense no-caps align="left" class="lab-choose-row" :label="props.value"
+         :aria-pressed="String(props.row.chosen)" @click.stop="$parent.$emit('choose', props.value)" />
+</q-td>
+"""
+"""Name of a condition in the table: a press shows this condition alone."""
+_COLUMNS_AT_END = '["condition", "median", "n", "label"]'
+_ALL_COLUMNS = '["condition", "median", "n", "progress", "label"]'
+_ROW = "(event, row) => emit(row)"
 
 
 def add_study(lab: Lab) -> None:
@@ -97,6 +106,7 @@ class _Opened:
     watcher: Watcher
     counts: Counts | None
     conditions: list[str]
+    replicates: int
     files: list[str]
 
 
@@ -108,17 +118,21 @@ def _open(lab: Lab, name: str) -> _Opened | None:
         return None
     standing = lab.standing(name)
     conditions: list[str] = []
+    replicates = 1
     counts = None
     if standing.n_runs or standing.n_driven_runs:
-        conditions = list(lab.studies.results(name).conditions)
+        results = lab.studies.results(name)
+        conditions, replicates = list(results.conditions), int(results.description["replicates"])
         counts = lab.counts(name) if standing.has_robot else None
     if counts is not None:
         counts.look()
     files = sorted(path.name for path in lab.root.glob("*.toml"))[:MOST_FILES]
     watcher = lab.watcher(name)
-    if standing.word == "Running":
-        watcher.prepare()
-    return _Opened(standing, watcher, counts, conditions, files)
+    if standing.n_done or standing.n_driven_done:  # saved figures are on the page from the start
+        watcher.look((standing.n_done, standing.n_driven_done), is_running=standing.word in _GROWING)
+    elif standing.word == "Running":
+        lab.drawer.prepare()
+    return _Opened(standing, watcher, counts, conditions, replicates, files)
 
 
 class _Starting:
@@ -161,7 +175,10 @@ class _Page:
         self._is_looking = False
         self._key = secrets.token_hex(8)
         self._asked = self._has_played = False
+        self._chosen = ""
+        self._choices: list[dict[str, Any]] = []
         self._report_stamp = self._watcher.report_stamp
+        self._shown_curves: Any = None
 
     def show(self) -> None:
         if self._standing.note:
@@ -174,7 +191,7 @@ class _Page:
         with panels.props("keep-alive"):
             with ui.tab_panel(overview):
                 self._show_overview()
-            with ui.tab_panel(replay):
+            with ui.tab_panel(replay).classes("lab-replay"):
                 self._show_replay()
             with ui.tab_panel(report):
                 self._show_reporting()
@@ -189,10 +206,22 @@ class _Page:
     def _show_overview(self) -> None:
         self._drive = Part(self._driven, self._show_driving)
         self._drive.show()
-        self._finding = Part(lambda: self._watcher.rows, self._show_finding)
+        self._finding = Part(self._found, self._show_finding)
         self._finding.show()
         self._waiting = Part(self._waiting_for, self._show_waiting)
         self._waiting.show()
+        self._filtered = Part(lambda: self._chosen, self._show_filter)
+        self._filtered.show()
+        with ui.element("div").classes("lab-panels-two") as self._panels:
+            with ui.column().classes("lab-panel") as self._curves_box:
+                section("Best coverage by generation")
+                self._curves = Curves([], "Median best coverage by generation, one line per condition")
+            with ui.column().classes("lab-panel"):
+                section("Best path")
+                self._path = Part(self._typical, self._show_path)
+                self._path.show()
+        self._table_box = ui.column().classes("lab-cards")
+        self._table: ui.table | None = None
         self._gallery = ui.column().classes("lab-cards")
         self._images: dict[str, _Image] = {}
         self._n_drawn = 0
@@ -231,6 +260,8 @@ class _Page:
         self._drive.look()
         if self._asked and self._key in self._watcher.replays:
             self._asked = False
+            if "text" in self._watcher.replays[self._key]:
+                self._choices = self._choices[:-1]
             self._stage.refresh()
         self._live.look()
         if self._report_stamp != (stamp := self._watcher.report_stamp):
@@ -249,7 +280,6 @@ class _Page:
             return
         self._standing, has_report = found
         self._state.look()
-        self._finding.look()
         self._renew_figures()
         if has_report != self._has_report:
             self._has_report = has_report
@@ -261,7 +291,7 @@ class _Page:
         state = self._lab.studies.lately(self._name)
         if state.n_done or state.n_driven_done:
             done = (state.n_done, state.n_driven_done)
-            self._watcher.look(done, is_running=standing.word in ("Running", "In use"))
+            self._watcher.look(done, is_running=standing.word in _GROWING)
         return standing, (self._lab.root / self._name / "report.html").is_file()
 
     def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:
@@ -270,37 +300,28 @@ class _Page:
 
     # finding and figures
 
-    def _show_finding(self, rows: list[dict[str, Any]]) -> None:
-        known = [row for row in rows if row["line_median"] is not None]
-        if not known:
-            return
-        known.sort(key=lambda row: -row["line_median"])
-        best = known[0]
-        n_missing = self._standing.n_runs - self._standing.n_done
-        so_far = " so far" if n_missing else ""
-        ui.label(
-            f"{best['condition']} has the highest median best coverage{so_far}: {_estimate(best)} "
-            f"({best['label']}, {best['n']} runs)."
-        ).classes("lab-finding")
-        with ui.expansion("Conditions", value=True).classes("lab-expansion"):
-            columns = [
-                {"name": key, "label": label, "field": key, "align": align, "sortable": True}
-                for key, label, align in (
-                    ("condition", "Condition", "left"),
-                    ("median", "Median best coverage", "left"),
-                    ("n", "Runs", "right"),
-                    ("label", "Label", "left"),
-                )
-            ]
-            shown = [{**row, "median": _estimate(row)} for row in known]
-            ui.table(rows=shown, columns=columns, row_key="condition").classes("lab-table").props(
-                "flat dense wrap-cells"
-            )
-            hint("Best coverage of a run, along the robot's path. Brackets: 95 % interval of the median.")
+    def _rows(self) -> list[dict[str, Any]]:
+        """Conditions with known coverage, the highest median first."""
+        known = [row for row in self._watcher.rows if row["line_median"] is not None]
+        return sorted(known, key=lambda row: -row["line_median"])
+
+    def _found(self) -> str:
+        """The finding; empty as long as there is none."""
+        if not (rows := self._rows()):
+            return ""
+        best, n_missing = rows[0], self._standing.n_runs - self._standing.n_done
+        return (
+            f"{best['condition']} has the highest median best coverage{' so far' if n_missing else ''}: "
+            f"{_estimate(best)} ({best['label']}, {best['n']} runs)."
+        )
+
+    def _show_finding(self, finding: str) -> None:
+        if finding:
+            ui.label(finding).classes("lab-finding")
 
     def _waiting_for(self) -> str | None:
         """Why there are no figures; None once there are some."""
-        if self._drawn():
+        if self._watcher.curves or self._drawn():
             return None
         standing = self._standing
         n = standing.n_done + standing.n_driven_done
@@ -318,17 +339,115 @@ class _Page:
             ui.label("No runs yet. Figures appear when the first run finishes.")
 
     def _renew_figures(self) -> None:
-        """Add new figures below those on the page, and have those load new drawings; nothing else moves."""
-        self._waiting.look()
-        is_new = self._n_drawn != self._watcher.n_drawn
-        self._n_drawn = self._watcher.n_drawn
+        """Update the figures, and add new ones below those on the page; nothing else moves."""
+        watcher = self._watcher
+        for part in (self._waiting, self._finding):
+            part.look()
+        is_new = self._n_drawn != watcher.n_drawn
+        self._n_drawn = watcher.n_drawn
+        self._renew_panels()
         for name in self._drawn():
             if name not in self._images:
                 with self._gallery:
-                    self._images[name] = _Image(name, self._watcher.figures[name])
+                    self._images[name] = _Image(name, watcher.figures[name])
                 self._images[name].load(self._name, self._n_drawn)
             elif is_new:
                 self._images[name].load(self._name, self._n_drawn)
+
+    def _renew_panels(self) -> None:
+        """Update the two panels and the table of conditions."""
+        curves = self._watcher.curves
+        self._panels.set_visibility(bool(curves) or bool(self._drawn()))
+        self._curves_box.set_visibility(bool(curves))
+        if curves and curves is not self._shown_curves:
+            self._shown_curves = curves
+            self._curves.put(curves)
+        self._path.look()
+        if self._rows():
+            self._renew_table()
+
+    def _renew_table(self) -> None:
+        rows = [
+            {
+                "condition": row["condition"],
+                "median": _estimate(row),
+                "n": row["n"],
+                "progress": f"{100 * row['n'] / self._opened.replicates:.0f} %",
+                "label": row["label"],
+                "chosen": row["condition"] == self._chosen,
+            }
+            for row in self._rows()
+        ]
+        if self._table is None:
+            with self._table_box:
+                section("Conditions")
+                self._table = self._make_table()
+                hint(
+                    "Choose a condition to show it alone. Best coverage of a run, along the robot's path. Brackets: "
+                    "95 % interval of the median."
+                )
+        is_growing = self._standing.share < 1
+        self._table.props[":visible-columns"] = _ALL_COLUMNS if is_growing else _COLUMNS_AT_END
+        if self._table.rows != rows:
+            self._table.rows = rows
+
+    def _make_table(self) -> ui.table:
+        columns = [
+            {"name": key, "label": label, "field": key, "align": align, "sortable": True}
+            for key, label, align in (
+                ("condition", "Condition", "left"),
+                ("median", "Median best coverage", "left"),
+                ("n", "Runs", "right"),
+                ("progress", "Progress", "right"),
+                ("label", "Label", "left"),
+            )
+        ]
+        table = ui.table(rows=[], columns=columns, row_key="condition").classes("lab-table lab-choosable")
+        table.props("flat bordered dense wrap-cells")
+        table.props[":table-row-class-fn"] = "(row) => row.chosen ? 'lab-chosen' : ''"
+        table.add_slot("body-cell-condition", _CONDITION)
+        table.on("choose", lambda event: self._choose(event.args))
+        table.on("rowClick", lambda event: self._choose(event.args["condition"]), js_handler=_ROW)
+        return table
+
+    def _choose(self, condition: Any) -> None:
+        """Show one condition alone in both panels; all if it was chosen already."""
+        names = [row["condition"] for row in self._rows()]
+        self._chosen = condition if condition in names and condition != self._chosen else ""
+        self._curves.choose(self._chosen)
+        self._filtered.look()
+        self._renew_panels()
+
+    def _show_filter(self, chosen: str) -> None:
+        if chosen:
+            with ui.row().classes("lab-row"):
+                ui.label(f"Showing {chosen}.").props('role="status"')
+                ui.button("Show all", on_click=lambda: self._choose("")).props("flat no-caps")
+
+    def _typical(self) -> tuple[str, bool, dict[str, Any] | None]:
+        """Condition of the path that is shown, whether there is one, and its replay; None while it is computed."""
+        rows, standing = self._rows(), self._standing
+        condition = self._chosen or (rows[0]["condition"] if rows else "")
+        if not condition and self._drawn():
+            condition = self._opened.conditions[0]
+        if not condition:
+            return "", False, None
+        is_growing = standing.word in _GROWING
+        done = 0 if is_growing else standing.n_done + standing.n_driven_done
+        return condition, True, self._watcher.typical(condition, done)
+
+    def _show_path(self, typical: tuple[str, bool, dict[str, Any] | None]) -> None:
+        condition, is_known, replay = typical
+        if not is_known:
+            return
+        if replay is None:
+            ui.label("Computing the path…").props('role="status"')
+            ui.skeleton().classes("lab-skeleton")
+        elif "text" in replay:
+            ui.label(replay["text"]).classes("lab-problem")
+        else:
+            Player(replay["scene"], replay["trials"])
+            hint(f"Best trial of the typical run of {condition}: the run with the median best coverage.")
 
     # replays
 
@@ -337,7 +456,6 @@ class _Page:
         form.summary()
         names = self._opened.conditions
         with ui.element("div").classes("lab-fields"):
-            form.choice("each", "Trials", _EACH, "")
             form.choice("condition", "Condition", names, names[0])
             for key, label in (
                 ("replicate", "Run"),
@@ -347,30 +465,40 @@ class _Page:
                 form.number(key, label, None, 0, 2**31)
         hint("If you don't choose a run, the run with the median best coverage is shown.")
 
-        def given(values: dict[str, Any]) -> dict[str, Any]:
-            keys = ("replicate", "generation", "individual")
+        def chosen(values: dict[str, Any]) -> dict[str, Any]:
+            keys = ("condition", "replicate", "generation", "individual")
             return {key: values[key] for key in keys if values[key] is not None}
 
-        def ask(values: dict[str, Any]) -> None:
-            wish: dict[str, Any] = {"each": values["each"] or None, **given(values)}
-            if values["each"] != "condition":
-                wish["condition"] = values["condition"]
-            self._watcher.replay(self._key, **wish)
-
         def drive(values: dict[str, Any]) -> None:
-            chosen = {"condition": values["condition"], "platform": values["platform"]}
-            self._lab.drive_live(self._name, {**chosen, **given(values)})
+            self._lab.drive_live(self._name, {**chosen(values), "platform": values["platform"]})
 
-        async def show() -> None:
+        async def show(*, compares: bool = False) -> None:
+            before = self._choices if compares else []
+
+            def ask(values: dict[str, Any]) -> None:
+                if len(before) >= MOST_TRIALS:
+                    raise StudyError(
+                        f"{MOST_TRIALS} trials are shown. Show one trial, then compare others with it."
+                    )
+                if (choice := chosen(values)) in before:
+                    raise StudyError(
+                        "This trial is shown already. Choose another condition, run, or generation."
+                    )
+                self._watcher.replay(self._key, [*before, choice])
+                self._choices = [*before, choice]
+
             self._has_played = self._asked = True
             self._key = secrets.token_hex(8)  # what was asked for before comes too late
-            self._stage.refresh()
             if not await form.submit(ask):
                 self._asked = False
-                self._stage.refresh()
+                return
+            self._stage.refresh()
 
         self._replay = show
-        ui.button("Show trials", on_click=show).props("unelevated no-caps")
+        with ui.row().classes("lab-row"):
+            ui.button("Show trial", on_click=lambda: show()).props("unelevated no-caps")
+            ui.button("Compare", on_click=lambda: show(compares=True)).props("outline no-caps")
+        hint(f"Compare adds the chosen trial to those shown, up to {MOST_TRIALS}.")
         self._stage = ui.refreshable(self._show_stage)
         self._stage()
         section("Drive live")
@@ -407,7 +535,7 @@ class _Page:
 
     def _show_stage(self) -> None:
         if self._asked:
-            ui.label("Computing the trials…").props('role="status"')
+            ui.label("Computing the trial…").props('role="status"')
             return
         found = self._watcher.replays.get(self._key)
         if found is None:

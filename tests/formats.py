@@ -284,12 +284,12 @@ def _observations(path: Path) -> Any:
 
 
 def _valid_observations() -> bytes:
-    from realitygap.records import ObservationsHead, ObservedTrial, write_observations
+    from realitygap.records import ObservationsHead, TrialRecord, write_observations
     from realitygap.world import paper_arena
 
     head = ObservationsHead("sim", "SIM", "scribbler-s2-fluke2", paper_arena().to_dict(), 0.5, "track")
     trials = [
-        ObservedTrial(
+        TrialRecord(
             start=(0.19, 0.2, 0.4), step_s=0.5, commands=np.full((2, 2), 0.5), readings=np.full((2, 3), 0.25),
             stalled=np.zeros(2, bool), cells=(3, 7), wheels=np.zeros((3, 2)), poses=np.zeros((3, 3)), number=number,
             purpose="motion", battery_v=7.25,
@@ -363,7 +363,7 @@ def _ledger(path: Path) -> Any:
             for generation, _ in ledger.generations(name, 0):
                 found.append(ledger.individuals(name, 0, generation))
         for trial in ledger.trials():
-            found.append(ledger.steps(trial.trial))
+            found.append(ledger.record(trial.trial))
         return found
 
 

@@ -11,7 +11,7 @@ import pytest
 from realitygap.errors import RealityGapError
 from realitygap.evolution import NearestArchive, NoveltyArchive, NoveltySettings, PaperArchive, Population
 from realitygap.gap import Estimate, GapResult, GapSide, Why
-from realitygap.records import ObservedTrial, ResultsFolder, Trial
+from realitygap.records import ResultsFolder, Trial, TrialRecord
 from realitygap.study import GapBetween, Strategist, TransferResult, load_study
 from realitygap.trials import Trajectory
 from realitygap.world import Calibration
@@ -243,10 +243,8 @@ def test_texts_of_users_are_escaped_in_every_card(tmp_path):
 
 
 def test_trials_have_one_line():
-    trial = ObservedTrial(
-        (0, 0, 0), 0.5, np.zeros((3, 2)), np.zeros((3, 3)), np.zeros(3, bool), (1,), number=4
-    )
-    assert repr(trial) == "ObservedTrial(4, controller, 3 steps of 0.5 s, observed: cells)"
+    trial = TrialRecord((0, 0, 0), 0.5, np.zeros((3, 2)), np.zeros((3, 3)), np.zeros(3, bool), (1,), number=4)
+    assert repr(trial) == "TrialRecord(4, controller, 3 steps of 0.5 s, observed: cells)"
     rows, stalled = np.zeros((4, 3)), np.array([False, True, False, True])
     driven = Trajectory(0.5, rows, rows, rows[1:], rows[1:, :2], stalled, 0.25, 0.1, (1,))
     assert repr(driven) == "Trajectory(3 steps of 0.5 s, 2 blocked, coverage 0.250)"

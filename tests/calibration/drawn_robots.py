@@ -9,7 +9,7 @@ import numpy as np
 from realitygap.calibration import ranges_of, scribbler_prior
 from realitygap.calibration._handles import parameters_of, robot_numbers
 from realitygap.platforms import SimEnsemble, SimPlatform
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import load_robot, paper_arena
 
@@ -25,14 +25,14 @@ def drawn(seed: int, names: Iterable[str]) -> dict[str, float]:
     return {name: float(KNOWN[name].prior.of(rng.uniform(size=1))[0]) for name in names}
 
 
-def carried_out(plans: Sequence[TrialPlan], truth: dict[str, float], seed: int) -> list[ObservedTrial]:
+def carried_out(plans: Sequence[TrialPlan], truth: dict[str, float], seed: int) -> list[TrialRecord]:
     """What is seen of plans on a robot with these parameters."""
     numbers = robot_numbers(KNOWN, ROBOT, {name: np.array([value]) for name, value in truth.items()})
     starts = np.array([[*(plan.start or ARENA.start)] for plan in plans])
     commands = np.array([plan.commands for plan in plans])
     done = ENSEMBLE.replay(starts, commands, numbers, seed)
     return [
-        ObservedTrial(
+        TrialRecord(
             start=tuple(starts[k]),
             step_s=ROBOT.step_s,
             commands=commands[k],

@@ -11,7 +11,7 @@ import pytest
 from realitygap.calibration import end_pose_of, fit_path, moved_in, of_one_length, path_plans, ruled
 from realitygap.calibration._path import STRAIGHT, TURNING
 from realitygap.platforms import SimPlatform, SimTarget
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.study._calibrate.kinds import _moved_in_sim
 from realitygap.world import INCH, load_robot, paper_arena
 
@@ -29,15 +29,15 @@ def fitted(trials, seed: int = 0, robot=ROBOT):
     return fit, {each.name: each for each in fit.fitted}
 
 
-def recorded(numbers: dict[str, float], key: int, observe="track", n: int = 10) -> list[ObservedTrial]:
+def recorded(numbers: dict[str, float], key: int, observe="track", n: int = 10) -> list[TrialRecord]:
     """Trials of a simulated robot with these numbers."""
     target = SimTarget(SimPlatform(robot=ROBOT, set=numbers), ARENA, key=key)
     return target.carry_out(path_plans(ARENA, n), observe)
 
 
-def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) -> ObservedTrial:
+def measured(ahead_in: float, turned_deg: float, command, left_in: float = 0.0) -> TrialRecord:
     """What a person with a ruler has of a trial."""
-    trial = ObservedTrial(
+    trial = TrialRecord(
         start=(0.2, 0.3, 0.0),
         step_s=0.5,
         commands=np.tile(command, (5, 1)),

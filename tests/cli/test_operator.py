@@ -159,7 +159,7 @@ def test_a_line_that_was_entered_is_kept_when_the_program_is_killed_at_the_next(
     terminal.kill()
     with Ledger.open(out / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["scored", "driven"]
-        assert len(ledger.steps(2)) == 3
+        assert len(ledger.record(2).commands) == 3
     again = Terminal(*run)
     again.answer("Escape: later", "dll\r")
     again.answer("Enter closes it", "\n")

@@ -11,7 +11,7 @@ import pytest
 
 from realitygap.cli import main
 from realitygap.errors import VisionError
-from realitygap.records import LEDGER_NAME, Ledger, read_observations, write_observations
+from realitygap.records import LEDGER_NAME, PATH_PARTS, Ledger, read_observations, write_observations
 from realitygap.study import (
     calibrate_from,
     drive_study,
@@ -24,7 +24,7 @@ from realitygap.study import (
     trial_of_file,
 )
 from realitygap.testing import Film, FilmedCamera, path_through, save_film
-from realitygap.trials import PATH_PARTS, TrialPlan
+from realitygap.trials import TrialPlan
 from realitygap.vision import Lens, Track, fit_lens, read_lens
 from realitygap.world import paper_arena
 from tests.cli.test_commands import realitygap
@@ -81,8 +81,8 @@ def driven(tmp_path_factory):
     farthest = max(operator.paths, key=lambda number: np.ptp(operator.paths[number][0][:, :2], axis=0).sum())
     path, cells = operator.paths[farthest]
     with Ledger.open(folder / "out" / LEDGER_NAME, writable=False) as ledger:
-        steps = ledger.steps(farthest)
-    began = np.array([step.time for step in steps]) - steps[0].time
+        times = ledger.record(farthest).times
+    began = times - times[0]
     times = np.append(began, began[-1] + STEP_S)
     rows = np.arange(len(path)) / PATH_PARTS
     at = LEAD_S + np.interp(rows, np.arange(len(times)), times)

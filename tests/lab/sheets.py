@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from realitygap.lab._drawn import keep_drawn
-from realitygap.records import LEDGER_NAME, Ledger, Score
+from realitygap.records import LEDGER_NAME, PATH_PARTS, Ledger, Score, TrialRecord
 from realitygap.study import drive_study, parse_study
 from realitygap.testing import (
     Film,
@@ -17,7 +17,7 @@ from realitygap.testing import (
     photograph_sheet,
     save_film,
 )
-from realitygap.trials import PATH_PARTS, Card, DrivenTrial
+from realitygap.trials import Card
 from realitygap.vision import SheetLayout
 from realitygap.world import cells_along, paper_arena
 from tests.study.physical import Unattended
@@ -37,8 +37,8 @@ class _Uncounted(Unattended):
         self._folder = folder
         self.paths: dict[int, np.ndarray] = {}
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
-        path = super().drawn(card, driven).path or ()
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
+        path = super().drawn(card, record).path or ()
         self.paths[card.trial.trial] = np.array(path)
         keep_drawn(self._folder, card.trial.trial, path)
         return None
@@ -61,7 +61,7 @@ def drive_sheet(root: Path) -> list[np.ndarray]:
 def film_of(root: Path, number: int, path: np.ndarray, file: Path) -> None:
     """Film a trial from above, as a video."""
     with Ledger.open(root / "by-robot" / LEDGER_NAME, writable=False) as ledger:
-        began = np.array([step.time for step in ledger.steps(number)])
+        began = ledger.record(number).times
     times = np.append(began - began[0], began[-1] - began[0] + STEP_S)
     at = LEAD_S + np.interp(np.arange(len(path)) / PATH_PARTS, np.arange(len(times)), times)
     camera = FilmedCamera(width=960, height=540, noise=3.0)

@@ -50,7 +50,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
             ((0, 12), True),
         ]
         assert {row["who"] for row in ledger.scores()} == {"anna"}
-        assert all(len(ledger.steps(number)) == 12 for number in range(1, 5))
+        assert all(len(ledger.record(number).commands) == 12 for number in range(1, 5))
         assert ledger.conditions()["coverage-robot"]["label"] == "EMULATED"
 
 
@@ -88,7 +88,7 @@ def test_a_lab_killed_in_the_middle_of_a_trial_loses_nothing(lab, visit):
     with ledger_of(lab.root) as ledger:
         wait_for(lambda: ledger.trial(1).problem is not None)
         assert ledger.trial(1).state == "running"
-        assert 2 < len(ledger.steps(1)) < 60
+        assert 2 < len(ledger.record(1).commands) < 60
     lab.start()
     page = visit(PAGE)
     begin_sitting(page, FAST)

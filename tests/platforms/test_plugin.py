@@ -108,7 +108,7 @@ def test_package_adds_a_robot_for_live_views_and_gymnasium() -> None:
 
     robot, n_steps = open_robot(Condition(name="a"), "toy")
     assert isinstance(robot, ToyRobot)
-    assert len(drive_trial(robot, one_genome().network(), n_steps).steps) == n_steps
+    assert len(drive_trial(robot, one_genome().network(), n_steps).commands) == n_steps
     env = gymnasium.make("realitygap/Avoid-v0", platform="toy", arena={"preset": "paper"})
     env.reset(seed=1)
     _, reward, *_ = env.step(np.array([0.5, 0.0]))

@@ -174,10 +174,9 @@ platform = "thymio"
     result = drive_study(file, EMULATED, tmp_path / "out")
     assert result.physical.n_complete == 1
     with Ledger.open(tmp_path / "out" / "ledger.sqlite", writable=False) as ledger:
-        trials, steps = ledger.trials("robot", 0, 0), ledger.steps(1)
+        trials, record = ledger.trials("robot", 0, 0), ledger.record(1)
         assert [trial.state for trial in trials] == ["scored", "scored"]
-        assert len(steps) == 5
-        assert len(steps[0].raw) == 7
+        assert record.raw.shape == (5, 7)
         assert ledger.conditions()["robot"]["label"] == "EMULATED"
         (sitting,) = ledger.sittings()
         assert sitting["port"] == EMULATED

@@ -6,7 +6,9 @@ import random
 import shutil
 import sqlite3
 import threading
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -19,7 +21,7 @@ from realitygap.records import (
     Individual,
     Ledger,
     Score,
-    Step,
+    TrialRecord,
     Turn,
     _ledger_file,
     complete_runs,
@@ -31,7 +33,29 @@ GENOME = {
     "hidden": [], "biases": [], "innovation": [0, 1], "source": [0, 1], "target": [3, 4], "weight": [0.5, -1.25],
     "enabled": [True, False],
 }  # fmt: skip
-STEP = Step(0.5, (0.0, 1700.0, 12.0), (0.0, 1.0, 0.007), True, 0.25, -1.0)
+RECORD = TrialRecord(
+    start=(0.0, 0.0, 0.0),
+    step_s=0.5,
+    commands=np.array([[0.25, -1.0], [0.5, 0.125]]),
+    readings=np.array([[0.0, 1.0, 0.007], [0.25, 0.0, 1.0]]),
+    stalled=np.array([True, False]),
+    last_readings=np.array([0.5, 0.75, 0.0]),
+    last_stalled=True,
+    times=np.array([0.25, 0.75, 1.5]),
+    raw=np.array([[0.0, 1700.0, 12.0], [400.0, 0.0, 6400.0], [800.0, 1200.0, 0.0]]),
+)
+CUT = replace(
+    RECORD,
+    commands=RECORD.commands[:1],
+    readings=RECORD.readings[:1],
+    stalled=RECORD.stalled[:1],
+    last_readings=np.empty(0),
+    last_stalled=False,
+    times=RECORD.times[:1],
+    raw=RECORD.raw[:1],
+    end="aborted",
+    problem="no answer",
+)
 
 
 def new_ledger(path, n=2, n_generations=1):
@@ -53,13 +77,20 @@ def sit(ledger, label="EMULATED"):
 
 def drive(ledger, number, cells=(13, 14)):
     ledger.start(number, sit(ledger))
-    ledger.finish(number, "step limit", [STEP], stalls=1, score=Score(cells, "witness", n_ends=1))
+    ledger.finish(number, RECORD, Score(cells, "witness", n_ends=1))
 
 
 @pytest.fixture
 def ledger(tmp_path):
     with new_ledger(tmp_path) as ledger:
         yield ledger
+
+
+def assert_driven(record, expected):
+    """What a robot did and saw is as it was given to the ledger."""
+    for name in ("commands", "readings", "stalled", "last_readings", "last_stalled", "times", "raw"):
+        np.testing.assert_array_equal(getattr(record, name), getattr(expected, name), err_msg=name)
+    assert (record.end, record.problem) == (expected.end, expected.problem)
 
 
 def states(ledger):
@@ -69,10 +100,10 @@ def states(ledger):
 @pytest.mark.parametrize("verdict", ["void", "driven"])
 def test_an_interrupted_trial_keeps_its_steps_and_is_settled(ledger, verdict):
     ledger.start(1, sit(ledger))
-    ledger.interrupt(1, "aborted", [STEP], stalls=1, problem="no answer")
+    ledger.interrupt(1, CUT)
     trial = ledger.trial(1)
     assert (trial.state, trial.end, trial.n_steps) == ("running", "aborted", 1)
-    assert ledger.steps(1) == [STEP]
+    assert_driven(ledger.record(1), CUT)
     assert ledger.events()[-1]["what"] == "interrupted"
     assert ledger.events()[-1]["details"] == {"end": "aborted", "problem": "no answer"}
     ledger.settle(1, verdict, "it stood at the wall")
@@ -91,9 +122,10 @@ def test_a_trial_goes_from_planned_to_scored(ledger):
     number = ledger.trials()[0].trial
     ledger.start(number, sit(ledger))
     assert ledger.trial(number).state == "running"
-    ledger.finish(number, "step limit", [STEP, STEP], stalls=2)
+    ledger.finish(number, RECORD)
     assert (ledger.trial(number).state, ledger.trial(number).n_steps) == ("driven", 2)
-    assert ledger.steps(number) == [STEP, STEP]
+    assert ledger.trial(number).stalls == 1
+    assert_driven(ledger.record(number), RECORD)
     ledger.score(number, Score([14, 13, 14], "anna"))
     assert (ledger.trial(number).state, ledger.trial(number).cells) == ("scored", (14, 13))
     assert [event["what"] for event in ledger.events()] == [
@@ -156,7 +188,7 @@ def test_closing_freezes_the_scores(ledger):
 def test_rows_have_no_coverage_of_ends_that_nobody_saw(ledger):
     for number in (1, 2):
         ledger.start(number, sit(ledger))
-        ledger.finish(number, "step limit", [STEP], stalls=1, score=Score((13, 14), "anna"))
+        ledger.finish(number, RECORD, Score((13, 14), "anna"))
     ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
     assert ledger_frame(ledger, "a")["coverage_ends"].to_list() == [None, None]
 
@@ -208,7 +240,7 @@ def test_closing_refuses_fitness_of_other_cells(ledger):
 def test_scores_of_a_sheet_are_entered_together_or_not_at_all(ledger):
     for number in (1, 2):
         ledger.start(number, sit(ledger))
-        ledger.finish(number, "step limit", [STEP], stalls=0)
+        ledger.finish(number, RECORD)
     with pytest.raises(LedgerError, match="Cell 72 is outside"):
         ledger.score_all({1: Score([1], "anna"), 2: Score([72], "anna")})
     assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
@@ -386,7 +418,7 @@ def test_random_bytes_are_refused_in_one_message_or_harmless(tmp_path):
         said = "Restore"
         try:
             with Ledger.open(path, writable=False) as ledger:
-                read = (ledger.trials(), ledger.scores(), ledger.sittings(), ledger.steps(1))
+                read = (ledger.trials(), ledger.scores(), ledger.sittings(), ledger.record(1))
                 read += (ledger.individuals("a", 0, 0), ledger.notes())
         except LedgerError as error:
             n_refused += 1
@@ -504,7 +536,7 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(number=trials)
     def finish(self, number):
         state = self.model.get(number, [None])[0]
-        if self._try(state == "running", lambda: self.ledger.finish(number, "step limit", [STEP], stalls=0)):
+        if self._try(state == "running", lambda: self.ledger.finish(number, RECORD)):
             self.model[number][0] = "driven"
 
     @rule(number=trials, cells=st.lists(st.integers(0, 71), min_size=1, max_size=4, unique=True))

@@ -17,7 +17,7 @@ from realitygap.errors import RecordError
 from realitygap.records import (
     ObservationsFile,
     ObservationsHead,
-    ObservedTrial,
+    TrialRecord,
     read_observations,
     trial_to_dict,
     write_observations,
@@ -29,9 +29,9 @@ HEAD = ObservationsHead(
 )
 
 
-def trial(number: int, t: int = 3) -> ObservedTrial:
+def trial(number: int, t: int = 3) -> TrialRecord:
     rng = np.random.default_rng(number)
-    return ObservedTrial(
+    return TrialRecord(
         start=(0.19, 0.2, math.pi / 7),
         step_s=0.5,
         commands=rng.uniform(-1, 1, (t, 2)),
@@ -46,7 +46,14 @@ def trial(number: int, t: int = 3) -> ObservedTrial:
     )
 
 
-def same(one: ObservedTrial, other: ObservedTrial) -> bool:
+def robot_trial(number: int) -> TrialRecord:
+    """A trial of a robot, which knows when it looked and what its sensors answered in their own units."""
+    rng = np.random.default_rng(number)
+    looks = {"times": np.cumsum(rng.uniform(0.4, 0.6, 4)), "raw": rng.integers(0, 6400, (4, 3)).astype(float)}
+    return replace(trial(number), last_readings=np.ones(3), last_stalled=True, problem="no answer", **looks)
+
+
+def same(one: TrialRecord, other: TrialRecord) -> bool:
     return trial_to_dict(one) == trial_to_dict(other)
 
 
@@ -55,6 +62,7 @@ def test_trials_come_back_as_they_were(tmp_path: Path) -> None:
         trial(0),
         trial(1, 0),
         replace(trial(2), wheels=np.empty((0, 2)), poses=np.empty((0, 3)), cells=()),
+        robot_trial(3),
     ]
     write_observations(tmp_path / "one.jsonl", HEAD, trials)
     found = read_observations(tmp_path / "one.jsonl")
@@ -62,6 +70,7 @@ def test_trials_come_back_as_they_were(tmp_path: Path) -> None:
     assert found.problem == ""
     assert all(same(*pair) for pair in zip(found.trials, trials, strict=True))
     assert found.trials[2].observe == "cells"
+    assert (found.trials[3].times.shape, found.trials[3].raw.shape) == ((4,), (4, 3))
     assert math.isnan(found.trials[1].battery_v)
     assert found.trials[0].commands.dtype == float
     assert found.trials[0].stalled.dtype == bool

@@ -33,10 +33,10 @@ def test_what_an_emulator_s_witness_saw_moves_as_it_was_seen(emulated, tmp_path)
         (which,) = [
             each.trial for each in ledger.trials("robot") if (each.generation, each.individual) == (1, 0)
         ]
-        steps = ledger.steps(which)
+        record = ledger.record(which)
     reach = trial.shape.reach[0]
-    np.testing.assert_allclose(trial.rays[4 * 3], (1 - np.array(steps[3].readings)) * reach)
-    assert trial.stalled[::4][:12].tolist() == [step.stalled for step in steps]
+    np.testing.assert_allclose(trial.rays[4 * 3], (1 - record.readings[3]) * reach)
+    assert trial.stalled[::4][:12].tolist() == record.stalled.tolist()
     path = write_movie(emulated, tmp_path / "a.gif", generation=1, individual=0, speed=4, width=320)
     with Image.open(path) as image:
         assert image.info["comment"].startswith(b"realitygap: EMULATED")

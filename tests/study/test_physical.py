@@ -57,7 +57,7 @@ def test_a_lost_link_leaves_the_trial_to_the_operator(tmp_path):
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
         states = [trial.state for trial in ledger.trials()]
         assert states == ["scored", "running", "planned"]
-        assert len(ledger.steps(2)) == 3
+        assert len(ledger.record(2).commands) == 3
     robots.append(FakeRobot())
     result = drive(study, tmp_path / "r", robot=robots[0])
     assert result.n_complete == 1
@@ -215,7 +215,7 @@ def test_a_trial_that_the_witness_could_not_tell_of_keeps_its_steps_and_is_drive
         drive(small_study(), tmp_path / "r", operator=Blind())
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["running", "planned", "planned"]
-        assert len(ledger.steps(1)) == 4
+        assert len(ledger.record(1).commands) == 4
     drive(small_study(), tmp_path / "r")
     drive(small_study(), tmp_path / "whole")
     assert scored(tmp_path / "r") == scored(tmp_path / "whole")

@@ -184,7 +184,7 @@ def disturb(
             n_struck += proxy.n_struck.total()
         with Ledger.open(path / LEDGER_NAME) as ledger:
             for trial in ledger.trials(states=["scored"]):
-                assert len(ledger.steps(trial.trial)) == STEPS
+                assert len(ledger.record(trial.trial).commands) == STEPS
         if result is not None and result.physical.n_complete == 1:
             return n_struck
     raise AssertionError("The study came to no end.")

@@ -60,8 +60,10 @@ def test_avoidance_is_scored_by_the_robots_own_readings(tmp_path):
     assert rows["coverage_line"].null_count() == rows.height
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
         assert {score["who"] for score in ledger.scores()} == {ROBOT}
-        assert len(ledger.steps(1)) == 4
-        assert ledger.last_look(1) is not None
+        record = ledger.record(1)
+        assert len(record.commands) == 4
+        assert len(record.times) == 5
+        assert len(record.last_readings) == record.readings.shape[1]
     assert summarize_tasks(tmp_path / "r").select("n", "label").rows() == [(1, "EMULATED")]
     assert summarize(tmp_path / "r")["line_median"].to_list() == [None]
     with pytest.raises(RecordError, match="Nobody counted the cells of robot"):

@@ -18,7 +18,7 @@ from realitygap.emulator import Emulator, serve_tcp
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.platforms import ScribblerPlatform
-from realitygap.records import ObservedTrial, read_observations, trial_to_dict
+from realitygap.records import TrialRecord, read_observations, trial_to_dict
 from realitygap.robots import Command
 from realitygap.robots.twin import sample_twin
 from realitygap.study import connect_robot, open_target, try_on
@@ -202,7 +202,7 @@ def failing(lost_at: list[int], on_lost: OnLost) -> tuple[RobotTarget, list[Any]
 
 def test_a_lost_trial_is_told_and_driven_again_once() -> None:
     target, opened = failing([3, 99], "retry")
-    told: list[tuple[int, ObservedTrial]] = []
+    told: list[tuple[int, TrialRecord]] = []
     with target:
         (trial,) = target.carry_out([FORWARD], "track", lambda k, trial: told.append((k, trial)))
     assert [(k, each.end, len(each.commands)) for k, each in told] == [(0, "lost", 2), (0, "step limit", 6)]
@@ -232,7 +232,7 @@ def test_lost_trials_may_be_skipped() -> None:
 
 def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
     target = emulated()
-    told: list[ObservedTrial] = []
+    told: list[TrialRecord] = []
 
     class Impatient(Failing):
         def drive(self, command: Command) -> None:
@@ -257,7 +257,7 @@ def test_ctrl_c_while_somebody_is_asked_for_cells_tells_the_trial() -> None:
 
     robot = connect_robot(PORT)(ScribblerPlatform(reading_max=6400))
     target = RobotTarget(lambda: robot, ARENA, Asked(), name="scribbler:test")
-    told: list[ObservedTrial] = []
+    told: list[TrialRecord] = []
     with pytest.raises(KeyboardInterrupt):
         target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
     assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 6)]

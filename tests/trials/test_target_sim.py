@@ -9,7 +9,7 @@ import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.platforms import JyroPlatform, JyroRobot, SimPlatform, SimRobot, SimTarget, try_genomes
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.trials import NoiseKey, RobotObserver, TrialPlan, carry_out_on_robot
 from realitygap.world import Pose, paper_arena
 
@@ -29,15 +29,15 @@ def genomes() -> list[Genome]:
     return list(population.ask())
 
 
-def one_by_one(name: str, plan: TrialPlan) -> ObservedTrial:
+def one_by_one(name: str, plan: TrialPlan) -> TrialRecord:
     made = SimRobot if name == "sim" else JyroRobot
     robot = made(PLATFORMS[name], ARENA, noise=0.1, noise_key=NoiseKey(KEY, individual=plan.number))
-    trial, problem = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
-    assert not problem
+    trial = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
+    assert not trial.problem
     return trial
 
 
-def assert_same(one: ObservedTrial, other: ObservedTrial) -> None:
+def assert_same(one: TrialRecord, other: TrialRecord) -> None:
     for name, value in vars(one).items():
         there = getattr(other, name)
         if isinstance(value, np.ndarray):

@@ -18,7 +18,7 @@ import pytest
 from realitygap.errors import DescriptionError, RobotError
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.platforms import TwinTarget, open_twin
-from realitygap.records import ObservedTrial, trial_to_dict
+from realitygap.records import TrialRecord, trial_to_dict
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.trials import RobotObserver, TrialPlan, carry_out_on_robot
 from realitygap.world import Pose, paper_arena
@@ -53,7 +53,7 @@ def plans(n: int = 4, steps: int = 20) -> list[TrialPlan]:
     return [*made, TrialPlan(start=Pose(0.4, 0.3, 2.0), commands=commands, number=9, purpose="motion")]
 
 
-def as_dicts(trials: list[ObservedTrial]) -> list[dict[str, object]]:
+def as_dicts(trials: list[TrialRecord]) -> list[dict[str, object]]:
     return [trial_to_dict(trial) for trial in trials]
 
 
@@ -62,7 +62,7 @@ def test_trials_are_those_of_the_twin_in_this_process(file: Path, target: TwinTa
     expected = []
     for plan in plans():
         robot.number = plan.number
-        trial, _ = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
+        trial = carry_out_on_robot(robot, plan, "track", RobotObserver(robot), plan.start or ARENA.start)
         expected.append(trial)
     told: list[int] = []
     trials = target.carry_out(plans(), "track", lambda k, trial: told.append(k))
@@ -104,7 +104,7 @@ def test_a_process_that_dies_is_started_again_and_its_trial_tried_once_more(
     expected = as_dicts(target.carry_out(plans(3), "track"))
     with TwinTarget(str(file), ARENA, 1) as mortal:
         (before,) = mortal.pids
-        trials: list[ObservedTrial] = []
+        trials: list[TrialRecord] = []
         # the first trial is on its way back, and the second in flight or about to be
         trials = mortal.carry_out(
             plans(3), "track", lambda k, trial: os.kill(before, signal.SIGKILL) if k == 0 else None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._simulate import Bools, Floats, plain_numbers
@@ -39,7 +39,7 @@ class Encounters:
         return int(((self.margin > math.atan(friction)) == self.aligned).sum())
 
 
-def encounters_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Encounters:
+def encounters_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Encounters:
     """All first touches in trials with poses, on which another step of the same command follows."""
     outline = np.array([point for part in robot.body for point in part.outline()])
     axle = plain_numbers(robot)["drive.axle"]
@@ -60,7 +60,7 @@ def encounters_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Are
     return Encounters(np.array(margins), np.array(aligned, np.bool_))
 
 
-def _straight_rows(trial: ObservedTrial) -> list[int]:
+def _straight_rows(trial: TrialRecord) -> list[int]:
     """Rows before which and after which the same straight command was given."""
     if not len(trial.poses):
         return []

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from realitygap.platforms import SimEnsemble
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import Arena, Distribution, RobotModel
 
 from ._abc import Posterior
@@ -39,7 +39,7 @@ SURELY = 0.03  # least probability of a stall, and of none
 
 
 def fit_from_poses(
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     ensemble: SimEnsemble,
     prior: Sequence[Parameter],
     robot: RobotModel,

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._align_or_stall import Encounters, encounters_of
@@ -41,7 +41,7 @@ MAD = 1.4826  # of a median absolute deviation, to a standard deviation of a nor
 
 
 def fit_contact(
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     simulate: Simulate,
     robot: RobotModel,
     arena: Arena,

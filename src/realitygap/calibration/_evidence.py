@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import Genome
 from realitygap.platforms import Play, Rehearsal
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 
 Vectors = NDArray[np.float32]
 
@@ -118,7 +118,7 @@ def _steps_of(shape: tuple[int, ...], per_step: int) -> NDArray[np.int64]:
 
 
 def evidence_of(
-    trials: Sequence[ObservedTrial], genomes: Sequence[Genome | None], n_cells: int
+    trials: Sequence[TrialRecord], genomes: Sequence[Genome | None], n_cells: int
 ) -> list[Evidence]:
     """What trials tell, by groups of as many steps.
 
@@ -133,7 +133,7 @@ def evidence_of(
         if len(trial.commands) >= LEAST_STEPS
     ]
 
-    def alike(one: tuple[int, ObservedTrial, Genome | None]) -> tuple[int, str, bool, str]:
+    def alike(one: tuple[int, TrialRecord, Genome | None]) -> tuple[int, str, bool, str]:
         _, trial, genome = one
         interface = "" if genome is None or trial.observe == "track" else repr(genome.interface)
         return len(trial.commands), trial.observe, bool(interface), interface
@@ -145,7 +145,7 @@ def evidence_of(
 
 
 def _of_group(
-    group: list[tuple[int, ObservedTrial, Genome | None]], observe: Observe, is_driven: bool, n_cells: int
+    group: list[tuple[int, TrialRecord, Genome | None]], observe: Observe, is_driven: bool, n_cells: int
 ) -> list[Evidence]:
     number = np.array([k for k, _, _ in group])
     seen = _as_rehearsal([trial for _, trial, _ in group], n_cells)
@@ -189,7 +189,7 @@ def _evidence(
     )
 
 
-def _as_rehearsal(trials: Sequence[ObservedTrial], n_cells: int) -> Rehearsal:
+def _as_rehearsal(trials: Sequence[TrialRecord], n_cells: int) -> Rehearsal:
     """What was observed, as if one robot had rehearsed it; what was not seen has no steps."""
     cells = np.zeros((1, len(trials), n_cells), np.bool_)
     for k, trial in enumerate(trials):

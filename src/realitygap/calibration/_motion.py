@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, Fitted, RobotModel
 
 from ._handles import MOTION, MOTION_NOISE, Known, own_values, parameters_of, robot_numbers, values_at
@@ -62,7 +62,7 @@ class MotionFit:
     evidence: dict[str, Any] = field(default_factory=dict)
 
 
-def observed_as(trials: Sequence[ObservedTrial], observe: Observe | None) -> list[ObservedTrial]:
+def observed_as(trials: Sequence[TrialRecord], observe: Observe | None) -> list[TrialRecord]:
     """Trials of which no more than this is known."""
     shown = []
     for trial in trials:
@@ -73,7 +73,7 @@ def observed_as(trials: Sequence[ObservedTrial], observe: Observe | None) -> lis
 
 
 def fit_motion(
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     simulate: Simulate,
     robot: RobotModel,
     arena: Arena,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
@@ -48,7 +48,7 @@ GAIN_SPREAD, UNEVEN_SPREAD, TRACK_SPREAD = 0.29, 0.115, 0.17
 
 STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
 
-Simulate = Callable[[ObservedTrial], Moved]
+Simulate = Callable[[TrialRecord], Moved]
 """How the simulated robot moves, without noise, in a trial with the same start and commands."""
 
 
@@ -93,7 +93,7 @@ def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
 
 
 def fit_path(
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     simulate: Simulate,
     robot: RobotModel,
     rng: np.random.Generator,
@@ -180,7 +180,7 @@ def fit_path(
 class _Measured:
     """The trials of one kind, and how each moved."""
 
-    trials: list[ObservedTrial]
+    trials: list[TrialRecord]
     moved: list[Moved]
 
     @property
@@ -189,9 +189,7 @@ class _Measured:
         return len(_driven(self.trials[0]))
 
     @classmethod
-    def of(
-        cls, trials: Sequence[ObservedTrial], command: tuple[float, float], robot: RobotModel
-    ) -> _Measured:
+    def of(cls, trials: Sequence[TrialRecord], command: tuple[float, float], robot: RobotModel) -> _Measured:
         alike = [trial for trial in trials if len(_driven(trial)) and bool(np.all(_driven(trial) == command))]
         measured = [(trial, moved_in(trial) or _by_encoders(trial, robot)) for trial in alike]
         kept = [(trial, moved) for trial, moved in measured if moved is not None]
@@ -211,13 +209,13 @@ class _Measured:
         return max((moved.angle_step for moved in self.moved), default=EXACT)
 
 
-def _driven(trial: ObservedTrial) -> Array:
+def _driven(trial: TrialRecord) -> Array:
     """(t, 2) commands of a trial up to those in which it comes to rest."""
     moving = np.flatnonzero(np.any(trial.commands != 0, axis=1))
     return trial.commands[: moving[-1] + 1] if len(moving) else trial.commands[:0]
 
 
-def _by_encoders(trial: ObservedTrial, robot: RobotModel) -> Moved | None:
+def _by_encoders(trial: TrialRecord, robot: RobotModel) -> Moved | None:
     """By the ways of the wheels, with the track that the robot's file has; None without encoders."""
     if not len(trial.wheels):
         return None

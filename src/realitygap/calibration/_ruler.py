@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import INCH
 
 RULER = INCH / 8
@@ -44,7 +44,7 @@ class Moved:
         return math.copysign(arc, self.ahead)
 
 
-def ruled(trial: ObservedTrial) -> ObservedTrial:
+def ruled(trial: TrialRecord) -> TrialRecord:
     """What a person with a ruler has of a trial that a camera saw: the rounded pose of its end, and no other."""
     moved = moved_by_camera(trial)
     return replace(
@@ -59,21 +59,21 @@ def ruled(trial: ObservedTrial) -> ObservedTrial:
     )
 
 
-def end_pose_of(trial: ObservedTrial, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
+def end_pose_of(trial: TrialRecord, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
     """The pose at the end of a trial, from what was measured as seen from its start [m, rad]."""
     x, y, heading = trial.start
     sine, cosine = math.sin(heading), math.cos(heading)
     return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine, heading + turned
 
 
-def moved_by_camera(trial: ObservedTrial) -> Moved:
+def moved_by_camera(trial: TrialRecord) -> Moved:
     """From a camera's poses; turns are counted where no command turns by half a turn or more."""
     headings = np.unwrap(trial.poses[:, 2])
     x, y = trial.poses[-1, :2].tolist()
     return _seen_from(trial, x, y, float(headings[-1] - headings[0]), EXACT, EXACT)
 
 
-def moved_in(trial: ObservedTrial) -> Moved | None:
+def moved_in(trial: TrialRecord) -> Moved | None:
     """From the start of a trial to its end, by a camera or else by a ruler; None where neither was there."""
     if len(trial.poses):
         return moved_by_camera(trial)
@@ -84,7 +84,7 @@ def moved_in(trial: ObservedTrial) -> Moved | None:
 
 
 def _seen_from(
-    trial: ObservedTrial, x: float, y: float, turned: float, length_step: float, angle_step: float
+    trial: TrialRecord, x: float, y: float, turned: float, length_step: float, angle_step: float
 ) -> Moved:
     x0, y0, heading = trial.start
     sine, cosine = math.sin(heading), math.cos(heading)

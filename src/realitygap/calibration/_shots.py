@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.platforms import Play, Rehearsal, SimEnsemble
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._prior import Floats, Parameter, numbers_of
@@ -49,7 +49,7 @@ class Shots:
         return np.arange(k)[:, None] * each + np.arange(t) // length, k * each
 
 
-def shots_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Shots:
+def shots_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Shots:
     """The commands of trials with poses."""
     k, t = len(trials), max(len(trial.commands) for trial in trials)
     commands, poses = np.zeros((k, t, 2)), np.full((k, t + 1, 3), np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.platforms import NOISE
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import Distribution, RobotModel
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def motor_noise(robot: RobotModel) -> tuple[str, ...]:
     )
 
 
-def padded_commands(trials: Sequence[ObservedTrial]) -> Floats:
+def padded_commands(trials: Sequence[TrialRecord]) -> Floats:
     """(k, t, 2) the commands of trials, followed by standing where others are longer."""
     commands = np.zeros((len(trials), max(len(trial.commands) for trial in trials), 2))
     for row, trial in zip(commands, trials, strict=True):
@@ -99,6 +99,6 @@ def padded_commands(trials: Sequence[ObservedTrial]) -> Floats:
     return commands
 
 
-def starts_of(trials: Sequence[ObservedTrial]) -> Floats:
+def starts_of(trials: Sequence[TrialRecord]) -> Floats:
     """(k, 3) where trials begin; where poses were seen, there."""
     return np.array([trial.poses[0] if len(trial.poses) else trial.start for trial in trials], np.float64)

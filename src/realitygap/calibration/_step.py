@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 
 ALIKE = 0.1
 """Share by which commands of trials may differ in length and are taken for equally long: over a radio link none are."""
 
 
-def of_one_length(trials: Sequence[ObservedTrial]) -> tuple[list[ObservedTrial], str]:
+def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str]:
     """The most trials whose commands lasted about as long, and in words which were left out; empty where none was."""
     lengths = sorted(trial.step_s for trial in trials)
     if not lengths or lengths[-1] <= (1 + ALIKE) * lengths[0]:
@@ -26,7 +26,7 @@ def of_one_length(trials: Sequence[ObservedTrial]) -> tuple[list[ObservedTrial],
     )
 
 
-def step_of(trials: Sequence[ObservedTrial]) -> float:
+def step_of(trials: Sequence[TrialRecord]) -> float:
     """How long one command of these trials lasted, their median [s].
 
     Raises:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._handles import Known, robot_numbers
@@ -35,7 +35,7 @@ class Windows:
         step_s: [s].
     """
 
-    trials: tuple[ObservedTrial, ...]
+    trials: tuple[TrialRecord, ...]
     trial: Ints
     first: Ints
     last: Ints
@@ -67,9 +67,7 @@ def wrapped(angle: Floats) -> Floats:
     return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
-def make_windows(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, length: int = 1
-) -> Windows:
+def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, length: int = 1) -> Windows:
     """All windows of `length` commands, end to end.
 
     Raises:

@@ -14,7 +14,7 @@ from realitygap.trials import Operator
 from ._keys import read_line
 
 if TYPE_CHECKING:
-    from realitygap.records import ObservedTrial
+    from realitygap.records import TrialRecord
     from realitygap.trials import Led, TrialPlan
     from realitygap.world import Arena, RobotModel
 
@@ -60,7 +60,7 @@ class CalibrationOperator(Operator):
                 return "redo"
             self._say("There is none before." if answer in ("r", "redo") else f"{answer!r} is none of these.")
 
-    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+    def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Ask where a path ended, unless an observer saw it; None has the trial driven again."""
         from realitygap.study import with_ruled_end
 

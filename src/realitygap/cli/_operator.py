@@ -19,9 +19,9 @@ from ._grid_editor import edit_cells
 from ._keys import read_line, single_keys
 
 if TYPE_CHECKING:
-    from realitygap.records import Score
+    from realitygap.records import Score, TrialRecord
     from realitygap.robots import Command, Observation, Robot
-    from realitygap.trials import Card, DrivenTrial, Preflight, Verdict
+    from realitygap.trials import Card, Preflight, Verdict
     from realitygap.world import Arena
 
 _ABORTING = ("space", "escape", "q")
@@ -194,10 +194,10 @@ class PersonOperator(Operator):
         with single_keys() as keys:
             return keys.read(0.0) in _ABORTING
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """The score that a camera saw; None without one, because the person has to look first."""
         self._say("Done; the motors are stopped.")
-        return super().drawn(card, driven)
+        return super().drawn(card, record)
 
     # a sheet
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from realitygap.trials import Card, DrivenTrial, Operator, Preflight
+from realitygap.trials import Card, Operator, Preflight
 
 if TYPE_CHECKING:
-    from realitygap.records import Score, Trial
+    from realitygap.records import Score, Trial, TrialRecord
 
 _SILENCE_S = 10.0
 """After so long a silence the next trial is told of, too."""
@@ -35,9 +35,9 @@ class TellingOperator(Operator):
         self._told = self._told or time.monotonic()
         super().place(card)
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """The cells along the driven line."""
-        score = super().drawn(card, driven)
+        score = super().drawn(card, record)
         if score is not None and time.monotonic() - self._told > _SILENCE_S:
             self._say(f"Trial {card.trial.trial}, {card.title}: {len(set(score.cells))} cells.")
         return score

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from realitygap.platforms import platform_of
-from realitygap.records import ObservedTrial, read_observations
+from realitygap.records import TrialRecord, read_observations
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
     NO_LINE,
@@ -94,7 +94,7 @@ class _Growing:
             "trials", done=done, n=n, readings=[self._point(k, each) for k, each in enumerate(trials)]
         )
 
-    def _point(self, number: int, trial: ObservedTrial) -> dict[str, Any]:
+    def _point(self, number: int, trial: TrialRecord) -> dict[str, Any]:
         """Return the position of a trial in the plot, and the mean reading of each sensor, 0..1."""
         at = float(number + 1)
         if trial.purpose == "sensors":
@@ -120,7 +120,7 @@ class _PageOperator(Operator):
             return "stop"
         return "redo" if answer == "redo" and number else "go"
 
-    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+    def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Ask where a path ended; None where it is to be driven again."""
         if plan.purpose != "path" or len(trial.poses):
             return trial

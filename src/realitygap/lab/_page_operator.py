@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.emulator import Witness
-from realitygap.records import LEDGER_NAME, Ledger, Score
+from realitygap.records import LEDGER_NAME, Ledger, Score, TrialRecord
 from realitygap.robots import Command, Observation, Robot
 from realitygap.study import CameraObserver
-from realitygap.trials import Card, DrivenTrial, Operator, Preflight, Verdict, WitnessObserver, own_witness
+from realitygap.trials import Card, Operator, Preflight, Verdict, WitnessObserver, own_witness
 
 from ._channel import Channel, Message
 from ._drawn import keep_drawn
@@ -150,10 +150,10 @@ class WatchedOperator(Operator):
             self._page.cut_off()
         return self._is_stopped
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """The cells along the driven line."""
         self._page.driven(card)
-        return super().drawn(card, driven)
+        return super().drawn(card, record)
 
 
 class PageOperator(Operator):
@@ -223,10 +223,10 @@ class PageOperator(Operator):
         super().watch(card, step, seen, command)
         return self._page.step(card, step, seen, command)
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """Return the score, or None if a person must check the cells first; they are saved as a proposal."""
         self._page.driven(card)
-        seen, number = super().drawn(card, driven), card.trial.trial
+        seen, number = super().drawn(card, record), card.trial.trial
         if card.observe != "cells" or (
             seen is not None and seen.who == CameraObserver.who and not self.proposer
         ):

@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.errors import LogError
 from realitygap.evolution import Genome
-from realitygap.records import ObservationsHead, Observe, ObservedTrial
+from realitygap.records import ObservationsHead, Observe, TrialRecord
 from realitygap.world import Arena, Grid, Pose, load_arena
 
 from ._log_map import LogMap
@@ -57,7 +57,7 @@ def _observe_of(log: Log) -> Observe:
     return "encoders" if len(log.wheels) else "readings"
 
 
-def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[ObservedTrial]:
+def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord]:
     """Yield the stretches of a log in which everything is known, as trials.
 
     Args:
@@ -86,7 +86,7 @@ def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[ObservedTri
         start = poses[begin] if len(poses) else np.zeros(3)
         wheels = log.wheels[rows] - log.wheels[begin] if len(log.wheels) else log.wheels
         commands = np.clip(np.stack([(left + right) / 2, (right - left) / 2], 1)[begin:end], -1, 1)
-        yield ObservedTrial(
+        yield TrialRecord(
             start=(float(start[0]), float(start[1]), float(start[2])),
             step_s=log.step_s,
             commands=commands,

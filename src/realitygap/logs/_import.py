@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from realitygap.errors import LogError
-from realitygap.records import ObservedTrial, write_observations
+from realitygap.records import TrialRecord, write_observations
 from realitygap.world import RobotModel, load_robot, robot_names
 
 from ._as_trials import NO_HEADING, head_of, trials_of
@@ -140,7 +140,7 @@ class _Found:
             self._longest = len(log.commands)
             self.report = replace(self.report, offset=diagnosis.offset)
 
-    def count(self, trial: ObservedTrial) -> None:
+    def count(self, trial: TrialRecord) -> None:
         """Count a trial that is written."""
         report = self.report
         self.report = replace(
@@ -148,7 +148,7 @@ class _Found:
         )
 
 
-def _trials(first: Log, rest: Iterator[Log], log_map: LogMap, found: _Found) -> Iterator[ObservedTrial]:
+def _trials(first: Log, rest: Iterator[Log], log_map: LogMap, found: _Found) -> Iterator[TrialRecord]:
     number = 0
     log: Log | None = first
     while log is not None:

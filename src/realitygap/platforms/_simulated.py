@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from realitygap._closing import ClosedOnExit
 from realitygap.evolution import ControllerInterface
 from realitygap.kernels.math.philox import MAX_INDIVIDUALS
-from realitygap.records import Observe, ObservedTrial, sees
+from realitygap.records import Observe, TrialRecord, sees
 from realitygap.robots import Label
 from realitygap.trials import (
     EndReason,
@@ -116,10 +116,10 @@ class SimTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
         check_plans(plans, observe, self, MAX_INDIVIDUALS - 1)
-        trials: list[ObservedTrial] = []
+        trials: list[TrialRecord] = []
         for first in range(0, len(plans), TOGETHER):
             for trial in self._carry_out_some(plans[first : first + TOGETHER], observe):
                 trials.append(trial)
@@ -138,8 +138,8 @@ class SimTarget(ClosedOnExit):
     def close(self) -> None:
         """Nothing is held."""
 
-    def _carry_out_some(self, plans: Sequence[TrialPlan], observe: Observe) -> list[ObservedTrial]:
-        trials: dict[int, ObservedTrial] = {}
+    def _carry_out_some(self, plans: Sequence[TrialPlan], observe: Observe) -> list[TrialRecord]:
+        trials: dict[int, TrialRecord] = {}
         alike: dict[Any, list[int]] = {}
         for k, plan in enumerate(plans):
             if plan.genome is None:
@@ -152,11 +152,11 @@ class SimTarget(ClosedOnExit):
             trials |= dict(zip(group, tried, strict=True))
         return [trials[k] for k in range(len(plans))]
 
-    def _command(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:
+    def _command(self, plan: TrialPlan, observe: Observe) -> TrialRecord:
         """Command after command."""
         self._robot.noise_key = NoiseKey(self.key, individual=plan.number)
         start = plan.start or self._drawn_start()
-        return carry_out_on_robot(self._robot, plan, observe, RobotObserver(self._robot), start)[0]
+        return carry_out_on_robot(self._robot, plan, observe, RobotObserver(self._robot), start)
 
     def _drawn_start(self) -> Pose:
         """The arena's start with what is drawn of it for the robot's trial."""
@@ -173,7 +173,7 @@ class SimTarget(ClosedOnExit):
 
     def _try(
         self, plans: Sequence[TrialPlan], interface: ControllerInterface, observe: Observe
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """Trials of controllers of one kind from one start."""
         start, steps = plans[0].start, plans[0].steps
         platform, arena = self.platform.model_copy(update={"steps": steps}), self.arena
@@ -194,7 +194,7 @@ class SimTarget(ClosedOnExit):
             poses = poses_of(tried.trace.poses[:, :, k], trials.arena.start)
             x, y, heading = start or (poses[0].tolist() if self._is_start_set else self.arena.start)
             commands = tried.trace.commands[:, :, k].astype(np.float64)
-            trial = ObservedTrial(
+            trial = TrialRecord(
                 start=(x, y, heading),
                 step_s=self.step_s,
                 commands=commands,

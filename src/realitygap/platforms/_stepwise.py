@@ -16,7 +16,7 @@ from realitygap.errors import RobotError
 from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface, Network, inputs_of_robot
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 from realitygap.robots import Command, Label, channels_of, select_channels
 from realitygap.tasks import TraceArrays
 from realitygap.trials import (
@@ -154,10 +154,10 @@ def trial_of(
         driven = run_trial(robot, controller, n_steps, look=look, sees_end=True, channels=interface.channels)
     except TrialInterrupted as error:  # nothing of this trial is kept
         raise error.__cause__ or error from None
-    if driven.last is None:
+    if driven.problem:
         raise RobotError(driven.problem)
     ends = {arena.grid.cell_at(x, y) for x, y, _ in poses} - {None}
-    stalled = [*(bool(step.stalled) for step in driven.steps), bool(driven.last.stalled)]
+    stalled = [*driven.stalled.tolist(), driven.last_stalled]
     result = {
         "cells": list(robot.visited_cells),
         "ends": sorted(cell for cell in ends if cell is not None),
@@ -168,11 +168,11 @@ def trial_of(
         return result
     return result | {
         "poses": poses,
-        "readings": [*(step.readings for step in driven.steps), driven.last.readings],
+        "readings": [*driven.readings.tolist(), driven.last_readings.tolist()],
         "stalled": stalled,
         "wheels": distances,
         "inputs": inputs,
-        "commands": [(step.move, step.turn) for step in driven.steps],
+        "commands": driven.commands.tolist(),
     }
 
 
@@ -517,16 +517,16 @@ class StepwiseTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
         check_plans(plans, observe, self)
         trials = []
         for k, plan in enumerate(plans):
             choose_number(self._robot, plan.number)
             start = plan.start or self.arena.start
-            trial, problem = carry_out_on_robot(self._robot, plan, observe, RobotObserver(self._robot), start)
-            if problem:
-                raise RobotError(f"Trial {plan.number} on {self.name}: {problem}")
+            trial = carry_out_on_robot(self._robot, plan, observe, RobotObserver(self._robot), start)
+            if trial.problem:
+                raise RobotError(f"Trial {plan.number} on {self.name}: {trial.problem}")
             trials.append(trial)
             if tell is not None:
                 tell(k, trial)

@@ -28,13 +28,13 @@ from realitygap.records._json_file import read_object
 from realitygap.records._ledger import Ledger
 from realitygap.records._ledger_file import ledger_tables
 from realitygap.records._ledger_kinds import (
+    PATH_PARTS,
     ROBOT,
     Generation,
     Individual,
     PhotoCount,
     Score,
     ScoreRole,
-    Step,
     Trial,
     TrialState,
     Turn,
@@ -53,9 +53,9 @@ from realitygap.records._observations_file import (
     trial_to_dict,
     write_observations,
 )
-from realitygap.records._observed import CALIBRATES, OBSERVATIONS, Observe, ObservedTrial, sees
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._published_results import PublishedResults
+from realitygap.records._trial_record import CALIBRATES, OBSERVATIONS, Observe, TrialRecord, sees
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 wake_on_ctrl_c()
@@ -89,7 +89,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Turn",
     "Trial",
     "TrialState",
-    "Step",
     "PhotoCount",
     "Score",
     "ScoreRole",
@@ -98,10 +97,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "LEDGER_NAME",
     "ledger_tables",
     # what an observer sees of trials one by one
-    "ObservedTrial",
+    "TrialRecord",
     "Observe",
     "CALIBRATES",
     "OBSERVATIONS",
+    "PATH_PARTS",
     "ROBOT",
     "sees",
     "Observations",

@@ -18,12 +18,12 @@ from realitygap.records._ledger_kinds import (
     Generation,
     Score,
     ScoreRole,
-    Step,
     Trial,
     TrialState,
     Turn,
 )
 from realitygap.records._ledger_reader import LedgerReader
+from realitygap.records._trial_record import TrialRecord
 from realitygap.records._version import RESULTS_VERSION
 
 
@@ -197,31 +197,19 @@ class Ledger(LedgerReader):
             )
             self._note_event(number, "running", {"sitting": sitting})
 
-    def finish(
-        self,
-        number: int,
-        end: str,
-        steps: Sequence[Step],
-        *,
-        stalls: int,
-        score: Score | None = None,
-        last: Step | None = None,
-    ) -> None:
-        """A running trial has ended, and counts; with a score it is scored at once.
-
-        `last` is what the robot observed after its last command, if it looked.
-        """
+    def finish(self, number: int, record: TrialRecord, score: Score | None = None) -> None:
+        """Keep a running trial that has ended, and counts; with a score it is scored, too."""
         with self._writing():
-            self._keep_steps(number, end, steps, stalls=stalls, last=last)
-            self._drive(number, {"end": end})
+            self._keep_steps(number, record)
+            self._drive(number, {"end": record.end})
             if score is not None:
                 self._score(number, score, "score")
 
-    def interrupt(self, number: int, end: str, steps: Sequence[Step], *, stalls: int, problem: str) -> None:
-        """A running trial ended before its last step; whether it counts is still to be said, by `settle`."""
+    def interrupt(self, number: int, record: TrialRecord) -> None:
+        """Keep a running trial that was cut off, or that nobody scored; `settle` decides whether it counts."""
         with self._writing():
-            self._keep_steps(number, end, steps, stalls=stalls, problem=problem)
-            self._note_event(number, "interrupted", {"end": end, "problem": problem})
+            self._keep_steps(number, record)
+            self._note_event(number, "interrupted", {"end": record.end, "problem": record.problem})
 
     def settle(self, number: int, verdict: Literal["void", "driven"], reason: str) -> None:
         """Say what becomes of a running trial that was cut off: void, to be driven again, or driven."""
@@ -310,36 +298,23 @@ class Ledger(LedgerReader):
             *(turn.sheet, turn.pen, turn.code),
         )
 
-    def _keep_steps(
-        self,
-        number: int,
-        end: str,
-        steps: Sequence[Step],
-        *,
-        stalls: int,
-        problem: str = "",
-        last: Step | None = None,
-    ) -> None:
+    def _keep_steps(self, number: int, record: TrialRecord) -> None:
+        """Keep a row for each command, and one with a command of 0, 0 for a look after the last."""
         self._require(number, "running")
+        readings = [*record.readings.tolist(), record.last_readings.tolist()]
+        stalled = [*record.stalled.tolist(), record.last_stalled]
+        commands = [*record.commands.tolist(), (0.0, 0.0)]
+        rows = zip(record.times.tolist(), record.raw.tolist(), readings, stalled, commands, strict=False)
         self._connection.executemany(
             "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
             [
-                (
-                    number,
-                    k,
-                    step.time,
-                    _json(step.raw),
-                    _json(step.readings),
-                    step.stalled,
-                    step.move,
-                    step.turn,
-                )
-                for k, step in enumerate(steps if last is None else (*steps, last))
+                (number, k, time, _json(raw), _json(near), is_stalled, *command)
+                for k, (time, raw, near, is_stalled, command) in enumerate(rows)
             ],
         )
         self._run(
             "UPDATE trials SET end = ?, problem = ?, n_steps = ?, stalls = ? WHERE id = ?",
-            *(end, problem or None, len(steps), stalls, number),
+            *(record.end, record.problem or None, len(record.commands), record.n_stalls, number),
         )
 
     def _drive(self, number: int, details: Mapping[str, Any]) -> None:

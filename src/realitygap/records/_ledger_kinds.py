@@ -102,26 +102,6 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Step:
-    """One command of a trial.
-
-    Attributes:
-        time: since the trial began [s].
-        raw: (s,) the robot's readings as they came.
-        readings: (s,) the same, 0 to 1.
-        stalled: whether it was blocked.
-        move, turn: what the network answered, -1 to 1.
-    """
-
-    time: float
-    raw: tuple[float, ...]
-    readings: tuple[float, ...]
-    stalled: bool
-    move: float
-    turn: float
-
-
-@dataclass(frozen=True)
 class PhotoCount:
     """The photograph that cells were read from, for somebody to confirm.
 
@@ -139,6 +119,9 @@ class PhotoCount:
     doubtful: tuple[int, ...]
     is_confirmed: bool
 
+
+PATH_PARTS = 4
+"""In how many parts of a step the driven path is kept, so that arcs look like arcs."""
 
 ROBOT = "robot"
 """Who scores a trial of which nobody counted the cells, because its task is scored by the robot's own readings."""

@@ -7,17 +7,20 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from realitygap._closing import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.drawing import card_of
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
+    PATH_PARTS,
     Score,
-    Step,
     Trial,
     TrialState,
 )
+from realitygap.records._trial_record import TrialRecord
 from realitygap.settings import shown
 
 _TRIALS = """
@@ -143,17 +146,42 @@ class LedgerReader(ClosedOnExit):
         where, values = ("", ()) if number is None else ("WHERE trial = ? ", (number,))
         return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
 
-    def steps(self, number: int) -> list[Step]:
-        """What a trial's robot saw and was told, step by step; without the look after its last command."""
-        n_steps = self.trial(number).n_steps
-        steps = self._steps(number)
-        return steps if n_steps is None else steps[:n_steps]
+    def record(self, number: int) -> TrialRecord:
+        """Return a trial as it was driven and observed.
 
-    def last_look(self, number: int) -> Step | None:
-        """The robot's readings after the last command of a trial; None if it did not look."""
-        n_steps = self.trial(number).n_steps
-        steps = self._steps(number)
-        return steps[-1] if n_steps is not None and len(steps) > n_steps else None
+        It has poses if somebody saw the driven path, and a last look if the robot had one. `step_s` is the median of
+        the times between commands. A trial that was not driven has no commands.
+        """
+        trial, score = self.trial(number), self.counted_score(number)
+        rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
+        readings = [self._numbers(row["readings"]) for row in rows]
+        raw = [self._numbers(row["raw"]) for row in rows]
+        n = len(rows)
+        t = n if trial.n_steps is None else trial.n_steps
+        path = () if score is None or score.path is None else score.path
+        try:
+            times = np.array([row["time"] for row in rows], np.float64)
+            poses = np.array(path, np.float64).reshape(-1, 3)[::PATH_PARTS]
+            return TrialRecord(
+                start=tuple(poses[0].tolist()) if len(poses) else (0.0, 0.0, 0.0),
+                step_s=float(np.median(np.diff(times[:t]))) if t > 1 else 0.0,
+                commands=np.array([(row["move"], row["turn"]) for row in rows[:t]], np.float64).reshape(t, 2),
+                readings=np.array(readings[:t], np.float64).reshape(t, -1 if t else 0),
+                stalled=np.array([row["stalled"] for row in rows[:t]], np.bool_),
+                cells=trial.cells or (),
+                poses=poses,
+                number=number,
+                end=trial.end or "",
+                last_readings=np.array(readings[t:], np.float64).reshape(-1),
+                last_stalled=any(row["stalled"] for row in rows[t:]),
+                times=times,
+                raw=np.array(raw, np.float64).reshape(n, -1 if n else 0),
+                problem=trial.problem or "",
+            )
+        except (OverflowError, TypeError, ValueError) as error:
+            raise LedgerError(
+                f"{self.path} is damaged: trial {number} has steps of several forms ({error})."
+            ) from None
 
     def counted_score(self, number: int) -> Score | None:
         """The score of a trial that counts for selection, with the driven path if it is known."""
@@ -165,20 +193,6 @@ class LedgerReader(ClosedOnExit):
             return None
         values = self._decoded(row, "cells", "path")
         return Score(tuple(values["cells"]), values["who"], n_ends=values["n_ends"], path=values["path"])
-
-    def _steps(self, number: int) -> list[Step]:
-        rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
-        return [
-            Step(
-                row["time"],
-                self._numbers(row["raw"]),
-                self._numbers(row["readings"]),
-                bool(row["stalled"]),
-                row["move"],
-                row["turn"],
-            )
-            for row in rows
-        ]
 
     def scores(self) -> list[dict[str, Any]]:
         """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""

@@ -24,8 +24,8 @@ from realitygap.errors import RecordError
 
 from ._files import reading
 from ._inside import open_inside
-from ._observed import OBSERVATIONS, Observe, ObservedTrial
 from ._output import refuse_results, write_whole
+from ._trial_record import OBSERVATIONS, Observe, TrialRecord
 
 OBSERVATIONS_FORMAT = "realitygap observations 1"
 _WIDTHS = {"commands": 2, "wheels": 2, "poses": 3}
@@ -70,7 +70,7 @@ class Observations:
     """
 
     head: ObservationsHead
-    trials: tuple[ObservedTrial, ...]
+    trials: tuple[TrialRecord, ...]
     problem: str = ""
 
 
@@ -79,18 +79,21 @@ def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     return "target" if there.get("identity") and wanted.get("identity") else "identity"
 
 
-def trial_to_dict(trial: ObservedTrial) -> dict[str, Any]:
-    """A trial as plain values; what is not known of its battery is null."""
+def trial_to_dict(trial: TrialRecord) -> dict[str, Any]:
+    """A trial as plain values, without those that it lacks; an unknown voltage of the battery is null."""
     values = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in vars(trial).items()
     }
     if not len(trial.last_readings):
         del values["last_readings"], values["last_stalled"]
+    for name in ("times", "raw", "problem"):
+        if not values[name]:
+            del values[name]
     return {**values, "battery_v": None if math.isnan(trial.battery_v) else trial.battery_v}
 
 
-def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
+def trial_from_dict(values: Mapping[str, Any]) -> TrialRecord:
     """The trial that `trial_to_dict` described.
 
     Raises:
@@ -98,7 +101,7 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
     """
     try:
         battery_v, measured = values["battery_v"], values.get("end_pose")
-        trial = ObservedTrial(
+        trial = TrialRecord(
             start=_pose(values["start"]),
             step_s=float(values["step_s"]),
             commands=_table("commands", values),
@@ -115,6 +118,9 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
             end_pose=None if measured is None else _pose(measured),
             last_readings=np.array(values.get("last_readings", []), np.float64),
             last_stalled=bool(values.get("last_stalled", False)),
+            times=np.array(values.get("times", []), np.float64).reshape(-1),
+            raw=_table("raw", {"raw": values.get("raw", [])}),
+            problem=str(values.get("problem", "")),
         )
     except KeyError as error:
         raise ValueError(f"a trial without {error}") from None
@@ -127,10 +133,12 @@ def trial_from_dict(values: Mapping[str, Any]) -> ObservedTrial:
         for name, table in (("wheels", trial.wheels), ("poses", trial.poses))
         if len(table)
     }
+    looks = t + (len(trial.last_readings) > 0)
+    rows |= {name: n - looks + t for name in ("times", "raw") if (n := len(getattr(trial, name)))}
     for name, n in rows.items():
         if n != t:
             raise ValueError(f"a trial with {t} commands whose {name} are of {n}")
-    for name in ("start", "commands", "readings", "wheels", "poses"):
+    for name in ("start", "commands", "readings", "wheels", "poses", "times", "raw"):
         if not np.all(np.isfinite(getattr(trial, name))):
             raise ValueError(f"a trial whose {name} are not all numbers")
     return trial
@@ -173,7 +181,7 @@ class ObservationsFile(ClosedOnExit):
             self.path = self.path.resolve()
         self._within = self.path.parent if within is None else within
         self.head = head
-        self.trials: tuple[ObservedTrial, ...] = ()
+        self.trials: tuple[TrialRecord, ...] = ()
         self.problem = ""
         refuse_results(self.path)
         held = self._take_up()
@@ -211,7 +219,7 @@ class ObservationsFile(ClosedOnExit):
         self.trials, self.problem = found.trials, found.problem
         return held
 
-    def append(self, trial: ObservedTrial) -> None:
+    def append(self, trial: TrialRecord) -> None:
         """Keep a trial; it is on the disk when this returns.
 
         Raises:
@@ -239,7 +247,7 @@ class ObservationsFile(ClosedOnExit):
         self._file.close()
 
 
-def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[ObservedTrial]) -> None:
+def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[TrialRecord]) -> None:
     """Write trials into a file of their own, whole; one that is there is replaced.
 
     Raises:
@@ -275,7 +283,7 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
     """What a file holds, and how many of its bytes."""
     first, newline, rest = data.partition(b"\n")
     head = _head(path, first)
-    trials: list[ObservedTrial] = []
+    trials: list[TrialRecord] = []
     held = len(first) + len(newline)
     problem = ""
     lines = rest.split(b"\n")

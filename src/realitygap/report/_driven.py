@@ -99,5 +99,5 @@ def refuse_replay(condition: str) -> RecordError:
     """What to say where a trial of a robot would have to be computed again."""
     return RecordError(
         f"The trials of condition {condition!r} were driven by a robot, and no program drives them again. What it "
-        "saw and was told stands step by step in the ledger: realitygap.records.Ledger.open(...).steps(TRIAL)."
+        "saw and was told stands step by step in the ledger: realitygap.records.Ledger.open(...).record(TRIAL)."
     )

@@ -12,14 +12,21 @@ import polars as pl
 
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.playback import WIDTH, MovingTrial, RobotShape, WatchedRobot, in_motion, play, save_movie
-from realitygap.records import LEDGER_NAME, Ledger, RecordWarning, ResultsFolder, Step, refuse_results
+from realitygap.records import (
+    LEDGER_NAME,
+    PATH_PARTS,
+    Ledger,
+    RecordWarning,
+    ResultsFolder,
+    TrialRecord,
+    refuse_results,
+)
 from realitygap.report._driven import driven_paths, refuse_replay
 from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
 from realitygap.runs import replay
-from realitygap.trials import PATH_PARTS
 
 Each = Literal["individual", "generation", "condition"]
 """Of what several trials are shown: each individual of a generation, the best of each generation or condition."""
@@ -190,29 +197,29 @@ def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
     poses = driven_paths(tally.folder, name, replicate).get(which)
     if poses is None:
         raise refuse_replay(name)
-    steps = _steps_of(tally, name, replicate, which)
+    record = _record_of(tally, name, replicate, which)
     robot = trial.condition.on
     shape, arena = RobotShape.of(robot), trial.condition.arena.arena()
     n_rows = len(poses)
     rays = np.full((n_rows, len(shape.mounts)), np.nan)
     stalled = np.zeros(n_rows, np.bool_)
-    for k, step in enumerate(steps):
+    for k, (readings, is_stalled) in enumerate(zip(record.readings, record.stalled, strict=True)):
         rows = slice(PATH_PARTS * k, PATH_PARTS * (k + 1))
-        if len(step.readings) == len(shape.mounts):
-            rays[rows] = (1.0 - np.array(step.readings)) * shape.reach
-        stalled[rows] = step.stalled
-    times = [step.time for step in steps]
-    step_s = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else robot.command_s
+        if len(readings) == len(shape.mounts):
+            rays[rows] = (1.0 - readings) * shape.reach
+        stalled[rows] = is_stalled
+    times = record.times[: len(record.commands)]
+    step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else robot.command_s
     return MovingTrial.of_rows(
         title, trial.label, arena, shape, step_s, poses, rays, stalled, parts=PATH_PARTS
     )
 
 
-def _steps_of(tally: Tally, name: str, replicate: int, which: tuple[int, int]) -> list[Step]:
+def _record_of(tally: Tally, name: str, replicate: int, which: tuple[int, int]) -> TrialRecord:
     with Ledger.open(tally.folder.path / LEDGER_NAME, writable=False) as ledger:
         for trial in ledger.trials(name, replicate, states=["scored"]):
             if (trial.generation, trial.individual) == which:
-                return ledger.steps(trial.trial)
+                return ledger.record(trial.trial)
     raise RecordError(f"The ledger has no scored trial of generation {which[0]}, individual {which[1]}.")
 
 

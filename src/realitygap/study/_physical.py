@@ -14,7 +14,6 @@ from realitygap.runs import Condition, Evolution
 from realitygap.tasks import score_observed
 from realitygap.trials import (
     Card,
-    DrivenTrial,
     EndReason,
     Operator,
     TrialInterrupted,
@@ -24,7 +23,6 @@ from realitygap.trials import (
 )
 
 from ._blocks import Block, blocks_of, turns_of
-from ._ledger_trial import observed_of_ledger
 from ._study import Study
 from ._targets import SEEN_AS, WOULD_SEE
 
@@ -236,7 +234,7 @@ class PhysicalStudy:
         arena = condition.arena.arena()
         if condition.coverage is not None:
             return [len(set(each)) / arena.grid.n_cells for each in cells]
-        observed = [observed_of_ledger(self._ledger, number) for number in trials]
+        observed = [self._ledger.record(number) for number in trials]
         try:
             return [float(each) for each in score_observed(condition.task_of_trials, observed, arena)]
         except TaskError as error:
@@ -316,36 +314,31 @@ class PhysicalStudy:
                 sees_end=task.needs_trace,
             )
         except TrialInterrupted as error:
-            self._interrupt(trial, error.driven)
+            self._ledger.interrupt(trial.trial, error.trial)
             raise
         self.n_driven += 1
-        if driven.end is EndReason.STEP_LIMIT:
+        if driven.end == EndReason.STEP_LIMIT:
             try:
                 score = self._operator.drawn(card, driven)
             except BaseException:
-                self._interrupt(trial, replace(driven, problem="it was driven, and nobody said what it drew"))
+                problem = "it was driven, and nobody said what it drew"
+                self._ledger.interrupt(trial.trial, replace(driven, problem=problem))
                 raise
             if score is None and not sees(task.observe, "cells"):
                 score = Score((), ROBOT)
             if sees(task.observe, "track") and (score is None or score.path is None):
-                self._interrupt(trial, replace(driven, problem="it was driven, and nobody saw where"))
+                problem = "it was driven, and nobody saw where"
+                self._ledger.interrupt(trial.trial, replace(driven, problem=problem))
                 return
-            self._ledger.finish(
-                trial.trial, driven.end, driven.steps, stalls=driven.stalls, score=score, last=driven.last
-            )
+            self._ledger.finish(trial.trial, driven, score)
             return
-        self._interrupt(trial, driven)
-        if driven.end is EndReason.LOST:
+        self._ledger.interrupt(trial.trial, driven)
+        if driven.end == EndReason.LOST:
             raise RobotError(
-                f"Trial {trial.trial}, step {len(driven.steps)} of {condition.on.steps}: {driven.problem} "
+                f"Trial {trial.trial}, step {len(driven.commands)} of {condition.on.steps}: {driven.problem} "
                 "Nothing that was scored is lost. Put the robot right, then run the same command again: it asks what "
                 "becomes of this trial."
             )
-
-    def _interrupt(self, trial: Trial, driven: DrivenTrial) -> None:
-        self._ledger.interrupt(
-            trial.trial, driven.end, driven.steps, stalls=driven.stalls, problem=driven.problem
-        )
 
     def _condition(self, trial: Trial) -> Condition:
         return next(condition for condition in self._conditions if condition.name == trial.condition)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from realitygap.calibration import distance_of, end_pose_of
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, RobotModel
 
@@ -52,7 +52,7 @@ def parse_length(text: str) -> float | None:
     return -value if sign else value
 
 
-def with_ruled_end(trial: ObservedTrial, ahead_in: float, left_in: float, turned_deg: float) -> ObservedTrial:
+def with_ruled_end(trial: TrialRecord, ahead_in: float, left_in: float, turned_deg: float) -> TrialRecord:
     """A path whose end somebody has measured from its start: inches ahead and to the left, degrees to the left."""
     end = end_pose_of(trial, ahead_in * INCH, left_in * INCH, math.radians(turned_deg))
     return replace(trial, end_pose=end)

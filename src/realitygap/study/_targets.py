@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from realitygap.errors import RobotError, StudyError
 from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, ObservedTrial, sees
+from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, TrialRecord, sees
 from realitygap.tasks import Task
 from realitygap.trials import Target, TellTrial, TrialPlan, is_taken_back, is_whole
 from realitygap.world import Arena
@@ -106,12 +106,12 @@ def carry_out_missing(
     target: Target,
     plans: Sequence[TrialPlan],
     observe: Observe,
-    kept: dict[Key, ObservedTrial],
+    kept: dict[Key, TrialRecord],
     keys: Sequence[Key],
     *,
     file: ObservationsFile | None = None,
     tell: TellTrial | None = None,
-) -> list[ObservedTrial]:
+) -> list[TrialRecord]:
     """Return the trials in the order of their plans: those that are kept, and the others, which are run now.
 
     Args:
@@ -128,7 +128,7 @@ def carry_out_missing(
     """
     missing = [k for k, key in enumerate(keys) if key not in kept]
 
-    def keep(k: int, trial: ObservedTrial) -> None:
+    def keep(k: int, trial: TrialRecord) -> None:
         if file is not None:
             file.append(trial)
         if is_whole(trial):

@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 from realitygap.errors import StudyError
 from realitygap.records import (
     LEDGER_NAME,
+    PATH_PARTS,
     Ledger,
     ObservationsFile,
     ObservationsHead,
-    ObservedTrial,
     ResultsFolder,
     Score,
     ScoreRole,
-    Step,
+    TrialRecord,
     read_observations,
 )
 from realitygap.runs import Condition, genome_of
-from realitygap.trials import PATH_PARTS
 from realitygap.vision import Beginning, Track, Tracked, find_beginning
 from realitygap.world import Arena, Grid
 
@@ -43,7 +42,7 @@ class TrialToTrack:
     """
 
     head: ObservationsHead
-    trial: ObservedTrial
+    trial: TrialRecord
     times: Floats
     arena: Arena
 
@@ -59,7 +58,7 @@ class TrackedTrial:
         seen: Share of the pictures in it in which the robot was found.
     """
 
-    trial: ObservedTrial
+    trial: TrialRecord
     score: Score
     beginning: Beginning
     seen: float
@@ -73,11 +72,11 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
         RecordError: There is no such study or trial.
     """
     with Ledger.open(Path(folder) / LEDGER_NAME, writable=False) as ledger:
-        trial, steps = ledger.trial(number), ledger.steps(number)
+        trial, record = ledger.trial(number), ledger.record(number)
         individuals = ledger.individuals(trial.condition, trial.replicate, trial.generation)
         sittings = ledger.sittings()
         label = ledger.conditions()[trial.condition]["label"]
-    if trial.state not in ("driven", "scored") or not steps:
+    if trial.state not in ("driven", "scored") or not len(record.commands):
         raise StudyError(
             f"Trial {number} of {folder} is {trial.state}, expected one that was driven. See: realitygap trials list "
             f"{folder}"
@@ -89,18 +88,15 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
     )
     condition = Condition.from_settings(trial.condition, described["settings"])
     arena = condition.arena.arena()
-    times = _times(steps)
-    observed = ObservedTrial(
+    t = len(record.commands)
+    times = _times(record.times[:t])
+    observed = replace(
+        record,
         start=(arena.start.x, arena.start.y, arena.start.heading),
         step_s=float(np.median(np.diff(times))),
-        commands=np.array([(step.move, step.turn) for step in steps], np.float64),
-        readings=np.minimum(
-            np.array([step.raw for step in steps], np.float64) / condition.on.full_scale, 1.0
-        ),
-        stalled=np.array([step.stalled for step in steps], np.bool_),
-        cells=trial.cells or (),
+        readings=np.minimum(record.raw[:t] / condition.on.full_scale, 1.0),
+        poses=np.empty((0, 3)),
         genome=genome_of(condition, individuals[trial.individual]).to_json(),
-        number=number,
         end=trial.end or "step limit",
     )
     platform = condition.on.at_port(sittings[-1]["port"]) if sittings else condition.on
@@ -110,9 +106,8 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
     return TrialToTrack(head, observed, times, arena)
 
 
-def _times(steps: list[Step]) -> Floats:
+def _times(began: Floats) -> Floats:
     """When each command began and the last ended, since the first [s]."""
-    began = np.array([step.time for step in steps], np.float64)
     usual = float(np.median(np.diff(began))) if len(began) > 1 else 0.5
     times: Floats = np.append(began, began[-1] + usual) - began[0]
     return times

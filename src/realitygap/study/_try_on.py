@@ -6,7 +6,7 @@ from pathlib import Path
 
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
-from realitygap.records import ObservationsFile, Observe, ObservedTrial
+from realitygap.records import ObservationsFile, Observe, TrialRecord
 from realitygap.trials import Target, TrialPlan, is_whole
 
 from ._targets import carry_out_missing, observations_head, refuse_more_than_is_seen
@@ -20,7 +20,7 @@ def try_on(
     steps: int = 100,
     observe: Observe = "cells",
     out: str | Path | None = None,
-) -> list[ObservedTrial]:
+) -> list[TrialRecord]:
     """Drive a controller on a target.
 
     Args:

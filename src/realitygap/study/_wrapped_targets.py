@@ -10,12 +10,12 @@ import numpy as np
 from realitygap._closing import ClosedOnExit
 from realitygap.calibration import ruled
 from realitygap.errors import StudyError
-from realitygap.records import ObservationsFile, Observe, ObservedTrial
+from realitygap.records import ObservationsFile, Observe, TrialRecord
 from realitygap.trials import Operator, Target, TrialPlan, is_taken_back, is_whole, taken_back
 
 from ._targets import carry_out_missing
 
-Tell = Callable[[int, ObservedTrial], None]
+Tell = Callable[[int, TrialRecord], None]
 
 PATH = "path"
 """Purpose of trials whose end is measured with a ruler where no camera looks."""
@@ -37,7 +37,7 @@ class WrappedTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
         return self.target.carry_out(plans, observe, tell)
 
@@ -61,10 +61,10 @@ class CountingTarget(WrappedTarget):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
 
-        def one_more(k: int, trial: ObservedTrial) -> None:
+        def one_more(k: int, trial: TrialRecord) -> None:
             self._done += 1
             if self._count is not None:
                 self._count(min(self._done, self._n), self._n)
@@ -79,7 +79,7 @@ class RuledTarget(WrappedTarget):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
         if observe == "track" or not any(plan.purpose == PATH for plan in plans):
             return self.target.carry_out(plans, observe, tell)
@@ -89,7 +89,7 @@ class RuledTarget(WrappedTarget):
                 "HOST:PORT), or be led through at a terminal."
             )
 
-        def with_ruler(trial: ObservedTrial) -> ObservedTrial:
+        def with_ruler(trial: TrialRecord) -> TrialRecord:
             trial = ruled(trial)
             return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
 
@@ -112,13 +112,13 @@ class OperatedTarget(WrappedTarget):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`; a trial that is taken back is told of as such, and again when it was driven anew.
 
         Raises:
             StoppedByPerson: What was told of is all that was recorded.
         """
-        trials: dict[int, ObservedTrial] = {}
+        trials: dict[int, TrialRecord] = {}
         k = 0
         while k < len(plans):
             answer = self._operator.lead(plans[k], k, len(plans))
@@ -149,7 +149,7 @@ class ResumableTarget(WrappedTarget):
     def __init__(self, target: Target, file: ObservationsFile) -> None:
         super().__init__(target)
         self._file = file
-        self.trials: dict[tuple[object, ...], ObservedTrial] = {}
+        self.trials: dict[tuple[object, ...], TrialRecord] = {}
         for trial in file.trials:
             if is_whole(trial):
                 self.trials[_what(trial)] = trial
@@ -158,7 +158,7 @@ class ResumableTarget(WrappedTarget):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`."""
         wanted = [_what_of(plan, self.arena.start) for plan in plans]
         if tell is not None:
@@ -168,7 +168,7 @@ class ResumableTarget(WrappedTarget):
         return carry_out_missing(self.target, plans, observe, self.trials, wanted, file=self._file, tell=tell)
 
 
-def _what(trial: ObservedTrial) -> tuple[object, ...]:
+def _what(trial: TrialRecord) -> tuple[object, ...]:
     """What makes a trial the one of a plan."""
     start = tuple(round(value, 6) for value in trial.start)
     driven = trial.genome or trial.commands.tobytes()

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import TaskError
-from realitygap.records import ObservedTrial, sees
+from realitygap.records import TrialRecord, sees
 from realitygap.world import Arena
 
 from ._task import Task
 from ._trajectories import TraceArrays, Trajectories
 
 
-def score_observed(task: Task, trials: Sequence[ObservedTrial], arena: Arena) -> NDArray[np.float64]:
+def score_observed(task: Task, trials: Sequence[TrialRecord], arena: Arena) -> NDArray[np.float64]:
     """Return what observed trials are worth to a task.
 
     Args:
@@ -48,7 +48,7 @@ def score_observed(task: Task, trials: Sequence[ObservedTrial], arena: Arena) ->
     return np.asarray(task.fitness(observed_trajectories(trials, arena), arena), np.float64)
 
 
-def _refuse(trials: Sequence[ObservedTrial], task: Task, what: str, lacks: Sequence[bool]) -> None:
+def _refuse(trials: Sequence[TrialRecord], task: Task, what: str, lacks: Sequence[bool]) -> None:
     if any(lacks):
         number = trials[lacks.index(True)].number
         raise TaskError(
@@ -57,7 +57,7 @@ def _refuse(trials: Sequence[ObservedTrial], task: Task, what: str, lacks: Seque
         )
 
 
-def observed_trajectories(trials: Sequence[ObservedTrial], arena: Arena) -> Trajectories:
+def observed_trajectories(trials: Sequence[TrialRecord], arena: Arena) -> Trajectories:
     """Stack observed trials. Readings are those that the controllers saw, with all noise.
 
     Args:

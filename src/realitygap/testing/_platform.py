@@ -9,7 +9,7 @@ import numpy as np
 from realitygap.errors import RealityGapError
 from realitygap.evolution import ControllerInterface, Genome, NeatSettings, Population, decode_all, listed
 from realitygap.platforms import Opening, Platform
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.robots import channels_of
 from realitygap.trials import NoiseKey, Target, TrialPlan, counters_of
 from realitygap.world import Arena, paper_arena
@@ -176,7 +176,7 @@ class _Check:
         return [] if shape == (2, 3) else [f"Two robots have inputs of shape {shape}, expected (2, 3)."]
 
 
-def _sizes(target: Target, trials: list[ObservedTrial]) -> list[str]:
+def _sizes(target: Target, trials: list[TrialRecord]) -> list[str]:
     found = []
     for trial in trials:
         if trial.readings.shape != (STEPS, target.n_sensors):
@@ -186,5 +186,5 @@ def _sizes(target: Target, trials: list[ObservedTrial]) -> list[str]:
     return found[:1]
 
 
-def _same(first: ObservedTrial, second: ObservedTrial) -> bool:
+def _same(first: TrialRecord, second: TrialRecord) -> bool:
     return bool(np.array_equal(first.poses, second.poses) and np.array_equal(first.readings, second.readings))

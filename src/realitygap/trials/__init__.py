@@ -17,12 +17,11 @@ from ._batch import (
     paper_inputs,
     poses_of,
 )
-from ._carry_out import TrialStopped, carry_out_on_robot
+from ._carry_out import carry_out_on_robot
 from ._draws import Draws
 from ._ending import EndReason, is_taken_back, is_whole, taken_back, those_that_count
 from ._loop import (
     Controller,
-    DrivenTrial,
     TrialInterrupted,
     controller_of,
     drive_trial,
@@ -37,16 +36,14 @@ from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sheet_observer import SheetObserver
 from ._target import Target, TellTrial, TrialPlan, check_plans
 from ._target_robot import OnLost, PacedRobot, RobotTarget
-from ._witness_observer import PATH_PARTS, WitnessObserver, own_witness
+from ._witness_observer import WitnessObserver, own_witness
 
 __all__ = [
     "MOST_TEAMS",
-    "PATH_PARTS",
     "REAL",
     "Card",
     "Controller",
     "Draws",
-    "DrivenTrial",
     "EndReason",
     "Led",
     "NoiseKey",
@@ -67,7 +64,6 @@ __all__ = [
     "TrialBatch",
     "TrialInterrupted",
     "TrialPlan",
-    "TrialStopped",
     "Tried",
     "Verdict",
     "WitnessObserver",

@@ -7,26 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from realitygap.errors import RobotError
-from realitygap.records import Observe, ObservedTrial, sees
+from realitygap.records import Observe, TrialRecord, sees
 from realitygap.robots import Command, Robot, check_command
 from realitygap.world import Pose
 
 from ._ending import EndReason
-from ._loop import Controller, DrivenTrial, TrialInterrupted, controller_of, replaying, run_trial
+from ._loop import Controller, TrialInterrupted, controller_of, replaying, run_trial
 from ._observer import Observer
 from ._target import TrialPlan
-
-
-class TrialStopped(KeyboardInterrupt):
-    """The program is being stopped in the middle of a trial; the motors are stopped as far as the wire allows.
-
-    Attributes:
-        trial: What was seen of it up to there.
-    """
-
-    def __init__(self, trial: ObservedTrial) -> None:
-        super().__init__("the program was stopped in the middle of a trial")
-        self.trial = trial
 
 
 @dataclass
@@ -54,7 +42,7 @@ class _Looks:
 
 def carry_out_on_robot(
     robot: Robot, plan: TrialPlan, observe: Observe, observer: Observer, start: Pose
-) -> tuple[ObservedTrial, str]:
+) -> TrialRecord:
     """Carry out one trial on a robot, and keep what is to be observed and nothing more.
 
     A controller sees and answers what its interface names. The motors are stopped on every way out.
@@ -67,12 +55,11 @@ def carry_out_on_robot(
         start: Where the robot is put.
 
     Returns:
-        The trial, and what went wrong with it. A robot that fails, or an observer, ends it as LOST: then it has what
-        was seen whole.
+        The trial. A robot that fails, or an observer, ends it as LOST: then it has what was seen whole.
 
     Raises:
         ValueError: Commands that no robot takes.
-        TrialStopped: In place of a KeyboardInterrupt or SystemExit, which is its cause.
+        TrialInterrupted: In place of a KeyboardInterrupt or SystemExit, which is its cause.
 
     Source: Rosenzweig & Remy, sections 2.1 to 2.3.
     """
@@ -90,14 +77,15 @@ def carry_out_on_robot(
             channels=() if plan.genome is None else plan.genome.interface.channels,
         )
     except TrialInterrupted as error:
-        raise TrialStopped(_kept(plan, start, robot, error.driven, looks)) from error
-    trial = _kept(plan, start, robot, driven, looks)
+        error.trial = _kept(plan, robot, error.trial, looks)
+        raise
+    trial = _kept(plan, robot, driven, looks)
     try:
-        return _with_what_is_seen(trial, observe, observer), driven.problem
+        return _with_what_is_seen(trial, observe, observer)
     except RobotError as error:
-        return replace(trial, end=str(EndReason.LOST)), driven.problem or str(error)
+        return replace(trial, end=str(EndReason.LOST), problem=trial.problem or str(error))
     except (KeyboardInterrupt, SystemExit) as error:  # while somebody is asked for cells
-        raise TrialStopped(replace(trial, end=str(EndReason.INTERRUPTED))) from error
+        raise TrialInterrupted(replace(trial, end=str(EndReason.INTERRUPTED))) from error
 
 
 def _controller(plan: TrialPlan) -> tuple[Controller, int]:
@@ -108,29 +96,27 @@ def _controller(plan: TrialPlan) -> tuple[Controller, int]:
     return controller_of(plan.genome.network(), plan.genome.interface, plan.steps), plan.steps
 
 
-def _kept(plan: TrialPlan, start: Pose, robot: Robot, driven: DrivenTrial, looks: _Looks) -> ObservedTrial:
+def _kept(plan: TrialPlan, robot: Robot, driven: TrialRecord, looks: _Looks) -> TrialRecord:
     """Return a trial as far as the robot itself reported it: only commands whose end was seen, too."""
-    steps = driven.steps[: max(looks.n - 1, 0)]
-    t = len(steps)
-    return ObservedTrial(
-        start=(start.x, start.y, start.heading),
-        step_s=robot.step_s,
-        commands=np.array([(step.move, step.turn) for step in steps], np.float64).reshape(t, 2),
-        readings=np.array([step.readings for step in steps]).reshape(t, robot.n_sensors),
-        stalled=np.array([step.stalled for step in steps], np.bool_),
-        cells=(),
+    t = min(len(driven.commands), max(looks.n - 1, 0))
+    n = t + len(driven.times) - len(driven.commands)
+    is_simulated = robot.label in ("SIM", "TWIN")
+    return replace(
+        driven,
+        commands=driven.commands[:t],
+        readings=driven.readings[:t],
+        stalled=driven.stalled[:t],
         wheels=np.array(looks.wheels[: t + 1], np.float64).reshape(-1, 2),
         genome="" if plan.genome is None else plan.genome.to_json(),
         number=plan.number,
         purpose=plan.purpose,
         battery_v=looks.battery_v,
-        end=str(driven.end),
-        last_readings=np.array([] if driven.last is None else driven.last.readings, np.float64),
-        last_stalled=driven.last is not None and driven.last.stalled,
+        times=np.empty(0) if is_simulated else driven.times[:n],
+        raw=np.empty((0, 0)) if is_simulated else driven.raw[:n],
     )
 
 
-def _with_what_is_seen(trial: ObservedTrial, observe: Observe, observer: Observer) -> ObservedTrial:
+def _with_what_is_seen(trial: TrialRecord, observe: Observe, observer: Observer) -> TrialRecord:
     """A trial with what the observer saw of it."""
     poses = observer.poses()[: len(trial.commands) + 1] if observe == "track" else np.empty((0, 3))
     cells = observer.cells() if sees(observe, "cells") else ()

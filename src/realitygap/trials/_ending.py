@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from enum import StrEnum
 
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 
 
 class EndReason(StrEnum):
@@ -22,27 +22,27 @@ class EndReason(StrEnum):
     """The program was stopped."""
 
 
-def is_whole(trial: ObservedTrial) -> bool:
+def is_whole(trial: TrialRecord) -> bool:
     """Return whether a trial came to its own end, and was not cut off."""
     return trial.end == EndReason.STEP_LIMIT
 
 
-def taken_back(trial: ObservedTrial) -> ObservedTrial:
+def taken_back(trial: TrialRecord) -> TrialRecord:
     """Return a trial as one that the operator does not let count."""
     return replace(trial, end=str(EndReason.ABORTED))
 
 
-def is_taken_back(trial: ObservedTrial) -> bool:
+def is_taken_back(trial: TrialRecord) -> bool:
     """Return whether a trial is the record that the one before it, of the same plan, does not count."""
     return trial.end == EndReason.ABORTED
 
 
-def those_that_count(trials: Iterable[ObservedTrial]) -> list[ObservedTrial]:
+def those_that_count(trials: Iterable[TrialRecord]) -> list[TrialRecord]:
     """Return the trials that came to their own end and were not taken back.
 
     If trials of one plan were driven again, only the last of them is returned.
     """
-    last: dict[object, ObservedTrial] = {}
+    last: dict[object, TrialRecord] = {}
     for trial in trials:
         what = (trial.purpose, trial.number, trial.start, trial.genome)
         if is_whole(trial):

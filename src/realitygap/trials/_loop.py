@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+
+import numpy as np
 
 from realitygap.errors import RobotError, RobotStopped
 from realitygap.evolution import ControllerInterface, Network, inputs_of_robot, listed, paper_interface
-from realitygap.records import Step
+from realitygap.records import TrialRecord
 from realitygap.robots import Clock, Command, Observation, Robot, SystemClock, channels_of, select_channels
 from realitygap.world import Pose
 
@@ -24,39 +25,16 @@ Watch = Callable[[int, Observation, Command], bool]
 """Called with the step's number, the observation, and the command before that is sent; True aborts the trial."""
 
 
-@dataclass(frozen=True)
-class DrivenTrial:
-    """The steps of a trial.
-
-    Attributes:
-        end: Why it ended.
-        steps: One for each command; fewer than asked for unless `end` is STEP_LIMIT.
-        problem: Message about the end; empty after the last step.
-        last: What was observed after the last command, with a command of 0, 0; None if it was not asked for, or not
-            reached.
-    """
-
-    end: EndReason
-    steps: tuple[Step, ...]
-    problem: str = ""
-    last: Step | None = None
-
-    @property
-    def stalls(self) -> int:
-        """Number of steps that began with the robot blocked."""
-        return sum(step.stalled for step in self.steps)
-
-
 class TrialInterrupted(KeyboardInterrupt):
     """The program is being stopped in the middle of a trial; the motors are stopped as far as the wire allows.
 
     Attributes:
-        driven: The trial up to there.
+        trial: The trial up to there.
     """
 
-    def __init__(self, driven: DrivenTrial) -> None:
+    def __init__(self, trial: TrialRecord) -> None:
         super().__init__("the program was stopped in the middle of a trial")
-        self.driven = driven
+        self.trial = trial
 
 
 def run_trial(
@@ -71,7 +49,7 @@ def run_trial(
     clock: Clock | None = None,
     sees_end: bool = False,
     channels: Sequence[str] = (),
-) -> DrivenTrial:
+) -> TrialRecord:
     """Run one trial on a robot. The motors are stopped on every way out.
 
     Args:
@@ -96,7 +74,29 @@ def run_trial(
     Source: Rosenzweig & Remy, sections 2.1 to 2.3.
     """
     clock = clock or getattr(robot, "clock", None) or SystemClock()
-    steps: list[Step] = []
+    looks: list[tuple[float, Observation]] = []
+    commands: list[Command] = []
+
+    def record(end: EndReason, problem: str = "") -> TrialRecord:
+        t = len(commands)
+        n = len(looks) if end is EndReason.STEP_LIMIT else t
+        seen = [observation for _, observation in looks[:n]]
+        readings = np.array([each.readings for each in seen], np.float64).reshape(n, robot.n_sensors)
+        stalled = np.array([each.stalled for each in seen], np.bool_)
+        return TrialRecord(
+            start=start or (0.0, 0.0, 0.0),
+            step_s=robot.step_s,
+            commands=np.array(commands, np.float64).reshape(t, 2),
+            readings=readings[:t],
+            stalled=stalled[:t],
+            end=str(end),
+            last_readings=readings[t:].reshape(-1),
+            last_stalled=bool(stalled[t:].any()),
+            times=np.array([time for time, _ in looks[:n]], np.float64),
+            raw=np.array([each.raw for each in seen], np.float64).reshape(n, -1 if n else 0),
+            problem=problem,
+        )
+
     try:
         select_channels(robot, channels)
         robot.reset(start)
@@ -110,25 +110,23 @@ def run_trial(
                 look(number)
             command = controller(seen, number)
             if watch is not None and watch(number, seen, command):
-                problem = f"aborted by the operator before step {number + 1}"
-                return DrivenTrial(EndReason.ABORTED, tuple(steps), problem)
-            steps.append(Step(time, seen.raw, seen.readings, seen.stalled, *command))
+                return record(EndReason.ABORTED, f"aborted by the operator before step {number + 1}")
+            looks.append((time, seen))
+            commands.append(command)
             robot.drive(command)
         robot.stop()
-        last = None
         if sees_end:
             seen = robot.observe()
-            last = Step(clock.now() - began, seen.raw, seen.readings, seen.stalled, 0.0, 0.0)
+            looks.append((clock.now() - began, seen))
         if look is not None:
             look(n_steps)
-        return DrivenTrial(EndReason.STEP_LIMIT, tuple(steps), last=last)
+        return record(EndReason.STEP_LIMIT)
     except RobotStopped as error:
-        return DrivenTrial(EndReason.ABORTED, tuple(steps), str(error))
+        return record(EndReason.ABORTED, str(error))
     except RobotError as error:
-        return DrivenTrial(EndReason.LOST, tuple(steps), str(error))
+        return record(EndReason.LOST, str(error))
     except (KeyboardInterrupt, SystemExit) as error:
-        driven = DrivenTrial(EndReason.INTERRUPTED, tuple(steps), "the program was stopped")
-        raise TrialInterrupted(driven) from error
+        raise TrialInterrupted(record(EndReason.INTERRUPTED, "the program was stopped")) from error
     finally:
         with contextlib.suppress(RobotError):
             robot.stop()
@@ -142,7 +140,7 @@ def drive_trial(
     interface: ControllerInterface | None = None,
     watch: Watch | None = None,
     sees_end: bool = False,
-) -> DrivenTrial:
+) -> TrialRecord:
     """Run one trial of a network on a robot that stands at its start.
 
     The network sees what its interface names. A constant input is part of the network.

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from realitygap.records import Observe, ObservedTrial, Score, Trial
+from realitygap.records import Observe, Score, Trial, TrialRecord
 from realitygap.robots import Command, Observation, Robot
 from realitygap.world import Arena
 
-from ._loop import DrivenTrial
 from ._observer import PortObserver
 from ._preflight import Preflight
 from ._target import TrialPlan
@@ -111,7 +110,7 @@ class Operator:
             self.observer.look()
         return False
 
-    def drawn(self, card: Card, driven: DrivenTrial) -> Score | None:
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """The score of a trial, if that is known as soon as the robot stands; else None, and `enter` will ask."""
         if self.observer is None:
             return None
@@ -133,7 +132,7 @@ class Operator:
         """Put the robot at the start of plan `number` of n: go on, take the trial before back, or stop for today."""
         return "go"
 
-    def measure(self, plan: TrialPlan, trial: ObservedTrial) -> ObservedTrial | None:
+    def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """The trial with what a person measured of it; None has it driven again."""
         return trial
 

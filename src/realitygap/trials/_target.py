@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
-from realitygap.records import OBSERVATIONS, Observe, ObservedTrial, sees
+from realitygap.records import OBSERVATIONS, Observe, TrialRecord, sees
 from realitygap.robots import Label
 from realitygap.world import Arena, Pose
 
@@ -40,7 +40,7 @@ class TrialPlan:
     sees_end: bool = False
 
 
-TellTrial = Callable[[int, ObservedTrial], None]
+TellTrial = Callable[[int, TrialRecord], None]
 """Called after each trial with the index of its plan."""
 
 
@@ -80,7 +80,7 @@ class Target(Protocol):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """Carry out trials; what is seen of plan k is entry k.
 
         Args:

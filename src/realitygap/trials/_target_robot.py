@@ -13,12 +13,13 @@ import numpy as np
 from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import inputs_of_robot
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 from realitygap.robots import Clock, Command, Label, Observation, Robot, channels_of, select_channels
 from realitygap.world import Arena, Pose
 
-from ._carry_out import TrialStopped, carry_out_on_robot
+from ._carry_out import carry_out_on_robot
 from ._ending import EndReason
+from ._loop import TrialInterrupted
 from ._observer import PortObserver
 from ._target import TellTrial, TrialPlan, check_plans
 
@@ -155,7 +156,7 @@ class RobotTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
         check_plans(plans, observe, self)
         trials = []
@@ -169,12 +170,12 @@ class RobotTarget(ClosedOnExit):
         return trials
 
     def _carry_out(
-        self, plan: TrialPlan, observe: Observe, tell: Callable[[ObservedTrial], None] | None
-    ) -> ObservedTrial:
+        self, plan: TrialPlan, observe: Observe, tell: Callable[[TrialRecord], None] | None
+    ) -> TrialRecord:
         """One trial; one that is lost again where that is wanted."""
         attempts = 2 if self._on_lost == "retry" else 1
         for _ in range(attempts):
-            trial, problem = self._try(plan, observe, tell)
+            trial = self._try(plan, observe, tell)
             if tell is not None:
                 tell(trial)
             if trial.end != EndReason.LOST:
@@ -184,22 +185,22 @@ class RobotTarget(ClosedOnExit):
             return trial
         again = "twice " if attempts > 1 else ""
         raise RobotError(
-            f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: {problem} "
+            f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: {trial.problem} "
             "Trials that were kept in a file are safe. Put the robot right, then go on with the rest."
         )
 
     def _try(
-        self, plan: TrialPlan, observe: Observe, tell: Callable[[ObservedTrial], None] | None
-    ) -> tuple[ObservedTrial, str]:
+        self, plan: TrialPlan, observe: Observe, tell: Callable[[TrialRecord], None] | None
+    ) -> TrialRecord:
         robot, start = self._ready(), plan.start or self.arena.start
         self._observer.place(plan, self.arena, observe)
         try:
-            trial, problem = carry_out_on_robot(robot, plan, observe, self._observer, start)
-        except TrialStopped as stopped:
+            trial = carry_out_on_robot(robot, plan, observe, self._observer, start)
+        except TrialInterrupted as stopped:
             if tell is not None:
                 tell(stopped.trial)
             raise
-        return replace(trial, step_s=robot.lasted_s), problem
+        return replace(trial, step_s=robot.lasted_s)
 
     def close(self) -> None:
         """Stop the motors and let go of the robot; safe to call twice."""

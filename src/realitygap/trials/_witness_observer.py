@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.records import Observe, Score
+from realitygap.records import PATH_PARTS, Observe, Score
 from realitygap.robots import Clock, Robot
 from realitygap.world import Arena, Pose, paper_arena
 
@@ -19,8 +19,6 @@ from ._target import TrialPlan
 if TYPE_CHECKING:
     from realitygap.emulator import Witness
 
-PATH_PARTS = 4
-"""In how many parts of a step the driven path is kept, so that arcs look like arcs."""
 PREFLIGHT_POSE = Pose(0.5334, 0.3048, 0.0)
 """The middle of the paper's arena, where the robot can turn on the spot [m, rad]."""
 SHOWN_S = 0.05

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from realitygap.calibration._rays import rays_of
-from realitygap.records import ObservedTrial
+from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, Pose, RobotModel
 
@@ -102,7 +102,7 @@ def distance_of(plan: TrialPlan, arena: Arena, robot: RobotModel) -> float:
     return right - start.x - max(sensor.x for sensor in robot.range)
 
 
-def placements_of(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> list[list[Placement]]:
+def placements_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> list[list[Placement]]:
     """(s,) the placements of each range sensor, of all trials in which the robot stood."""
     placements: list[list[Placement]] = [[] for _ in robot.range]
     for trial in trials:

@@ -18,7 +18,7 @@ from realitygap.records import (
     OBSERVATIONS,
     Observations,
     Observe,
-    ObservedTrial,
+    TrialRecord,
     is_observations,
     read_observations,
     sees,
@@ -81,7 +81,7 @@ class RecordedTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`; where the robot stood, how long it drove and the number are as they were recorded.
 
         Raises:
@@ -118,13 +118,13 @@ def _imported(path: str | Path) -> Observations:
     log_map, _ = mapping_of(path)
     name, robot = robot_of(log_map)
     logs = list(read_logs(path, log_map, robot))
-    trials: list[ObservedTrial] = []
+    trials: list[TrialRecord] = []
     for log in logs:
         trials += trials_of(log, log_map, len(trials))
     return Observations(head_of(path, log_map, name, logs[0]), tuple(trials))
 
 
-def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
     """A trial with no more than is to be observed."""
     if observe != "track":
         trial = replace(trial, poses=np.empty((0, 3)))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import inputs_of_robot
-from realitygap.records import Observe, ObservedTrial, trial_from_dict
+from realitygap.records import Observe, TrialRecord, trial_from_dict
 from realitygap.robots import Label
 from realitygap.trials import TellTrial, TrialPlan, check_plans
 from realitygap.world import Arena
@@ -62,16 +62,16 @@ class TwinTarget(ClosedOnExit):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`; on Ctrl-C its processes end."""
         check_plans(plans, observe, self)
         requests = [{"do": "carry_out", "plan": plan_to_dict(plan), "observe": observe} for plan in plans]
-        trials: list[ObservedTrial] = []
+        trials: list[TrialRecord] = []
         try:
             for answer in self._pool.ask_all(requests):
-                trial = trial_from_dict(answer["trial"])
-                if answer["problem"]:
-                    raise RobotError(f"Trial {trial.number} on {self.name}: {answer['problem']}")
+                trial = trial_from_dict(answer)
+                if trial.problem:
+                    raise RobotError(f"Trial {trial.number} on {self.name}: {trial.problem}")
                 trials.append(trial)
                 if tell is not None:
                     tell(len(trials) - 1, trial)

@@ -61,14 +61,14 @@ class _Twin:
         made = plan_from_dict(plan)
         self._robot.number = made.number
         start = made.start or self._arena.start
-        trial, problem = carry_out_on_robot(
+        trial = carry_out_on_robot(
             self._robot,
             made,
             observe,  # type: ignore[arg-type]  # checked by who asks
             RobotObserver(self._robot),
             start,
         )
-        return {"trial": trial_to_dict(trial), "problem": problem}
+        return trial_to_dict(trial)
 
     def evolve(
         self,

@@ -33,7 +33,7 @@ from realitygap.calibration import (
     step_of,
 )
 from realitygap.platforms import SimEnsemble, SimPlatform, SimRobot
-from realitygap.records import CALIBRATES, Observe, ObservedTrial
+from realitygap.records import CALIBRATES, Observe, TrialRecord
 from realitygap.robots import Command
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
@@ -54,7 +54,7 @@ class Kind:
     """
 
     plans: Callable[[Arena, RobotModel, int | None], Sequence[TrialPlan]]
-    fit: Callable[[Sequence[ObservedTrial], RobotModel, Arena, Observe, int], Parts]
+    fit: Callable[[Sequence[TrialRecord], RobotModel, Arena, Observe, int], Parts]
     least: int = 1
     observes: tuple[Observe, ...] = CALIBRATES
 
@@ -107,9 +107,9 @@ def _path_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence
 
 
 def _fit_path(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+    trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
-    def simulate(trial: ObservedTrial) -> Moved:
+    def simulate(trial: TrialRecord) -> Moved:
         return _moved_in_sim(trial, robot, arena)
 
     straight = [trial for trial in trials if _is_straight(trial)]
@@ -130,12 +130,12 @@ def _fit_path(
     )
 
 
-def _is_straight(trial: ObservedTrial) -> bool:
+def _is_straight(trial: TrialRecord) -> bool:
     """Whether it was to go straight ahead."""
     return bool(np.any(trial.commands[:, 0] > 0)) and not np.any(trial.commands[:, 1])
 
 
-def _ends_at_a_wall(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> bool:
+def _ends_at_a_wall(trial: TrialRecord, robot: RobotModel, arena: Arena) -> bool:
     """Whether something ahead stopped the robot; where nobody saw its end, by what it said itself.
 
     One that went back has been told wrongly which of its ends is ahead: that is said elsewhere.
@@ -157,7 +157,7 @@ def _ends_at_a_wall(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> bo
     )
 
 
-def _moved_in_sim(trial: ObservedTrial, robot: RobotModel, arena: Arena) -> Moved:
+def _moved_in_sim(trial: TrialRecord, robot: RobotModel, arena: Arena) -> Moved:
     """How the simulated robot moves in a trial, without noise, where nothing stands in its way.
 
     Raises:
@@ -209,7 +209,7 @@ def _sensor_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequen
 
 
 def _fit_sensors(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+    trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     standing = [trial for trial in trials if len(trial.commands) and not np.any(trial.commands)]
     if not standing:
@@ -278,7 +278,7 @@ def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequen
 
 
 def _fit_motion(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+    trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
     fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
@@ -290,21 +290,21 @@ def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Seque
 
 
 def _fit_contact(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+    trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     met = _of_purpose(trials, "contact")
     simulate = _replay(met, robot, arena)
     return _parts_of(fit_contact(met, simulate, robot, arena, observe=observe, seed=seed))
 
 
-def _of_purpose(trials: Sequence[ObservedTrial], purpose: str) -> list[ObservedTrial]:
+def _of_purpose(trials: Sequence[TrialRecord], purpose: str) -> list[TrialRecord]:
     """The trials that were carried out for it; all with commands where none was."""
     return [trial for trial in trials if trial.purpose == purpose] or [
         trial for trial in trials if len(trial.commands)
     ]
 
 
-def _replay(trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena) -> Simulate:
+def _replay(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Simulate:
     """Trials in `sim` with other numbers."""
     step_s = step_of(trials) if trials else robot.step_s
     ranges = ranges_of(scribbler_prior(robot), robot)
@@ -323,7 +323,7 @@ def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[
 
 
 def _fit_all(
-    trials: Sequence[ObservedTrial], robot: RobotModel, arena: Arena, observe: Observe, seed: int
+    trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     return fit_everything(trials, robot, arena, seed)
 

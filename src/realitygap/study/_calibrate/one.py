@@ -18,7 +18,7 @@ from realitygap.records import (
     Observations,
     ObservationsFile,
     Observe,
-    ObservedTrial,
+    TrialRecord,
     read_observations,
     sees,
     write_whole,
@@ -240,7 +240,7 @@ def _arena_of(path: Path, found: Observations) -> Arena:
         ) from None
 
 
-def _refuse_other_readings(trials: Sequence[ObservedTrial], robot: RobotModel) -> None:
+def _refuse_other_readings(trials: Sequence[TrialRecord], robot: RobotModel) -> None:
     others = {trial.readings.shape[1] for trial in trials if len(trial.readings)} - {len(robot.range)}
     if others:
         raise StudyError(
@@ -278,7 +278,7 @@ def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> S
 
 def _fit(
     kind: str,
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     robot: str | Path,
     arena: Arena,
     observe: Observe,
@@ -293,7 +293,7 @@ def _fit(
     return replace(parts, notes=(*parts.notes, left_out)) if left_out else parts
 
 
-def _seen_as(trial: ObservedTrial, observe: Observe) -> ObservedTrial:
+def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
     """A trial with no more than was to be observed."""
     if observe != "track" and len(trial.poses):
         trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
@@ -307,7 +307,7 @@ def calibration_of(
     target: str,
     label: str,
     observe: Observe,
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     arena: str,
     seed: int,
 ) -> Calibration:

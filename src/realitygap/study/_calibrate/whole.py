@@ -36,7 +36,7 @@ from realitygap.calibration import (
 from realitygap.errors import whole_number
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble, SimPlatform
-from realitygap.records import Observe, ObservedTrial
+from realitygap.records import Observe, TrialRecord
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
@@ -69,7 +69,7 @@ def calibrate_all(
     effort: Effort = "full",
     choose: bool = False,
     tell: Callable[[str], None] | None = None,
-    keep: Callable[[ObservedTrial], None] | None = None,
+    keep: Callable[[TrialRecord], None] | None = None,
     threads: int | None = None,
 ) -> Calibration:
     """Carry out trials on a target and fit all parameters of `sim` to what was observed.
@@ -149,7 +149,7 @@ def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> li
 
 
 def fit_everything(
-    trials: Sequence[ObservedTrial],
+    trials: Sequence[TrialRecord],
     robot: RobotModel,
     arena: Arena,
     seed: int = 0,
@@ -186,11 +186,11 @@ class _Fit:
         """(m, d) what is seen of m robots."""
         return self.ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
 
-    def evidence(self, trials: Sequence[ObservedTrial]) -> list[Evidence]:
+    def evidence(self, trials: Sequence[TrialRecord]) -> list[Evidence]:
         genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
         return evidence_of(trials, genomes, self.arena.grid.n_cells)
 
-    def posterior(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+    def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         """What is left of the prior.
 
         With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
@@ -205,7 +205,7 @@ class _Fit:
         blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
         return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior, share=OF_COMMANDS)
 
-    def _posterior_of_trials(self, trials: Sequence[ObservedTrial], effort: Effort) -> Posterior:
+    def _posterior_of_trials(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         return fit_all(
             self.evidence(trials), self.simulate, self.prior, self.robot,
             seed=self.seed, effort=effort, tell=self.tell,
@@ -214,7 +214,7 @@ class _Fit:
     def numbers(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         return numbers_of(self.prior, values, self.robot)
 
-    def parts(self, trials: Sequence[ObservedTrial], effort: Effort) -> Parts:
+    def parts(self, trials: Sequence[TrialRecord], effort: Effort) -> Parts:
         """All that the trials tell."""
         if not self.evidence(trials):
             return self._as_it_is()
@@ -259,7 +259,7 @@ class _Fit:
         commands = plan.commands if plan.genome is None else np.zeros((n, 2))
         start = plan.start or self.arena.start
         x, y, heading = start
-        trial = ObservedTrial((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
+        trial = TrialRecord((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
         return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
 
     def _as_it_is(self) -> Parts:

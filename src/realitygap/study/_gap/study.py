@@ -25,7 +25,7 @@ from realitygap.gap import (
     replay_error,
 )
 from realitygap.platforms import SimTarget, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.trials import Target, TrialPlan, is_whole
 from realitygap.world import Arena, Pose
@@ -80,8 +80,8 @@ class GapStudy:
     target: GapSide
     controllers: tuple[Controller, ...]
     arena: Arena
-    source_trials: tuple[ObservedTrial, ...]
-    target_trials: tuple[ObservedTrial, ...]
+    source_trials: tuple[TrialRecord, ...]
+    target_trials: tuple[TrialRecord, ...]
     maps: CoverageMaps | None
     task: Task
     replay: ReplayError | None
@@ -185,7 +185,7 @@ def study_gap(
 
 
 def _paced(
-    source: Target, target: Target, on_target: Sequence[ObservedTrial]
+    source: Target, target: Target, on_target: Sequence[TrialRecord]
 ) -> tuple[Target, tuple[str, ...]]:
     """The simulator with commands as long as most of a robot's trials had, and what there is to say of it."""
     step_s = float(np.median([trial.step_s for trial in on_target]))
@@ -233,26 +233,26 @@ def _carry_out(
     observe: Observe,
     tell: Tell | None,
     file: ObservationsFile | None = None,
-) -> list[ObservedTrial]:
+) -> list[TrialRecord]:
     """Trials in the order of their plans: those in the file, and the others, kept as they come."""
     found = () if file is None else file.trials
     kept = {(trial.number, trial.genome): trial for trial in found if is_whole(trial)}
     keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
     done = itertools.count(sum(key in kept for key in keys) + 1)
 
-    def told(k: int, _: ObservedTrial) -> None:
+    def told(k: int, _: TrialRecord) -> None:
         if tell is not None:
             tell(platform.name, next(done), len(plans))
 
     return carry_out_missing(platform, plans, observe, kept, keys, file=file, tell=told)
 
 
-def _by_controller(trials: Sequence[ObservedTrial], n: int) -> list[ObservedTrial]:
+def _by_controller(trials: Sequence[TrialRecord], n: int) -> list[TrialRecord]:
     """Trials that went round n controllers, those of a controller together."""
     return [trials[k] for i in range(n) for k in range(i, len(trials), n)]
 
 
-def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int, task: Task) -> GapSide:
+def side_of(platform: Target, trials: Sequence[TrialRecord], n: int, task: Task) -> GapSide:
     """Trials that went round n controllers, as a side of a gap.
 
     Raises:
@@ -271,9 +271,7 @@ def side_of(platform: Target, trials: Sequence[ObservedTrial], n: int, task: Tas
     return GapSide(platform.name, platform.label, scores.reshape(n, -1), crossed, ends)
 
 
-def _replay(
-    source: Target, observed: Sequence[ObservedTrial], n: int, tell: Tell | None
-) -> ReplayError | None:
+def _replay(source: Target, observed: Sequence[TrialRecord], n: int, tell: Tell | None) -> ReplayError | None:
     """The target's commands replayed in simulation from where its robot was; its trials went round n controllers."""
     t = min((len(trial.commands) for trial in observed), default=0)
     seen = [k for k, trial in enumerate(observed) if len(trial.poses) > t][:MOST_REPLAYED]
@@ -321,7 +319,7 @@ def _reevolved(
     source: Target,
     in_source: GapSide,
     reevolved: Sequence[Controller],
-    on_target: Sequence[ObservedTrial],
+    on_target: Sequence[TrialRecord],
     target: Target,
     task: Task,
 ) -> Estimate:

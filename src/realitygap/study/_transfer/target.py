@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from realitygap.errors import RecordError
-from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, ObservedTrial
+from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
 from realitygap.trials import Target, TellTrial, TrialPlan, is_whole
 
 from .._targets import carry_out_missing, observations_head
@@ -43,7 +43,7 @@ class KeptTarget(WrappedTarget):
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
-    ) -> list[ObservedTrial]:
+    ) -> list[TrialRecord]:
         """As `Target.carry_out`.
 
         Raises:
@@ -64,7 +64,7 @@ class KeptTarget(WrappedTarget):
         carry_out_missing(self.target, numbered, observe, self._kept, keys, file=self._file, tell=tell)
         return [self._checked(plan, observe) for plan in numbered]
 
-    def _checked(self, plan: TrialPlan, observe: Observe) -> ObservedTrial:
+    def _checked(self, plan: TrialPlan, observe: Observe) -> TrialRecord:
         """The trial of a plan, if it is that."""
         trial = self._kept[plan.number]
         genome = "" if plan.genome is None else plan.genome.to_json()

@@ -1,4 +1,4 @@
-"""What an observer has of a trial on any platform, and the file that keeps such trials."""
+"""The record of one trial on any platform."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def sees(observe: Observe, least: Observe) -> bool:
 
 
 @dataclass(frozen=True)
-class ObservedTrial:
-    """A trial of t commands as it was observed; row k of what is sensed is from before command k.
+class TrialRecord:
+    """A trial of t commands; row k of what is sensed is from before command k.
 
     Attributes:
-        start: (3,) where the robot was put: x [m], y [m], heading [rad].
-        step_s: How long a command lasts [s].
+        start: (3,) where the robot was put: x [m], y [m], heading [rad]; zeros where only its study knows.
+        step_s: Duration of a command [s].
         commands: (t, 2) move and turn, -1..1.
         readings: (t, s) of each range sensor, 0..1.
         stalled: (t,) bool.
@@ -47,6 +47,10 @@ class ObservedTrial:
             the start on; None where nobody measured.
         last_readings: (s,) of each range sensor after the last command; no entries where nobody looked.
         last_stalled: Whether the last command was blocked; False where nobody looked.
+        times: Since the trial began [s], of each look at the sensors, so (t + 1,) if the robot looked after the last
+            command, otherwise (t,). No entries for a simulation, in which they follow from `step_s`.
+        raw: Readings at these times in the robot's own units, a row each; no rows for a simulation.
+        problem: Message about the end; empty after the last step.
     """
 
     start: tuple[float, float, float]
@@ -54,7 +58,7 @@ class ObservedTrial:
     commands: NDArray[np.float64]
     readings: NDArray[np.float64]
     stalled: NDArray[np.bool_]
-    cells: tuple[int, ...]
+    cells: tuple[int, ...] = ()
     wheels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
     genome: str = ""
@@ -65,14 +69,22 @@ class ObservedTrial:
     end_pose: tuple[float, float, float] | None = None
     last_readings: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     last_stalled: bool = False
+    times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    raw: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    problem: str = ""
 
     def __repr__(self) -> str:
         steps = f"{len(self.commands)} steps of {self.step_s:g} s"
         return f"{type(self).__name__}({self.number}, {self.purpose}, {steps}, observed: {self.observe})"
 
     @property
+    def n_stalls(self) -> int:
+        """Number of steps that began with the robot blocked."""
+        return int(self.stalled.sum())
+
+    @property
     def observe(self) -> Observe:
-        """How much is seen of it; cells where it has neither wheels nor poses, counted or not."""
+        """Observation level: cells if it has neither wheels nor poses, counted or not."""
         if len(self.poses):
             return "track"
         return "encoders" if len(self.wheels) else "cells"

@@ -24,6 +24,14 @@ def job(*, is_over: bool = True, is_failed: bool = False, **values: Any) -> Any:
     return SimpleNamespace(is_over=is_over, is_failed=is_failed, outcome="disk full", ask=None, **values)
 
 
+CURVE = {
+    "condition": "novelty-10",
+    "label": "SIM",
+    "points": [
+        {"n": 8, "median": 0.4, "low": 0.3, "high": 0.5},
+        {"n": 8, "median": 0.5, "low": None, "high": None},
+    ],
+}
 PROGRESS = {"n_done": 6, "n_runs": 8, "n_computed": 4, "seconds": 2.0}
 
 
@@ -65,16 +73,24 @@ def test_durations_have_the_unit_that_fits():
 
 def test_figures_are_read_only_for_the_runs_and_the_version_they_were_drawn_of(tmp_path, monkeypatch):
     figure = {"caption": "c", "alt": "a", "wide": "<svg/>", "narrow": "<svg/>"}
-    keep_figures(tmp_path, (8, 0), [ROW], {"coverage": figure})
-    assert read_figures(tmp_path, (8, 0)) == ([ROW], {"coverage": figure})
+    keep_figures(tmp_path, (8, 0), [ROW], [CURVE], {"coverage": figure})
+    assert read_figures(tmp_path, (8, 0)) == ([ROW], [CURVE], {"coverage": figure})
     assert read_rows(tmp_path, (8, 0)) == [ROW]
     assert read_figures(tmp_path, (9, 0)) is None
     monkeypatch.setattr(_figure_cache, "__version__", "next")
     assert read_figures(tmp_path, (8, 0)) is None
 
 
+@pytest.mark.parametrize(
+    "curve", [{**CURVE, "points": []}, {**CURVE, "points": [{"n": 1, "median": "high"}]}, [], "text"]
+)
+def test_curves_of_another_form_are_not_read(tmp_path, curve):
+    keep_figures(tmp_path, (8, 0), [ROW], [curve], {})
+    assert read_figures(tmp_path, (8, 0)) is None
+
+
 @pytest.mark.parametrize("row", [{**ROW, "line_median": "high"}, {**ROW, "n": None}, [], "text"])
 def test_summary_of_another_form_is_not_read(tmp_path, row):
-    keep_figures(tmp_path, (8, 0), [row], {"coverage": {"caption": 1}})
+    keep_figures(tmp_path, (8, 0), [row], [], {"coverage": {"caption": 1}})
     assert read_rows(tmp_path, (8, 0)) is None
     assert read_figures(tmp_path, (8, 0)) is None

@@ -89,9 +89,21 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         assert other.get_by_role("button", name="Stop calibration").is_disabled()
         page.reload()
         page.locator(".lab-question").get_by_text("Trial 3 of").wait_for()
+        page.get_by_role("button", name="Robot is in place").click()
+        page.get_by_label("Turn to the left").wait_for()
         page.get_by_role("button", name="Stop calibration").click()
         page.get_by_text("Recorded trials are saved").wait_for()
-    assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2
+        assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2
+        choose(page, "What to calibrate", "Path")
+        begin(page, Robot=f"scribbler:{server.name}", Name="led")
+        page.get_by_text("before you said what you saw").wait_for()
+        page.get_by_role("button", name="Use this trial").click()
+        page.get_by_label("Turn to the left").wait_for()
+        measure(page, "13 3/4", "0", "1")
+        page.locator(".lab-question").get_by_text("Trial 1 of").wait_for()
+        page.get_by_role("button", name="Stop calibration").click()
+        page.get_by_text("Recorded trials are saved").wait_for()
+    assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 3
 
 
 def test_no_calibration_is_written_or_read_outside_the_folder(lab, visit):

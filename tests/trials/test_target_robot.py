@@ -205,9 +205,12 @@ def test_a_lost_trial_is_told_and_driven_again_once() -> None:
     told: list[tuple[int, TrialRecord]] = []
     with target:
         (trial,) = target.carry_out([FORWARD], "track", lambda k, trial: told.append((k, trial)))
-    assert [(k, each.end, len(each.commands)) for k, each in told] == [(0, "lost", 2), (0, "step limit", 6)]
-    assert len(told[0][1].poses) == 3
-    assert trial_to_dict(trial) == trial_to_dict(told[1][1])
+    assert [(k, each.end, len(each.commands)) for k, each in told] == [
+        *[(0, "running", 0), (0, "lost", 2)],
+        *[(0, "running", 0), (0, "step limit", 6)],
+    ]
+    assert len(told[1][1].poses) == 3
+    assert trial_to_dict(trial) == trial_to_dict(told[3][1])
     assert len(opened) == 2
     assert all(robot.link.motors_off for robot in opened)
 
@@ -220,7 +223,7 @@ def test_a_trial_lost_twice_stops_with_the_trials_before_it_kept() -> None:
         pytest.raises(RobotError, match=r"Trial 5 on scribbler:test was lost twice after 1 commands"),
     ):
         target.carry_out([FORWARD] * 2, "cells", lambda k, trial: told.append(trial.end))
-    assert told == ["step limit", "lost", "lost"]
+    assert told == ["running", "step limit", "running", "lost", "running", "lost"]
 
 
 def test_lost_trials_may_be_skipped() -> None:
@@ -245,22 +248,26 @@ def test_ctrl_c_stops_the_motors_and_tells_the_trial_up_to_there() -> None:
     target = RobotTarget(lambda: robot, ARENA, WitnessObserver(), name="scribbler:test")
     with pytest.raises(KeyboardInterrupt):
         target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
-    assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 3)]
+    assert [(trial.end, len(trial.commands)) for trial in told] == [("running", 0), ("interrupted", 3)]
     assert robot.link.motors_off
     assert not robot.link.is_open
 
 
-def test_ctrl_c_while_somebody_is_asked_for_cells_tells_the_trial() -> None:
+@pytest.mark.parametrize("asks", [False, True])
+def test_ctrl_c_while_an_observer_is_asked_for_cells_tells_the_trial(asks: bool) -> None:
     class Asked(WitnessObserver):
         def cells(self) -> tuple[int, ...]:
             raise KeyboardInterrupt
 
     robot = connect_robot(PORT)(ScribblerPlatform(reading_max=6400))
-    target = RobotTarget(lambda: robot, ARENA, Asked(), name="scribbler:test")
+    observer = Asked()
+    observer.asks = asks
+    target = RobotTarget(lambda: robot, ARENA, observer, name="scribbler:test")
     told: list[TrialRecord] = []
     with pytest.raises(KeyboardInterrupt):
         target.carry_out([FORWARD], "cells", lambda k, trial: told.append(trial))
-    assert [(trial.end, len(trial.commands)) for trial in told] == [("interrupted", 6)]
+    ends = [("driven", 6), ("driven", 6)] if asks else [("interrupted", 6)]
+    assert [(trial.end, len(trial.commands)) for trial in told] == [("running", 0), *ends]
 
 
 def test_what_cannot_be_is_said_before_anything_moves() -> None:

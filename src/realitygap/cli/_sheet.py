@@ -15,7 +15,7 @@ from ._operator import pick_cells
 
 if TYPE_CHECKING:
     from realitygap.records import Observe
-    from realitygap.trials import TrialPlan
+    from realitygap.trials import TrialPlan, Verdict
     from realitygap.world import Arena
 
 
@@ -25,7 +25,18 @@ def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
     Args:
         asks_for_start: Whether to ask for the robot at the start of each trial; else that was asked before.
     """
-    return SheetObserver(pick_cells, NO_LINE, _ask_for_start if asks_for_start else None)
+    return SheetObserver(pick_cells, NO_LINE, _ask_for_start if asks_for_start else None, _settle)
+
+
+def _settle(problem: str, can_count: bool) -> Verdict:
+    """Ask what becomes of a trial that was under way when the program ended."""
+    if not can_count:
+        typer.prompt(f"{problem} Enter", default="", show_default=False, err=True)
+        return "void"
+    while True:
+        answer = typer.prompt(f"{problem} v: void, drive it again; d: driven, count it", err=True).lower()
+        if answer in ("v", "void", "d", "driven"):
+            return "void" if answer.startswith("v") else "driven"
 
 
 def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:

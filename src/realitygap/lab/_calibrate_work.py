@@ -20,7 +20,7 @@ from realitygap.study import (
     save_calibration,
     with_ruled_end,
 )
-from realitygap.trials import Led, OnLost, Operator, SheetObserver, TrialPlan, those_that_count
+from realitygap.trials import Led, OnLost, Operator, SheetObserver, TrialPlan, Verdict, those_that_count
 from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
@@ -147,4 +147,8 @@ def _sheet_observer(channel: Channel) -> SheetObserver:
         cells = {each for each in given if type(each) is int and 0 <= each < arena.grid.n_cells}
         return sorted(cells) or None
 
-    return SheetObserver(pick, NO_LINE)
+    def settle(problem: str, can_count: bool) -> Verdict:
+        answer = channel.ask("settle", problem=problem, can_count=can_count).get("verdict")
+        return "driven" if answer == "driven" else "void"
+
+    return SheetObserver(pick, NO_LINE, settle=settle)

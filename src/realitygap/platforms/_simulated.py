@@ -12,7 +12,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
 from realitygap.evolution import ControllerInterface
 from realitygap.kernels.math.philox import MAX_INDIVIDUALS
 from realitygap.records import Observe, TrialRecord, sees
@@ -20,6 +19,7 @@ from realitygap.robots import Label
 from realitygap.trials import (
     EndReason,
     NoiseKey,
+    RepeatableTarget,
     RobotObserver,
     Target,
     TellTrial,
@@ -74,7 +74,7 @@ class SimulatedPlatform(Platform):
         return None
 
 
-class SimTarget(ClosedOnExit):
+class SimTarget(RepeatableTarget):
     """A simulator as a target.
 
     Controllers are tried in calls of the compiled trials, commands one by one on the simulated robot; what comes out is

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface, Network, inputs_of_robot
 from realitygap.kernels.neat.genome import NeatRules
@@ -21,6 +20,7 @@ from realitygap.robots import Command, Label, channels_of, select_channels
 from realitygap.tasks import TraceArrays
 from realitygap.trials import (
     NoiseKey,
+    RepeatableTarget,
     RobotObserver,
     TellTrial,
     TrialBatch,
@@ -485,7 +485,7 @@ class StepwiseFleet:
         self._robots.close()
 
 
-class StepwiseTarget(ClosedOnExit):
+class StepwiseTarget(RepeatableTarget):
     """A simulated robot of this process as a target.
 
     Args:

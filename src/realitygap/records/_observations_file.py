@@ -1,7 +1,8 @@
 """Observed trials in a file: a line of JSON each, kept as they end.
 
 The first line says of what, where and how much was observed. A trial is on the disk when `append` returns; a crash in
-the midst of a line costs that trial and no other.
+the midst of a line costs that trial and no other. A robot's trial has a line when it begins and, if a person has to say
+what they saw, one when the robot has driven: after a crash the file says which trial was under way.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from realitygap.errors import RecordError
 from ._files import reading
 from ._inside import open_inside
 from ._output import refuse_results, write_whole
-from ._trial_record import OBSERVATIONS, Observe, TrialRecord
+from ._trial_record import OBSERVATIONS, UNDER_WAY, Observe, TrialRecord
 
 OBSERVATIONS_FORMAT = "realitygap observations 1"
 _WIDTHS = {"commands": 2, "wheels": 2, "poses": 3}
@@ -67,11 +68,14 @@ class Observations:
         head: What they have in common.
         trials: In the order in which they ended.
         problem: What was left out and why; empty where nothing was.
+        under_way: The last line of each trial that never ended, because the program did: what the robot drove, if its
+            `end` is "driven".
     """
 
     head: ObservationsHead
     trials: tuple[TrialRecord, ...]
     problem: str = ""
+    under_way: tuple[TrialRecord, ...] = ()
 
 
 def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
@@ -169,6 +173,7 @@ class ObservationsFile(ClosedOnExit):
 
     Attributes:
         trials: Those that it had when it was opened.
+        under_way: Trials that never ended, by purpose, number, and controller; `append` adds and removes them.
         problem: What was cut off; empty where nothing was.
 
     Raises:
@@ -182,6 +187,7 @@ class ObservationsFile(ClosedOnExit):
         self._within = self.path.parent if within is None else within
         self.head = head
         self.trials: tuple[TrialRecord, ...] = ()
+        self.under_way: dict[tuple[str, int, str], TrialRecord] = {}
         self.problem = ""
         refuse_results(self.path)
         held = self._take_up()
@@ -209,7 +215,7 @@ class ObservationsFile(ClosedOnExit):
         there, wanted = found.head.to_dict(), self.head.to_dict()
         of_no_matter = not_compared(there, wanted)
         other = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
-        if other and not found.trials:
+        if other and not found.trials and not found.under_way:
             return 0  # nobody's yet
         if other:
             what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
@@ -217,6 +223,8 @@ class ObservationsFile(ClosedOnExit):
                 f"{self.path} has trials of something else: {what}. They are not put together. Name another file."
             )
         self.trials, self.problem = found.trials, found.problem
+        for trial in found.under_way:
+            _note(self.under_way, trial)
         return held
 
     def append(self, trial: TrialRecord) -> None:
@@ -229,6 +237,7 @@ class ObservationsFile(ClosedOnExit):
             self._write(_line(trial_to_dict(trial)))
         except OSError as error:
             raise self._cannot(error) from error
+        _note(self.under_way, trial)
 
     def _write(self, line: bytes) -> None:
         n = self._file.write(line)
@@ -284,6 +293,7 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
     first, newline, rest = data.partition(b"\n")
     head = _head(path, first)
     trials: list[TrialRecord] = []
+    under_way: dict[tuple[str, int, str], TrialRecord] = {}
     held = len(first) + len(newline)
     problem = ""
     lines = rest.split(b"\n")
@@ -292,7 +302,7 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
         if is_last and not line:
             break
         try:
-            trials.append(trial_from_dict(_object(line)))
+            trial = trial_from_dict(_object(line))
         except ValueError as error:
             if not is_last:
                 raise RecordError(f"{path} is damaged: line {number} is {error}.") from None
@@ -301,7 +311,18 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
             )
         else:
             held += len(line) + (not is_last)
-    return Observations(head, tuple(trials), problem), held
+            _note(under_way, trial)
+            if trial.end not in UNDER_WAY:
+                trials.append(trial)
+    return Observations(head, tuple(trials), problem, tuple(under_way.values())), held
+
+
+def _note(under_way: dict[tuple[str, int, str], TrialRecord], trial: TrialRecord) -> None:
+    """Keep the trials that have not ended, by purpose, number, and controller."""
+    key = trial.purpose, trial.number, trial.genome
+    under_way.pop(key, None)
+    if trial.end in UNDER_WAY:
+        under_way[key] = trial
 
 
 def _object(line: bytes) -> dict[str, Any]:

@@ -18,6 +18,10 @@ CALIBRATES: tuple[Observe, ...] = OBSERVATIONS[1:]
 """As much as a calibration needs: from readings alone nothing is told of where a robot drove."""
 
 
+UNDER_WAY = ("running", "driven")
+"""Ends of records of trials that go on: the robot drives, or a person has yet to say what they saw of it."""
+
+
 def sees(observe: Observe, least: Observe) -> bool:
     """Return whether an observation has as much as another, the least that is wanted."""
     return OBSERVATIONS.index(observe) >= OBSERVATIONS.index(least)

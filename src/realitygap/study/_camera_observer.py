@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError, VisionError
-from realitygap.records import Observe, Score
+from realitygap.records import Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
-from realitygap.trials import PortObserver, SheetObserver, TrialPlan
+from realitygap.trials import EndReason, PortObserver, SheetObserver, TrialPlan
 from realitygap.vision import Track, Tracked
 from realitygap.world import Arena
 
@@ -48,6 +49,7 @@ class CameraObserver:
     """
 
     who = "camera"
+    asks = False
     observes: Observe = "track"
 
     def __init__(
@@ -139,6 +141,11 @@ class CameraObserver:
             return None
         self._say(f"The camera counts {len(score.cells)} cells.")
         return score
+
+    def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
+        """None: the pictures are gone with the program. The person next to the robot reads so."""
+        self.beside.settle(plan, arena, replace(trial, end=str(EndReason.RUNNING)))
+        return None
 
     def _seen(self) -> Track:
         """From the first look to the last."""

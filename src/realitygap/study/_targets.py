@@ -9,7 +9,7 @@ from realitygap.errors import RobotError, StudyError
 from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
 from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, TrialRecord, sees
 from realitygap.tasks import Task
-from realitygap.trials import Target, TellTrial, TrialPlan, is_taken_back, is_whole
+from realitygap.trials import Target, TellTrial, TrialPlan, is_taken_back, is_whole, taken_back
 from realitygap.world import Arena
 
 Key = TypeVar("Key", bound=Hashable)
@@ -120,26 +120,31 @@ def carry_out_missing(
         observe: How much is seen of them.
         kept: Whole trials by key; those that are run are added.
         keys: Of the trial of each plan.
-        file: Gets each trial as it comes, also one that was cut off.
+        file: Gets each trial as it comes, also one that was cut off. The target settles those in it that never ended.
         tell: Called with the place and the trial, for each whole one that is run.
 
     Raises:
         RobotError: A trial was lost.
     """
-    missing = [k for k, key in enumerate(keys) if key not in kept]
 
     def keep(k: int, trial: TrialRecord) -> None:
         if file is not None:
             file.append(trial)
         if is_whole(trial):
-            kept[keys[missing[k]]] = trial
+            kept[keys[k]] = trial
             if tell is not None:
-                tell(missing[k], trial)
+                tell(k, trial)
         elif is_taken_back(trial):
-            kept.pop(keys[missing[k]], None)
+            kept.pop(keys[k], None)
 
+    if file is not None and file.under_way:
+        for k, plan in enumerate(plans):
+            name = plan.purpose, plan.number, "" if plan.genome is None else plan.genome.to_json()
+            if (trial := file.under_way.get(name)) is not None:
+                keep(k, target.settle(plan, trial) or taken_back(trial, "void: the program ended in it"))
+    missing = [k for k, key in enumerate(keys) if key not in kept]
     if missing:
-        target.carry_out([plans[k] for k in missing], observe, keep)
+        target.carry_out([plans[k] for k in missing], observe, lambda i, trial: keep(missing[i], trial))
     where = "" if file is None else f" The others are kept in {file.path}."
     refuse_lost(sum(key not in kept for key in keys), target.name, where)
     return [kept[key] for key in keys]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from realitygap._closing import ClosedOnExit
 from realitygap.calibration import ruled
 from realitygap.errors import StudyError
 from realitygap.records import ObservationsFile, Observe, TrialRecord
-from realitygap.trials import Operator, Target, TrialPlan, is_taken_back, is_whole, taken_back
+from realitygap.trials import EndReason, Operator, Target, TrialPlan, is_taken_back, is_whole, taken_back
 
 from ._targets import carry_out_missing
 
@@ -41,6 +42,10 @@ class WrappedTarget(ClosedOnExit):
         """As `Target.carry_out`."""
         return self.target.carry_out(plans, observe, tell)
 
+    def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
+        """As `Target.settle`."""
+        return self.target.settle(plan, trial)
+
     def close(self) -> None:
         """Let go of the platform."""
         self.target.close()
@@ -65,9 +70,10 @@ class CountingTarget(WrappedTarget):
         """As `Target.carry_out`."""
 
         def one_more(k: int, trial: TrialRecord) -> None:
-            self._done += 1
-            if self._count is not None:
-                self._count(min(self._done, self._n), self._n)
+            if is_whole(trial):
+                self._done += 1
+                if self._count is not None:
+                    self._count(min(self._done, self._n), self._n)
             if tell is not None:
                 tell(k, trial)
 
@@ -96,7 +102,10 @@ class RuledTarget(WrappedTarget):
         trials = []
         for k, plan in enumerate(plans):
             is_path = plan.purpose == PATH
-            (trial,) = self.target.carry_out([plan], "track" if is_path else observe)
+            begun = functools.partial(
+                _tell_begun, tell, k
+            )  # and no more: a ruler sees less than is observed here
+            (trial,) = self.target.carry_out([plan], "track" if is_path else observe, begun)
             trials.append(with_ruler(trial) if is_path else trial)
             if tell is not None:
                 tell(k, trials[-1])
@@ -129,15 +138,34 @@ class OperatedTarget(WrappedTarget):
                 if k in trials and tell is not None:  # should somebody stop before it is driven again
                     tell(k, taken_back(trials.pop(k)))
                 continue
-            (trial,) = self.target.carry_out([plans[k]], observe)
+            (trial,) = self.target.carry_out([plans[k]], observe, functools.partial(_tell_driven, tell, k))
             measured = self._operator.measure(plans[k], trial)
             if measured is None:
+                if tell is not None:
+                    tell(k, taken_back(trial))
                 continue
             trials[k] = measured
             if tell is not None:
                 tell(k, measured)
             k += 1
         return [trials[k] for k in range(len(plans))]
+
+    def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
+        """As `Target.settle`; a trial that counts is measured now."""
+        driven = self.target.settle(plan, trial)
+        return None if driven is None else self._operator.measure(plan, driven)
+
+
+def _tell_begun(tell: Tell | None, k: int, _: int, trial: TrialRecord) -> None:
+    """Tell that trial k begins."""
+    if tell is not None and trial.end == EndReason.RUNNING:
+        tell(k, trial)
+
+
+def _tell_driven(tell: Tell | None, k: int, _: int, trial: TrialRecord) -> None:
+    """Tell of trial k before a person measures it: a whole one is driven, so far."""
+    if tell is not None:
+        tell(k, replace(trial, end=str(EndReason.DRIVEN)) if is_whole(trial) else trial)
 
 
 class ResumableTarget(WrappedTarget):

@@ -34,7 +34,7 @@ from ._preflight import Preflight, preflight
 from ._processors import usable_processors
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sheet_observer import SheetObserver
-from ._target import Target, TellTrial, TrialPlan, check_plans
+from ._target import RepeatableTarget, Target, TellTrial, TrialPlan, check_plans
 from ._target_robot import OnLost, PacedRobot, RobotTarget
 from ._witness_observer import WitnessObserver, own_witness
 
@@ -54,6 +54,7 @@ __all__ = [
     "PlatformTrials",
     "PortObserver",
     "Preflight",
+    "RepeatableTarget",
     "RobotObserver",
     "RobotTarget",
     "SceneTrack",

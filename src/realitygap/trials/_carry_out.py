@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -41,7 +42,12 @@ class _Looks:
 
 
 def carry_out_on_robot(
-    robot: Robot, plan: TrialPlan, observe: Observe, observer: Observer, start: Pose
+    robot: Robot,
+    plan: TrialPlan,
+    observe: Observe,
+    observer: Observer,
+    start: Pose,
+    keep: Callable[[TrialRecord], None] | None = None,
 ) -> TrialRecord:
     """Carry out one trial on a robot, and keep what is to be observed and nothing more.
 
@@ -53,6 +59,8 @@ def carry_out_on_robot(
         observe: How much to look at.
         observer: Who looks.
         start: Where the robot is put.
+        keep: Given the trial when the robot has driven it, before the observer is asked what it saw; None if a trial
+            without the answer is of no use.
 
     Returns:
         The trial. A robot that fails, or an observer, ends it as LOST: then it has what was seen whole.
@@ -81,11 +89,14 @@ def carry_out_on_robot(
         raise
     trial = _kept(plan, robot, driven, looks)
     try:
+        if keep is not None and sees(observe, "cells") and trial.end == EndReason.STEP_LIMIT:
+            keep(replace(trial, end=str(EndReason.DRIVEN)))
         return _with_what_is_seen(trial, observe, observer)
     except RobotError as error:
         return replace(trial, end=str(EndReason.LOST), problem=trial.problem or str(error))
     except (KeyboardInterrupt, SystemExit) as error:  # while somebody is asked for cells
-        raise TrialInterrupted(replace(trial, end=str(EndReason.INTERRUPTED))) from error
+        end = EndReason.INTERRUPTED if keep is None else EndReason.DRIVEN
+        raise TrialInterrupted(replace(trial, end=str(end))) from error
 
 
 def _controller(plan: TrialPlan) -> tuple[Controller, int]:

@@ -20,6 +20,10 @@ class EndReason(StrEnum):
     """The robot, or the link to it, failed."""
     INTERRUPTED = "interrupted"
     """The program was stopped."""
+    RUNNING = "running"
+    """Not yet: the robot drives. After a crash that is all that is known."""
+    DRIVEN = "driven"
+    """After its last step; a person has yet to say what they saw of it."""
 
 
 def is_whole(trial: TrialRecord) -> bool:
@@ -27,9 +31,9 @@ def is_whole(trial: TrialRecord) -> bool:
     return trial.end == EndReason.STEP_LIMIT
 
 
-def taken_back(trial: TrialRecord) -> TrialRecord:
+def taken_back(trial: TrialRecord, problem: str = "") -> TrialRecord:
     """Return a trial as one that the operator does not let count."""
-    return replace(trial, end=str(EndReason.ABORTED))
+    return replace(trial, end=str(EndReason.ABORTED), problem=problem)
 
 
 def is_taken_back(trial: TrialRecord) -> bool:

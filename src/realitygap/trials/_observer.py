@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.records import Observe, Score
+from realitygap.records import Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
 from realitygap.world import Arena
 
@@ -46,9 +46,11 @@ class PortObserver(Observer, Protocol):
         observes: The most that can be seen with it.
         identity: Of the robot that was met, as `Target.identity`.
         who: Enters the scores that it reports.
+        asks: Whether a person says after a trial what they saw.
     """
 
     who: str
+    asks: bool
 
     @property
     def observes(self) -> Observe:
@@ -86,6 +88,10 @@ class PortObserver(Observer, Protocol):
 
     def score(self, arena: Arena) -> Score | None:
         """The score of the trial that has just ended; None if a person has to count it."""
+        ...
+
+    def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
+        """The trial that was under way when the program ended, as far as it counts; None: it is void."""
         ...
 
 

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.records import Observe, Score
+from realitygap.records import Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
 from realitygap.world import Arena
 
+from ._ending import EndReason
 from ._own_senses import OwnSenses
 from ._target import TrialPlan
 
 PickCells = Callable[[Arena], Sequence[int] | None]
 """Has a person say which cells a line crosses; None asks again."""
+
+Settle = Callable[[str, bool], Literal["void", "driven"]]
+"""Has a person say what becomes of a trial that was cut off: told what happened, and whether the trial can count."""
 
 
 class SheetObserver(OwnSenses):
@@ -25,9 +31,11 @@ class SheetObserver(OwnSenses):
         pick: Asks the person.
         without_line: Purposes of trials that draw no line.
         stand: Has the robot put at the start of a trial; None where that was asked before.
+        settle: Asks about a trial that was under way when the program ended; if None, it is void.
     """
 
     who = "person"
+    asks = True
     observes: Observe = "cells"
 
     def __init__(
@@ -35,9 +43,10 @@ class SheetObserver(OwnSenses):
         pick: PickCells,
         without_line: Container[str] = (),
         stand: Callable[[TrialPlan, Arena, Observe], None] | None = None,
+        settle: Settle | None = None,
     ) -> None:
         super().__init__()
-        self._pick, self._without_line, self._stand = pick, without_line, stand
+        self._pick, self._without_line, self._stand, self._settle = pick, without_line, stand, settle
         self._plan: TrialPlan | None = None
 
     def meet(self, robot: Robot, arena: Arena | None = None) -> None:
@@ -78,3 +87,18 @@ class SheetObserver(OwnSenses):
     def score(self, arena: Arena) -> Score | None:
         """None: a person looks at the sheet later."""
         return None
+
+    def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
+        """The trial with its cells, if its robot had driven and the person counts it; None: it is void."""
+        has_driven = trial.end == EndReason.DRIVEN
+        what = f"The program ended in trial {trial.number} ({trial.purpose})"
+        told = (
+            f"{what}, which was driven, before you said what you saw."
+            if has_driven
+            else f"{what}: it is driven again."
+        )
+        if self._settle is None or self._settle(told, has_driven) == "void" or not has_driven:
+            return None
+        self._plan, self._arena = plan, arena
+        cells = tuple(sorted(set(trial.cells or self.cells())))
+        return replace(trial, end=str(EndReason.STEP_LIMIT), cells=cells)

@@ -10,6 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
 from realitygap.records import OBSERVATIONS, Observe, TrialRecord, sees
@@ -86,11 +87,21 @@ class Target(Protocol):
         Args:
             plans: In this order, where the order can matter.
             observe: How much to look at; nothing else of the platform comes out.
-            tell: Called with the plan's index after each trial, so that it can be kept at once.
+            tell: Called with the plan's index after each trial, so that it can be kept. A robot's trial is also told of
+                when it begins, and when the robot has driven and a person is asked; its `end` says which.
 
         Raises:
             RobotError: The robot failed; what `tell` was given is not lost.
             ValueError: So much cannot be seen of it, or a controller of another kind.
+        """
+        ...
+
+    def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
+        """Return what counts of a trial that was under way when the program ended; None if it is void.
+
+        Args:
+            plan: The plan of the trial.
+            trial: What was told of it last.
         """
         ...
 
@@ -103,6 +114,14 @@ class Target(Protocol):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
+
+
+class RepeatableTarget(ClosedOnExit):
+    """A target whose trials come out the same again, so that one that was cut off is void."""
+
+    def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
+        """Return None: the trial is void."""
+        return None
 
 
 def check_plans(

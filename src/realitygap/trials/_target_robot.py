@@ -157,7 +157,7 @@ class RobotTarget(ClosedOnExit):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`; `tell` is called with trials that were lost, too."""
+        """As `Target.carry_out`; `tell` is called with trials that begin, that were driven, and that were lost, too."""
         check_plans(plans, observe, self)
         trials = []
         try:
@@ -194,13 +194,35 @@ class RobotTarget(ClosedOnExit):
     ) -> TrialRecord:
         robot, start = self._ready(), plan.start or self.arena.start
         self._observer.place(plan, self.arena, observe)
+        if tell is not None:
+            tell(self._begun(plan, start))
+        keep = tell if self._observer.asks else None
         try:
-            trial = carry_out_on_robot(robot, plan, observe, self._observer, start)
+            trial = carry_out_on_robot(robot, plan, observe, self._observer, start, keep)
         except TrialInterrupted as stopped:
             if tell is not None:
                 tell(stopped.trial)
             raise
         return replace(trial, step_s=robot.lasted_s)
+
+    def _begun(self, plan: TrialPlan, start: Pose) -> TrialRecord:
+        """Return the record of a trial before its robot moves."""
+        nothing = np.empty((0, self.n_sensors))
+        return TrialRecord(
+            start=start,
+            step_s=self.step_s,
+            commands=np.empty((0, 2)),
+            readings=nothing,
+            stalled=np.empty(0, np.bool_),
+            genome="" if plan.genome is None else plan.genome.to_json(),
+            number=plan.number,
+            purpose=plan.purpose,
+            end=str(EndReason.RUNNING),
+        )
+
+    def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
+        """As `Target.settle`: the observer says."""
+        return self._observer.settle(plan, self.arena, trial)
 
     def close(self) -> None:
         """Stop the motors and let go of the robot; safe to call twice."""

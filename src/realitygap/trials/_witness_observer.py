@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
-from realitygap.records import PATH_PARTS, Observe, Score
+from realitygap.records import PATH_PARTS, Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
 from realitygap.world import Arena, Pose, paper_arena
 
@@ -35,6 +35,7 @@ class WitnessObserver(OwnSenses):
     """
 
     who = "witness"
+    asks = False
     observes: Observe = "track"
 
     def __init__(self, witness: Witness | None = None) -> None:
@@ -107,6 +108,10 @@ class WitnessObserver(OwnSenses):
     def cells(self) -> tuple[int, ...]:
         """Cells along the driven line."""
         return self.witness.cells()
+
+    def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
+        """None: a trial that is driven again comes out the same."""
+        return None
 
     def score(self, arena: Arena) -> Score:
         """The cells along the driven line, and the path."""

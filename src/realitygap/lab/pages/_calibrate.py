@@ -204,6 +204,14 @@ def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
                 ui.button("Undo last trial", on_click=lambda: answer(answer="redo")).props(
                     "outline no-caps"
                 ).set_enabled(ask["trial"] > 0)
+        elif ask["question"] == "settle":
+            ui.label(ask["problem"])
+            with ui.row().classes("lab-row"):
+                if ask["can_count"]:
+                    ui.button("Use this trial", on_click=lambda: answer(verdict="driven")).props(
+                        "unelevated no-caps"
+                    )
+                ui.button("Repeat trial", on_click=lambda: answer(verdict="void")).props("outline no-caps")
         elif ask["question"] == "measure":
             fields = {key: ui.input(text).props("outlined dense") for key, text in ask["questions"].items()}
             ui.label(ask["said"]).classes("lab-problem")

@@ -10,7 +10,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
 from realitygap.logs import head_of, mapping_of, read_logs, robot_of, trials_of
@@ -24,13 +23,13 @@ from realitygap.records import (
     sees,
 )
 from realitygap.robots import Label
-from realitygap.trials import TellTrial, TrialPlan, check_plans, those_that_count
+from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans, those_that_count
 from realitygap.world import Arena
 
 MOST_NUMBER = 2**63 - 1
 
 
-class RecordedTarget(ClosedOnExit):
+class RecordedTarget(RepeatableTarget):
     """The trials of controllers that a file holds.
 
     The k-th plan with a controller gets its k-th trial with as many steps.

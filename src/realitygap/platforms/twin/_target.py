@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import inputs_of_robot
 from realitygap.records import Observe, TrialRecord, trial_from_dict
 from realitygap.robots import Label
-from realitygap.trials import TellTrial, TrialPlan, check_plans
+from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans
 from realitygap.world import Arena
 
 from ._plan_file import plan_to_dict
 from ._pool import TwinPool
 
 
-class TwinTarget(ClosedOnExit):
+class TwinTarget(RepeatableTarget):
     """A twin, whose file this process never opens.
 
     Trial `number` is the same whenever it is carried out, by whichever process.

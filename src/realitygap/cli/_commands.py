@@ -51,6 +51,12 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("report", "Write the HTML report of a study.", "_results", "report"),
         Command("show", "Draw a run, trial, network, arena, or robot.", "_show", "show"),
         Command("export", "Export a network as JSON, ONNX, C, Aseba, or a graph.", "_export", "export"),
+        Command(
+            "export-trials",
+            "Write driven trials as bags of ROS 2 or as MCAP.",
+            "_trial_bags",
+            "export_trials",
+        ),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
     ),
     "Measure and close the gap": (
@@ -86,6 +92,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command(
             "audit-distance", "Report what a behavior distance weighs.", "_audit_distance", "audit_distance"
         ),
+        Command("arena", "Convert an arena from or to a map of ROS.", "_arena", "arena"),
         Command("simulate", "Run one case file as the Jyro simulator does.", "_simulate", "simulate"),
         Command("bench", "Measure the speed of this machine.", "_bench", "bench"),
     ),

@@ -2,7 +2,7 @@
 
 A log is a file of any size with commands, poses, encoders, and readings, each by its own clock. `LogMap` says which
 column is what. `read_logs` yields its trials on one regular grid, `diagnose` names the usual mistakes, and `trials_of`
-makes observed trials of them. This package fits nothing.
+makes observed trials of them. `write_bag` writes a trial for programs of ROS. This package fits nothing.
 """
 
 from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trials_of
@@ -18,10 +18,13 @@ from ._read import Log, read_logs
 from ._round_robot import round_robot
 from ._source import Batch, Source
 from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
+from ._write_bag import WHEEL_DIAMETER_MM, BagReport, write_bag
 
 __all__ = [
     "KINDS",
     "NO_HEADING",
+    "WHEEL_DIAMETER_MM",
+    "BagReport",
     "Batch",
     "ClockOffset",
     "Commands",
@@ -58,4 +61,5 @@ __all__ = [
     "robot_of",
     "round_robot",
     "trials_of",
+    "write_bag",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 from realitygap._limits import parse_json
 from realitygap.errors import LogError, from_extra
 
-from ._source import RECORDED, Batch, check_columns
+from ._source import RECORDED, Batch, Floats, check_columns
 
 BATCH_MESSAGES = 20_000
 MOST_FIELDS = 400
@@ -52,10 +52,17 @@ class BagSource:
         return self._columns
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
-        """As `Source.batches`; all columns have to be of one topic."""
+        """As `Source.batches`; all columns have to be of one topic, or the same field of several.
+
+        Several topics give the rows of the first one, with the last value that each of the others had by then.
+        """
         if rows:
             raise LogError(f"{self.path} is a bag: `rows` is for text files. Leave it out of the mapping.")
-        topic = self._topic_of([name for name in names if name != RECORDED])
+        by_topic = self._by_topic([name for name in names if name != RECORDED])
+        topic = next(iter(by_topic))
+        if len(by_topic) > 1:
+            yield self._joined(by_topic, names)
+            return
         wanted = [name if name != RECORDED else f"{topic}/{RECORDED}" for name in names]
         check_columns(self, wanted)
         first, table = 1, []
@@ -69,16 +76,38 @@ class BagSource:
         if table:
             yield _batch(first, names, table)
 
-    def _topic_of(self, names: Sequence[str]) -> str:
+    def _by_topic(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """The columns of each topic, in order."""
         topics = sorted(self._messages.topics(), key=len, reverse=True)
-        found = {next((topic for topic in topics if name.startswith(f"{topic}/")), "") for name in names}
-        if len(found) == 1 and "" not in found:
-            return str(found.pop())
+        found: dict[str, list[str]] = {}
+        for name in names:
+            topic = next((topic for topic in topics if name.startswith(f"{topic}/")), "")
+            found.setdefault(topic, []).append(name)
         if "" in found:
             check_columns(self, names)
-        raise LogError(
-            f"{self.path}: {', '.join(names)} are of {len(found)} topics, expected one for each part of the mapping."
-        )
+        fields = {name.removeprefix(topic) for topic, own in found.items() for name in own}
+        if len(found) != 1 and len(fields) != 1:
+            raise LogError(
+                f"{self.path}: {', '.join(names)} are of {len(found)} topics, expected one for each part of the "
+                "mapping, or the same field of each topic."
+            )
+        return found
+
+    def _joined(self, by_topic: dict[str, list[str]], names: Sequence[str]) -> Batch:
+        """Return all rows of the first topic with the values of the others."""
+        columns: dict[str, Floats] = {}
+        times: Floats = np.empty(0)
+        for own in by_topic.values():
+            parts = [part.columns for part in self.batches([RECORDED, *own])]
+            table = {name: np.concatenate([part[name] for part in parts]) for name in (RECORDED, *own)}
+            if not len(times):
+                times = table[RECORDED]
+                columns = table
+                continue
+            last = np.searchsorted(table[RECORDED], times, side="right") - 1
+            for name in own:
+                columns[name] = np.where(last < 0, np.nan, table[name][np.maximum(last, 0)])
+        return Batch(1, {name: columns[name] for name in names})
 
 
 def _batch(first: int, names: Sequence[str], table: list[list[float]]) -> Batch:

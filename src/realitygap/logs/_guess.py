@@ -65,6 +65,9 @@ def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
         "poses": _poses(names),
         "readings": _readings(names),
     }
+    ranges = _ranges(source, names)
+    if ranges is not None:
+        parts["readings"] = ranges
     values |= {name: part for name, part in parts.items() if part is not None}
     if "commands" not in values and "wheels" not in values:
         shown = ", ".join(names[:MOST_SHOWN])
@@ -209,6 +212,19 @@ def _readings(names: Sequence[str]) -> dict[str, Any] | None:
     return {"sensors": [name for _, name in sorted(family)]}
 
 
+def _ranges(source: Source, names: Sequence[str]) -> dict[str, Any] | None:
+    """Messages of the type sensor_msgs/Range, by the fields that they have: lengths, of which 0 is the nearest."""
+    sensors = [name for name in names if name.endswith("/range") and f"{name[:-5]}max_range" in names]
+    if not sensors:
+        return None
+    sensors.sort(
+        key=lambda name: [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]
+    )
+    most = [f"{name[:-5]}max_range" for name in sensors]
+    full = max(float(next(iter(source.batches([name]))).columns[name][0]) for name in most)
+    return {"sensors": sensors, "full": full, "inverted": True}
+
+
 def _time(names: Sequence[str]) -> dict[str, str] | None:
     for word in TIME:
         for name in names:
@@ -224,6 +240,8 @@ def _check_topics(source: Source, values: dict[str, Any]) -> None:
     for name in ("readings", "wheels"):
         part = values.get(name)
         columns = part and (part.get("sensors") or [part.get("left"), part.get("right")])
+        if columns and all(str(column).endswith("/range") for column in columns):
+            continue
         if columns and len({str(column).rpartition("/")[0] for column in columns}) != 1:
             del values[name]
     if "commands" not in values and "wheels" not in values:

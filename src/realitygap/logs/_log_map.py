@@ -220,7 +220,7 @@ class LogMap(Settings):
 
 
 def load_log_map(path: str | Path) -> LogMap:
-    """Return the mapping in a TOML file.
+    """Return the mapping in a TOML file; files that it names may lie next to it.
 
     Raises:
         LogError: The file cannot be read or has mistakes; the message has each with its place.
@@ -234,6 +234,10 @@ def load_log_map(path: str | Path) -> LogMap:
         ) from None
     except ValueError as error:
         raise LogError(f"{path}: it is not TOML: {error}.") from None
+    for key in ("robot", "arena", "controller"):
+        name = values.get(key)
+        if isinstance(name, str) and name and (path.parent / name).is_file():
+            values[key] = str(path.parent / name)
     try:
         return LogMap(**values)
     except ValueError as error:

@@ -47,6 +47,7 @@ from ._tracked import (
 )
 from ._transfer.result import Strategist, Transferred, TransferResult, estimate_mean
 from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
+from ._trial_bags import export_trials
 from ._try_on import try_on
 from ._wrapped_targets import StoppedByPerson
 
@@ -99,6 +100,7 @@ __all__ = [
     "connect_robot",
     "drive_study",
     "estimate_mean",
+    "export_trials",
     "gap_between",
     "hold_out_of",
     "keep_tracked",

@@ -4,6 +4,10 @@ Pen traces on a photograph of a sheet: a `SheetLayout` is what is printed for an
 and a box to try each pen in; `score_sheet` finds that sheet and says which cells each pen's trace crosses, and how sure
 that is. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_trace` and `visited_cells`.
 
+A map of ROS is a picture, too: `arena_of_map` traces its free space, and `save_map` draws an arena.
+
+A map of ROS is a picture, too: `arena_of_map` traces its free space, and `save_map` draws an arena.
+
 A robot under a camera: `track_video` follows the tag on a robot in an arena with four corner tags.
 """
 
@@ -18,6 +22,7 @@ from ._pens import PenMaps, separate_pens
 from ._photo import photo_bytes, photo_hash, read_photo
 from ._print import PAPERS, sheet_pdf, sheet_tiles
 from ._raster import raster, to_pixels
+from ._ros_map import OccupancyMap, arena_of_map, read_map, save_map
 from ._score import SheetScore, TraceScore, score_sheet
 from ._sheet_trials import SheetTrials, trials_on_sheet
 from ._tag_family import CORNER_FAMILY, FAMILIES, tag_bits
@@ -46,6 +51,7 @@ __all__ = [
     "Lens",
     "LiveTrack",
     "Marks",
+    "OccupancyMap",
     "PenMaps",
     "RobotTag",
     "Sheet",
@@ -62,6 +68,7 @@ __all__ = [
     "Tracker",
     "VideoFile",
     "View",
+    "arena_of_map",
     "cells_along",
     "corner_tags",
     "draw_overlay",
@@ -79,8 +86,10 @@ __all__ = [
     "print_tags",
     "raster",
     "read_lens",
+    "read_map",
     "read_photo",
     "rectify",
+    "save_map",
     "save_overlay",
     "score_sheet",
     "separate_pens",

@@ -174,6 +174,14 @@ class Arena:
         own = {name.removeprefix(PREFIX): value for name, value in values.items()}
         return replace(Arena.from_file(self._file().with_numbers(own)), others=self.others)
 
+    def to_toml(self) -> str:
+        """Return the file that keeps it; `load_arena` reads it.
+
+        Raises:
+            ValueError: It has a picture on its floor, which is a file of its own, or numbers that are drawn.
+        """
+        return self._file().to_toml()
+
     def _file(self) -> ArenaFile:
         """The arena in the form of a file."""
         return ArenaFile(

@@ -15,6 +15,7 @@ from ._floor import MOST_PIXELS, Floor, FloorImage
 from ._numbers import Described, NotNegative, Number, Positive, in_si
 from ._obstacle import TAPE_WIDTH, Obstacle
 from ._part import Corner, box_as_corners, why_no_part
+from ._toml import toml_table, toml_value
 from ._units import INCH
 
 MOST_CELLS = 256
@@ -250,6 +251,25 @@ class ArenaFile(Described):
             if entry.obstacle().distance(self.start.x, self.start.y) < 0:
                 raise ValueError(f"start: lies within obstacle {k}. Move one of the two")
         return self
+
+    def to_toml(self) -> str:
+        """Return the file that keeps it; `load_arena` reads it.
+
+        Raises:
+            ValueError: It has a picture on its floor, which is a file of its own, or numbers that are drawn.
+        """
+        if self.floor.image is not None or self.vary:
+            what = "numbers that are drawn" if self.vary else "a picture on its floor"
+            raise ValueError(f"The arena {self.name!r} has {what}, expected none. Copy its own file.")
+        values = self.model_dump(exclude_defaults=True)
+        walls = values.pop("wall", ())
+        tables = {name: values.pop(name) for name in ("floor", "grid") if values.get(name)}
+        lists = {name: values.pop(name, ()) for name in ("obstacle", "light")}
+        rows = [f"    {toml_value([wall[end] for end in ('x1', 'y1', 'x2', 'y2')])}," for wall in walls]
+        parts = [toml_table(values), "\n".join(["wall = [", *rows, "]"])]
+        parts += [f"[{name}]\n{toml_table(table)}" for name, table in tables.items()]
+        parts += [f"[[{name}]]\n{toml_table(row)}" for name, table in lists.items() for row in table]
+        return "\n\n".join(parts) + "\n"
 
     def resolved_grid(self) -> GridEntry:
         """Return the grid; where the file has none, 16 cells along the longer side of the walls, in their middle."""

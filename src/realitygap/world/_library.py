@@ -222,6 +222,10 @@ def load_arena(arena: str | Path) -> Arena:
     """
     if str(arena) == "paper":
         return paper_arena()
+    if str(arena).lower().endswith((".yaml", ".yml")):
+        raise DescriptionError(
+            f"{arena} looks like a map of ROS, expected an arena. Convert it: realitygap arena {arena} -o arena.toml"
+        )
     file, origin = _find("arena", arena_names(), arena)
     if origin.lower().endswith(".svg"):
         text = read_text(file, origin)

@@ -1,0 +1,214 @@
+"""Maps of ROS become arenas, and arenas become maps that map_server reads."""
+
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from realitygap.errors import DescriptionError
+from realitygap.vision import arena_of_map, read_map, save_map
+from realitygap.world import Arena, Grid, Obstacle, Pose, arena_names, is_inside, load_arena, paper_arena
+
+PIXEL = 0.05
+
+
+def write_map(folder, gray, *, ending=".pgm", **values):
+    """A map with this picture, row 0 at the top; its YAML file."""
+    Image.fromarray(np.asarray(gray, np.uint8)).save(folder / f"room{ending}")
+    told = {"image": f"room{ending}", "resolution": PIXEL, "origin": [-1.0, 2.0, 0.0]} | values
+    told = {"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196} | told
+    (folder / "room.yaml").write_text(
+        "\n".join(f"{key}: {value}" for key, value in told.items() if value is not None)
+    )
+    return folder / "room.yaml"
+
+
+def room(height=40, width=60):
+    """A room 2 m high and 3 m wide with walls one pixel thick, around them unknown."""
+    gray = np.full((height, width), 205)
+    gray[2:-2, 2:-2] = 0
+    gray[3:-3, 3:-3] = 254
+    return gray
+
+
+def corners(arena):
+    return {(round(x, 4), round(y, 4)) for wall in arena.walls for x, y in (wall[:2], wall[2:])}
+
+
+LEFT, RIGHT, BOTTOM, TOP = -1 + 3 * PIXEL, -1 + 57 * PIXEL, 2 + 3 * PIXEL, 2 + 37 * PIXEL
+
+
+@pytest.mark.parametrize("ending", [".pgm", ".png"])
+def test_a_room_has_four_walls_where_its_free_space_ends(tmp_path, ending):
+    arena = arena_of_map(write_map(tmp_path, room(), ending=ending))
+    assert arena.name == "room"
+    assert len(arena.walls) == 4
+    assert corners(arena) == {(round(x, 4), round(y, 4)) for x in (LEFT, RIGHT) for y in (BOTTOM, TOP)}
+    assert is_inside(arena, arena.start.x, arena.start.y)
+    assert arena.start.y == pytest.approx((BOTTOM + TOP) / 2, abs=PIXEL)
+
+
+def test_what_stands_in_a_room_has_walls_and_what_is_outside_has_none(tmp_path):
+    gray = room()
+    gray[10:20, 20:30] = 0
+    gray[0, 0] = 254  # free, and out of reach
+    gray[14, 24] = 254  # within the box
+    arena = arena_of_map(write_map(tmp_path, gray))
+    box = {(round(-1 + c * PIXEL, 4), round(4 - r * PIXEL, 4)) for c in (20, 30) for r in (10, 20)}
+    assert corners(arena) >= box
+    assert len(arena.walls) == 8
+
+
+def test_the_origin_moves_and_turns_the_room(tmp_path):
+    arena = arena_of_map(write_map(tmp_path, room(), origin=[5.0, 1.0, math.pi / 2]))
+    xs, ys = zip(*corners(arena), strict=True)
+    assert (min(xs), max(xs)) == (pytest.approx(5 - 37 * PIXEL), pytest.approx(5 - 3 * PIXEL))
+    assert (min(ys), max(ys)) == (pytest.approx(1 + 3 * PIXEL), pytest.approx(1 + 57 * PIXEL))
+
+
+@pytest.mark.parametrize(
+    ("free", "values", "is_free"),
+    [
+        (254, {}, True),
+        (205, {}, False),
+        (205, {"free_thresh": 0.25}, True),
+        (0, {"negate": 1}, True),
+        (254, {"negate": 1}, False),
+        (0, {"negate": True}, True),
+        (10, {"mode": "raw"}, True),
+        (50, {"mode": "raw"}, False),
+        (255, {"mode": "raw"}, False),
+    ],
+)
+def test_a_pixel_is_free_as_its_file_says(tmp_path, free, values, is_free):
+    found = read_map(write_map(tmp_path, [[free, free]], **values))
+    assert found.free.tolist() == [[is_free, is_free]]
+
+
+def test_a_start_chooses_its_room(tmp_path):
+    gray = room()
+    gray[:, 20] = 0  # a wall between a small room and a large one
+    path = write_map(tmp_path, gray)
+    large, small = arena_of_map(path), arena_of_map(path, (-0.5, 3.0, 1.0))
+    assert small.start == Pose(-0.5, 3.0, 1.0)
+    assert max(x for x, _ in corners(small)) == pytest.approx(-1 + 20 * PIXEL)
+    assert min(x for x, _ in corners(large)) == pytest.approx(-1 + 21 * PIXEL)
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.5, 0.785, 1.3])
+def test_a_sloping_line_one_pixel_wide_is_straight_and_has_no_gap(tmp_path, angle):
+    size = 1.0
+    ends = [
+        (size * math.cos(angle + k * math.pi / 2), size * math.sin(angle + k * math.pi / 2)) for k in range(4)
+    ]
+    walls = tuple((*ends[k], *ends[(k + 1) % 4]) for k in range(4))
+    made = Arena("square", walls, Grid(-1, -1, 0.5, 4, 4), Pose(0, 0, 0))
+    save_map(made, tmp_path / "square.yaml")
+    again = arena_of_map(tmp_path / "square.yaml", made.start)
+    assert len(again.walls) <= 8
+    for x1, y1, x2, y2 in again.walls:
+        for share in (0.0, 0.5, 1.0):
+            x, y = x1 + share * (x2 - x1), y1 + share * (y2 - y1)
+            turned = [
+                abs(x * math.cos(a) + y * math.sin(a)) for a in (angle + math.pi / 4, angle - math.pi / 4)
+            ]
+            assert max(turned) == pytest.approx(size / math.sqrt(2), abs=0.035)
+
+
+@pytest.mark.parametrize("name", ["paper", "maze-medium", "maze-hard", "paper-boxes"])
+def test_an_arena_comes_back_from_its_map(tmp_path, name):
+    made = load_arena(name)
+    image = save_map(made, tmp_path / "map.yaml", resolution=0.005)
+    again = arena_of_map(tmp_path / "map.yaml", made.start)
+    assert Image.open(image).format == "PPM"
+    assert again.start == made.start
+    lines = np.array(made.segments)
+    for x1, y1, x2, y2 in again.walls:
+        for share in (0.0, 0.5, 1.0):
+            point = np.array([x1 + share * (x2 - x1), y1 + share * (y2 - y1)])
+            start, along = lines[:, :2], lines[:, 2:] - lines[:, :2]
+            places = np.clip(((point - start) * along).sum(1) / (along**2).sum(1), 0, 1)
+            assert np.linalg.norm(start + places[:, None] * along - point, axis=1).min() < 0.016
+    lengths = [sum(math.dist(wall[:2], wall[2:]) for wall in walls) for walls in (made.segments, again.walls)]
+    assert lengths[1] > 0.9 * lengths[0]
+
+
+def test_a_map_shows_free_unknown_and_occupied_space(tmp_path):
+    made = paper_arena()
+    disc = Obstacle(0.6, 0.3, 0.0, ((0.0, 0.0),), 0.1)
+    made = Arena("disc", made.walls, made.grid, made.start, (disc,))
+    gray = np.array(Image.open(save_map(made, tmp_path / "map.yaml")))
+    assert gray[0, 0] == 205
+    assert set(np.unique(gray)) == {0, 205, 254}
+    found = read_map(tmp_path / "map.yaml")
+    column, row = found.to_image(0.6, 0.3)
+    assert gray[row, column] == 0
+    column, row = found.to_image(made.start.x, made.start.y)
+    assert found.free[row, column]
+    assert gray.shape == (61 + 1 + 8, 107 + 1 + 8)
+
+
+@pytest.mark.parametrize("name", arena_names())
+def test_an_arena_comes_back_from_its_file(tmp_path, name):
+    text = load_arena(name).to_toml()
+    (tmp_path / "again.toml").write_text(text)
+    assert load_arena(tmp_path / "again.toml").to_toml() == text
+
+
+WRONG = {
+    "no map": (
+        {"image": None},
+        "it has no image, expected the YAML file of a map: image, resolution, and origin",
+    ),
+    "resolution": ({"resolution": 0}, "resolution: expected a number from 0.0001 to 1000, came 0"),
+    "no number": ({"resolution": "wide"}, "resolution: expected a number from 0.0001 to 1000, came 'wide'"),
+    "origin": ({"origin": 3}, r"origin: expected \[x, y, yaw\], came 3"),
+    "origin's part": ({"origin": "[0, .nan, 0]"}, "origin: expected a number from -10000 to 10000, came nan"),
+    "thresholds": ({"free_thresh": 0.9}, "free_thresh: expected less than occupied_thresh, 0.65, came 0.9"),
+    "mode": ({"mode": "magic"}, "mode: expected trinary, scale, raw, came 'magic'"),
+    "negate": ({"negate": 2}, "negate: expected a number from 0 to 1, came 2"),
+    "image": ({"image": "other.pgm"}, "image: there is no file .*other.pgm"),
+    "image's name": ({"image": 7}, "image: expected the name of an image file, came 7"),
+    "itself": ({"image": "room.yaml"}, "image: room.yaml is no image that can be read"),
+}
+
+
+@pytest.mark.parametrize(("values", "message"), WRONG.values(), ids=WRONG)
+def test_a_wrong_value_has_one_message(tmp_path, values, message):
+    with pytest.raises(DescriptionError, match=rf"room\.yaml: {message}"):
+        read_map(write_map(tmp_path, room(), **values))
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"image: [", "not YAML"),
+        (b"\xff\xfe\x00", "not a YAML file of a map"),
+        (b"- 1\n- 2\n", "it has no image, resolution, origin"),
+        (b"!!python/object/apply:os.system ['touch owned']\n", "not YAML"),
+    ],
+)
+def test_a_file_that_is_no_map_has_one_message(tmp_path, data, message):
+    (tmp_path / "room.yaml").write_bytes(data)
+    with pytest.raises(DescriptionError, match=message):
+        read_map(tmp_path / "room.yaml")
+
+
+def test_a_map_that_cannot_be_an_arena_has_one_message(tmp_path):
+    with pytest.raises(DescriptionError, match=r"There is no map .*none\.yaml"):
+        read_map(tmp_path / "none.yaml")
+    with pytest.raises(DescriptionError, match="has no free pixel"):
+        arena_of_map(write_map(tmp_path, np.zeros((5, 5))))
+    with pytest.raises(DescriptionError, match=r"The start \(9, 9\) is not in free space"):
+        arena_of_map(write_map(tmp_path, room()), (9, 9, 0))
+    gray = np.full((99, 99), 254)
+    gray[1::2, 1::2] = 0
+    with pytest.raises(
+        DescriptionError, match=r"has 9,\d+ walls with a tolerance of 0\.01 m, expected at most 2,048"
+    ):
+        arena_of_map(write_map(tmp_path, gray), tolerance=0.01)
+    with pytest.raises(DescriptionError, match=r"would have .* pixels, expected at most 8,192 each way"):
+        save_map(paper_arena(), tmp_path / "out.yaml", resolution=1e-4)
+    with pytest.raises(DescriptionError, match="a wall covers the start"):
+        save_map(paper_arena(), tmp_path / "out.yaml", resolution=1.0)

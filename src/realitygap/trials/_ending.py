@@ -21,7 +21,7 @@ class EndReason(StrEnum):
     INTERRUPTED = "interrupted"
     """The program was stopped."""
     RUNNING = "running"
-    """Not yet: the robot drives. After a crash that is all that is known."""
+    """Not ended yet. After a crash, that is all that is known."""
     DRIVEN = "driven"
     """After its last step; a person has yet to say what they saw of it."""
 

@@ -82,23 +82,24 @@ def sentences(summary: dict[str, Any]) -> str:
         else f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
     )
     size = (
-        f"{plan['twins']} twins of each of the families {', '.join(plan['families'])} (seeds from {plan['first_seed']} "
-        f"on), {plan['controllers']} held-out controllers, {plan['trials']} trials of each on both sides; calibrated "
-        f"by {', '.join(str(each) for each in plan['budgets'] if each)} trials; transfer with "
-        f"{plan['transfer_budget']} trials, {plan['replicates']} replicates and "
+        f"The study has {plan['twins']} twins of each of the families {', '.join(plan['families'])} "
+        f"(seeds from {plan['first_seed']} on). It tries {plan['controllers']} held-out controllers, "
+        f"with {plan['trials']} trials of each on both sides. "
+        f"Twins are calibrated by {', '.join(str(each) for each in plan['budgets'] if each)} trials. "
+        f"Transfer has {plan['transfer_budget']} trials, {plan['replicates']} replicates, and "
         f"{plan['fresh_trials']} fresh trials. {done}"
     )
     counted = (
-        f"{summary['n_counted']} of {len(summary['twins'])} twins differ from the simulator as it is by more than "
-        f"three standard errors, and count. Goals are judged at {summary['budget']} trials."
+        f"{summary['n_counted']} of {len(summary['twins'])} twins count: they differ from the uncalibrated simulator "
+        f"by more than three standard errors. Goals are judged at {summary['budget']} trials."
     )
     if (plan["twins"], len(plan["families"])) < (10, 4):
-        counted += " **This is less than the whole study: it shows that all of it works, and nothing else.**"
+        counted += " **This is less than the whole study. It shows only that every part works.**"
     names = {True: [], False: [], None: []}  # type: dict[bool | None, list[str]]
     for goal in goals:
         names[goal["met"]].append(goal["name"])
     verdict = "\n\n".join(
-        f"{word}: {'; '.join(names[met]) or NOTHING}."
+        "\n".join([f"{word}:", "", *(f"* {name}" for name in names[met] or [NOTHING])])
         for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
     )
     parts = [size, counted, verdict, *_of_stretch(summary), *not_counted(summary), *_reasons(summary)]
@@ -223,20 +224,20 @@ def directions(summary: dict[str, Any]) -> str:
     gains = ", ".join(f"`{name}` {value - plain:+.3f}" for name, value in coverage.items() if name != "plain")
     return f"""\
 * Jakobi, Husbands & Harvey (1995): controllers transfer best from a simulator whose noise is about that of the robot,
-  worse from one with less *or more*. Not told here: noise is among what is fitted, and no condition has less or more of
-  it than the fit. `realitygap transfer --strategy noise --strategy posterior` asks it of one target.
-* Miglino, Nafasi & Taylor (1995), on a robot that is to wander over an arena: the correlation of simulated and real
-  performance rises with noise in the simulation. Here SRCC, whose median over twins is {order[0]:.2f} with the
-  simulator as it is, is {order[1]:.2f} calibrated by {summary["budget"]} trials (`track`), and rises on {rises} of
-  {len(pairs)} twins; noise is among what was fitted, and not told apart. Miglino, Lund & Nolfi (1995) bring the two
-  closer by sampling the robot's own sensors and motors, which is what calibrating does.
-* Koos, Mouret & Doncieux (2013): few trials on the target, spent on learning where the simulation is wrong, find
-  controllers that transfer. Here the same few trials change the simulation itself, or choose among champions, or are
-  all that evolution has. In coverage on the twin over `plain`: {gains}. Their own strategy,
-  `transferability`, is not among those of this study.
+  and worse from one with less *or more* noise. This study does not test it: noise is fitted, and no condition has less
+  or more noise than the fit. To test it on one target, run `realitygap transfer --strategy noise --strategy posterior`.
+* Miglino, Nafasi & Taylor (1995), on a robot that should explore an arena: the correlation of simulated and real
+  performance rises with noise in the simulation. Here, the median SRCC over twins is {order[0]:.2f} with the
+  uncalibrated simulator and {order[1]:.2f} after {summary["budget"]} trials (`track`). It rises on {rises} of
+  {len(pairs)} twins. Noise was fitted together with other parameters, so its effect is not separate. Miglino, Lund &
+  Nolfi (1995) bring simulation and robot closer by sampling the robot's own sensors and motors, as calibration does.
+* Koos, Mouret & Doncieux (2013): a few trials on the target are spent on learning where the simulation is wrong. They
+  find controllers that transfer. Here, the same number of trials changes the simulation itself, chooses among
+  champions, or is all that evolution has. Coverage on the twin, less that of `plain`: {gains}.
+  This study does not include their own strategy, `transferability`.
 * Ligot & Birattari (2019): pseudo-reality, another simulator in place of the robot, reproduces which design methods
-  drop in reality. It is what makes this study a test at all, and its limit: an order of methods may carry over to a
-  robot; an amount may not.
+  lose performance in reality. This makes this study a test, and also limits it: an order of methods may be the same
+  on a robot, but an amount may not.
 """
 
 

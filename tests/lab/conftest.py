@@ -199,3 +199,13 @@ def open_advanced(page, field) -> None:
             return
         page.get_by_text("Advanced", exact=True).first.click()
         page.wait_for_timeout(1000)
+
+
+def open_fold(page, title) -> None:
+    """Open a section of the page Trials: a click may come before the page listens, so click until it is open."""
+    fold = page.locator(f'[data-fold="{title}"]')
+    for _ in range(60):
+        if fold.locator(".q-expansion-item__content").first.is_visible():
+            return
+        fold.locator(".lab-fold").click()
+        page.wait_for_timeout(1000)

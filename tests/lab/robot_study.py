@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.study import parse_study
 
+CONNECT = re.compile("Connect robot|Reconnect")
 FAST = "emulator://s2?fluke=2&speed=off"
 SLOW = "emulator://s2?fluke=2&speed=1"
 
@@ -41,9 +43,11 @@ def make_study(root: Path, *, steps: int = 12, blind: bool = True) -> Path:
 
 
 def begin_sitting(page: Any, port: str = FAST, who: str = "anna") -> None:
-    page.get_by_label("Your name").fill(who)
+    name = page.get_by_label("Your name")
+    if name.input_value() != who:  # then it is not shown any more
+        name.fill(who)
     page.get_by_label("Port", exact=True).fill(port)
-    page.get_by_role("button", name="Connect robot").click()
+    page.get_by_role("button", name=CONNECT).click()
 
 
 def start_trial(page: Any, number: int) -> None:

@@ -7,7 +7,7 @@ from axe_playwright_python.sync_playwright import Axe
 
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, PHONE, open_advanced
+from .conftest import DESKTOP, PHONE, open_advanced, open_fold
 from .robot_study import begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
@@ -133,6 +133,7 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
     begin_sitting(page)
     page.get_by_role("button", name="Start trial").wait_for()
     assert faults(page) == []
+    open_fold(page, "Robot")
     page.get_by_role("button", name="Disconnect").click()
     page.get_by_role("button", name="Connect robot").wait_for()
     robot = look("robot")

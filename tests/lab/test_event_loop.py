@@ -10,6 +10,7 @@ import pytest
 
 from realitygap.records import LEDGER_NAME
 
+from .conftest import open_fold
 from .robot_study import make_study
 from .test_counts import begin, plan
 from .test_fuzz import carried_out, page_client
@@ -43,6 +44,7 @@ def test_ledger_that_another_program_writes_blocks_no_page(lab, visit):
         plan(ledger)
     page, other = visit("study/by-robot/trials"), visit("gap")
     page.get_by_label("Your name").fill("anna")
+    open_fold(page, "Notes")
     page.get_by_label("Note on the study").fill("it rains")
     with closing(sqlite3.connect(folder / LEDGER_NAME, isolation_level=None)) as writer:
         writer.execute("BEGIN IMMEDIATE")

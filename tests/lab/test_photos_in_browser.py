@@ -10,7 +10,7 @@ import pytest
 
 from realitygap.records import LEDGER_NAME, Ledger
 
-from .conftest import OUTAGE, PHONE
+from .conftest import OUTAGE, PHONE, open_fold
 from .robot_study import ledger_of, tap
 from .sheets import drive_sheet, photo_of, true_cells
 
@@ -126,6 +126,7 @@ def test_a_second_count_does_not_begin_with_the_photo_by_itself(lab, visit):
     page.get_by_text("2 trials saved.").wait_for()
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
+    open_fold(other, "Score")
     other.get_by_role("button", name="1, red").last.click()
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0

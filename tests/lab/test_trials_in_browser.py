@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import OUTAGE, PHONE, check_uncovered, open_advanced
+from .conftest import DESKTOP, OUTAGE, PHONE, check_uncovered, open_advanced, open_fold
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
+from .sheets import drive_sheet
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +44,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
         count(page, first, 0, 1, 13)
         count(page, first + 1, 0, 12)
         page.get_by_role("button", name="Close generation").click()
-    page.get_by_text("All robot runs are complete.").wait_for()
+    page.get_by_text("All 4 trials scored.").wait_for()
     with ledger_of(lab.root) as ledger:
         assert [(each.cells, each.is_closed) for each in ledger.trials()] == 2 * [
             ((0, 1, 13), True),
@@ -52,6 +53,60 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
         assert {row["who"] for row in ledger.scores()} == {"anna"}
         assert all(len(ledger.record(number).commands) == 12 for number in range(1, 5))
         assert ledger.conditions()["coverage-robot"]["label"] == "EMULATED"
+
+
+def open_folds(page) -> list[str]:
+    page.wait_for_timeout(500)  # until nothing slides any more
+    return page.locator("[data-fold].q-expansion-item--expanded").evaluate_all(
+        "all => all.map((it) => it.dataset.fold)"
+    )
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, size):
+    make_study(lab.root, steps=20)
+    page = visit(PAGE, size=size)
+
+    def check(step: str, action: str, folds: list[str]) -> None:
+        page.locator(".lab-steps [aria-current=step]", has_text=step).wait_for()
+        button = page.get_by_role("button", name=action)
+        button.wait_for()
+        assert open_folds(page) == folds
+        check_uncovered(button)
+
+    page.get_by_text("No trials yet. Connect a robot to drive 4 trials.").wait_for()
+    check("Place", "Connect robot", ["Robot"])
+    begin_sitting(page, "emulator://s2?fluke=2&speed=2")
+    check("Place", "Start trial", [])
+    page.get_by_role("button", name="Start trial").click()
+    check("Drive", "Abort trial", [])
+    start_trial(page, 2)
+    page.get_by_text("is full").wait_for()
+    check("Score", "Save score", ["Score"])
+    check_uncovered(page.get_by_role("button", name="Stop robot"))
+    for number in (1, 2):
+        count(page, number, 0)
+    check("Close", "Close generation", [])
+
+
+def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
+    drive_sheet(lab.root)
+    page = visit(PAGE)
+    page.get_by_label("Your name").fill("anna")
+    page.wait_for_function("() => document.cookie.includes('realitygap_who')")
+    page.wait_for_timeout(1000)  # the grid is drawn again for another name
+    grid = page.get_by_role("grid", name="Cells crossed in trial 1")
+    assert grid.get_by_role("row").count() == 6
+    page.locator('[data-counting="1"] [data-cell="0"]').focus()
+    for key in ("ArrowUp", "ArrowRight", "ArrowRight", "Space"):
+        page.keyboard.press(key)
+    grid.get_by_role("gridcell", name="column 3, row 2, crossed", exact=True).wait_for()
+    assert page.evaluate("document.activeElement.dataset.cell") == "14"
+    page.get_by_text("1 of 72 cells").wait_for()
+    page.keyboard.press("Enter")
+    page.get_by_text("Trial 1: 1 cells saved").wait_for()
+    with ledger_of(lab.root) as ledger:
+        assert ledger.trial(1).cells == (14,)
 
 
 def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
@@ -162,6 +217,7 @@ def test_two_people_count_and_their_agreement_is_told(lab, visit):
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0
     count(other, 1, 0, 1, 2)
+    open_fold(other, "All trials")
     other.get_by_text("1 trial counted by two people, 72 cells: 98.6 % judged alike.").wait_for()
 
 
@@ -191,6 +247,7 @@ def test_the_arena_is_drawn_where_cells_are(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
+    page.wait_for_timeout(800)  # the page brings the grid into view
     page.get_by_role("button", name="Save score").scroll_into_view_if_needed()
     first, last = (page.locator(f'[data-counting] [data-cell="{cell}"]').bounding_box() for cell in (0, 71))
     assert first["x"] < last["x"]
@@ -217,7 +274,7 @@ def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
     page.get_by_role("combobox", name="Scored by").click()
     page.get_by_role("option", name="The emulator").click()
     begin_sitting(page)
-    page.get_by_text("All robot runs are complete.").wait_for()
+    page.get_by_text("All 4 trials scored.").wait_for()
     with ledger_of(lab.root) as ledger:
         assert {row["who"] for row in ledger.scores()} == {"witness"}
 
@@ -229,7 +286,9 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
     start_trial(page, 1)
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
+    open_fold(page, "Notes")
     page.get_by_label("Note on the study").fill("half a note")
+    open_fold(page, "All trials")
     page.get_by_role("button", name="Score trial 2").click()
     page.locator('[data-counting="2"]').wait_for()
     page.get_by_role("button", name="Score trial 1").focus()

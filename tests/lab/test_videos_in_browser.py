@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .conftest import open_advanced
+from .conftest import open_advanced, open_fold
 from .robot_study import begin_sitting, ledger_of, make_study, tap
 from .sheets import drive_paths, film_of, true_cells
 
@@ -19,6 +19,7 @@ def test_a_trial_is_found_in_a_video_and_its_cells_are_corrected_and_entered(lab
     film_of(lab.root, number, paths[number], lab.root / "film.mp4")
     page = visit(PAGE)
     page.get_by_label("Your name").fill("anna")
+    open_fold(page, "Score from photo or video")
     page.get_by_text("Score from a video").click()
     page.get_by_role("button", name="Track video").click()
     page.get_by_text(f"Found in the video: trials {number}.").wait_for()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import LedgerError
+from realitygap.platforms import emulated_robots, is_physical
 from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial
 from realitygap.runs import Condition
 from realitygap.world import Arena
@@ -102,6 +103,20 @@ class Counts:
         self._drafts: dict[tuple[int, str, ScoreRole], Draft] = {}
         self._looking = threading.Lock()
         self._keeper = ThreadPoolExecutor(1)  # one: drafts are written in the order of the taps
+
+    @property
+    def n_planned(self) -> int:
+        """Number of trials in the whole study on a robot, without those that are repeated."""
+        neat = [each["neat"] for each in self._settings.values() if is_physical(each)]
+        return int(self.description["replicates"]) * sum(
+            int(each["population"]) * int(each["generations"]) for each in neat
+        )
+
+    @property
+    def emulated_robot(self) -> str:
+        """Port of an emulated robot of the platform that drives; empty if the platform has none."""
+        names = [each["platform"] for each in self._settings.values() if is_physical(each)]
+        return next((port for port in emulated_robots() if port.partition(":")[0] in names), "")
 
     def look(self) -> list[CountedTrial]:
         """Read the trials again if the ledger has changed, and their proposals likewise; return all trials.

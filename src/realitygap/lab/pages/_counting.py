@@ -17,7 +17,7 @@ from realitygap.lab._photos import Photos
 from realitygap.lab._proposals import Proposal
 from realitygap.records import ScoreRole
 
-from ._frame import hint, section, text_of
+from ._frame import hint, text_of
 from ._grid import CellGrid, ink_of
 from ._notices import attempt
 
@@ -54,7 +54,6 @@ class Counting:
 
     async def show(self) -> None:
         """Show it."""
-        section("Score")
         self._lists = ui.refreshable(self._show_lists)
         self._card = ui.refreshable(self._show_card)
         self._lists()
@@ -182,13 +181,12 @@ class Counting:
         self._draft, arena, proposals = loaded.draft, loaded.arena, loaded.proposals
         chosen = next((one for one in proposals if one.mark == self._draft.proposal), None)
         with ui.card().classes("lab-card").props(f'data-counting="{each.number}"'):
-            with ui.row().classes("lab-row"):
+            with ui.row().classes("lab-row no-wrap"):
                 ui.element("span").classes("lab-pen").style(f"background: {ink_of(each.pen)}")
                 ui.label(f"Trial {each.number}: the {each.pen} line on sheet {each.trial.sheet}").classes(
                     "lab-section"
                 )
-            hint(each.title)
-            hint(_ROLES[role])
+            hint(f"{each.title}. {_ROLES[role]}")
             for one in proposals:
                 self._show_proposal(each, role, one, is_chosen=one is chosen)
             n_marked = ui.label(self._said(arena.grid.n_cells)).props('role="status"')
@@ -219,7 +217,9 @@ class Counting:
             grid.on("save", lambda: self._enter(each, role))
             hint(_HOW + (_FRAMED if chosen and chosen.doubtful else ""))
             with ui.row().classes("lab-row"):
-                ui.button("Save score", on_click=lambda: self._enter(each, role)).props("unelevated no-caps")
+                ui.button("Save score", on_click=lambda: self._enter(each, role)).props(
+                    "unelevated no-caps"
+                ).classes("lab-primary")
 
                 async def clear() -> None:
                     put(Draft([]))

@@ -42,7 +42,7 @@ class Driving:
             self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
             ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
                 "unelevated no-caps"
-            )
+            ).classes("lab-primary")
         ui.timer(LIVE_S, self._look)
 
     def _look(self) -> None:

@@ -113,6 +113,12 @@ class SheetPhotos:
 
         self._drafts = await run.io_bound(read) or {}
 
+    @property
+    def has_photos(self) -> bool:
+        """Whether a sheet with trials to score has a photo."""
+        waiting = {each.trial.sheet for each in self._counts.trials() if each.trial.state == "driven"}
+        return any(photo.sheet in waiting for photo in self._photos.photos())
+
     def sheets(self) -> list[int]:
         """Those with lines that may be counted, once or twice."""
         found = {

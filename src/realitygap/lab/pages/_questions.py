@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
@@ -16,9 +15,7 @@ from ._grid import CellGrid, ink_of
 from ._notices import notify
 
 
-def show_question(
-    job: StudyJob, ask: dict[str, Any], counts: Counts, *, may: bool, jump: Callable[[int], Any]
-) -> None:
+def show_question(job: StudyJob, ask: dict[str, Any], counts: Counts, *, may: bool) -> None:
     """Show what a study waits for.
 
     Args:
@@ -26,7 +23,6 @@ def show_question(
         ask: What it asks.
         counts: Its trials.
         may: Whether this visitor may answer.
-        jump: Shows a trial to be counted.
     """
     with ui.card().classes("lab-card lab-question").props(f'role="status" data-asked="{ask["number"]}"'):
         show = {
@@ -38,16 +34,14 @@ def show_question(
             "score": _score,
             "close": _close,
         }[ask["question"]]
-        show(_Asked(job, ask, counts, may, jump))
+        show(_Asked(job, ask, counts, may))
 
 
 class _Asked:
     """A question, and who is asked."""
 
-    def __init__(
-        self, job: StudyJob, ask: dict[str, Any], counts: Counts, may: bool, jump: Callable[[int], Any]
-    ) -> None:
-        self.job, self.ask, self.counts, self.may, self.jump = job, ask, counts, may, jump
+    def __init__(self, job: StudyJob, ask: dict[str, Any], counts: Counts, may: bool) -> None:
+        self.job, self.ask, self.counts, self.may = job, ask, counts, may
 
     @property
     def card(self) -> dict[str, Any]:
@@ -64,7 +58,7 @@ class _Asked:
         """One that answers."""
         ui.button(text, on_click=lambda: self.answer(**values)).props(
             ("unelevated" if is_main else "outline") + " no-caps"
-        ).set_enabled(self.may)
+        ).classes("lab-primary" if is_main else "").set_enabled(self.may)
 
 
 def _meet(asked: _Asked) -> None:
@@ -85,6 +79,9 @@ def _accept(asked: _Asked) -> None:
 def _settle(asked: _Asked) -> None:
     _title(asked.card)
     ui.label(f"The trial was interrupted: {asked.ask['problem']}.").classes("lab-problem")
+    step = asked.job.step
+    if step is not None:
+        ui.label(f"Last recorded step: {step['step'] + 1} of {step['n_steps']}.")
     ui.label("Void: the trial is repeated. Driven: it counts, with the line drawn so far.")
     with ui.row().classes("lab-row"):
         asked.button("Void and repeat", verdict="void")
@@ -101,7 +98,7 @@ def _place(asked: _Asked) -> None:
     card = asked.card
     arena = asked.counts.arena(asked.counts.trial(card["trial"]).trial.condition)
     _title(card)
-    with ui.row().classes("lab-row"):
+    with ui.row().classes("lab-row no-wrap"):
         ui.element("span").classes("lab-pen").style(f"background: {ink_of(card['pen'])}")
         ui.label(f"Pen: {card['pen']}. Sheet {card['sheet']}. {card['n_left']} left in this generation.")
     if asked.ask["is_placed"]:
@@ -113,16 +110,10 @@ def _place(asked: _Asked) -> None:
 
 
 def _score(asked: _Asked) -> None:
-    trials = asked.ask["trials"]
-    ui.label("Mark the cells that the lines cross").classes("lab-section")
     what = f"Sheet {asked.ask['sheet']} is full." if asked.ask["is_full"] else "The trial has ended."
-    ui.label(f"{what} Score the trials below, on this page or another. The study then continues.")
-    with ui.row().classes("lab-row"):
-        for number in trials:
-            ui.button(f"Trial {number}", on_click=lambda number=number: asked.jump(number)).props(
-                "outline no-caps"
-            )
-    asked.button("Later", is_main=False)
+    with ui.row().classes("lab-row no-wrap"):
+        ui.label(f"{what} Score its trials, on this page or another. The study then continues.")
+        asked.button("Later", is_main=False)
 
 
 def _close(asked: _Asked) -> None:

@@ -56,7 +56,7 @@ class Stop:
         lab = self._lab
         if not (port := lab.robot_port):
             return "", lab.is_just_stopped
-        name = "Emulated robot" if port.startswith("emulator://") else f"Robot on {port}"
+        name = "Emulated robot" if "emulator://" in port else f"Robot on {port}"
         other = "" if lab.may_operate(self._visitor) else f"{lab.operator_name} is operating · "
         return other + name, lab.is_just_stopped
 

@@ -15,7 +15,6 @@ from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
 from realitygap.lab._problem import FieldError
 from realitygap.lab._study_job import StudyJob
-from realitygap.platforms import emulated_robots
 from realitygap.report import measure_agreement
 from realitygap.robots import list_ports
 from realitygap.robots.scribbler import PortGuess
@@ -23,7 +22,7 @@ from realitygap.robots.scribbler import PortGuess
 from ._counting import Counting
 from ._driving import Driving
 from ._fields import Form
-from ._frame import LONGEST_NAME, framed, remember_who, section, text_of, visitor_of
+from ._frame import LONGEST_NAME, framed, remember_who, text_of, visitor_of
 from ._handover import show_holder
 from ._notices import WRONG, attempt
 from ._part import Part, watching
@@ -32,6 +31,7 @@ from ._questions import show_question
 from ._videos import Videos
 
 EMULATED = "emulator://s2?fluke=2"
+"""Emulated robot of a study whose platform has none."""
 _STEPS = ("Place", "Drive", "Score", "Close")
 _STEP_OF = {"settle": "Drive", "go on": "Drive", "score": "Score", "close": "Close"}
 """Steps of the questions that do not belong to placing the robot."""
@@ -41,6 +41,10 @@ _SCORERS = {
     "witness": "The emulator; only for emulated robots",
 }
 _WHEN = {"sheet": "When a sheet is full", "trial": "After each trial"}
+_TO_GRID = (
+    "setTimeout(() => document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'}), 300)"
+)
+"""Bring the grid into view once its section is open."""
 _NUMBER = """
 <q-td :props="props">
   <q-btn v-if="props.row.counts" outline dense no-caps padding="4px 12px" :label="String(props.value)"
@@ -84,9 +88,10 @@ class _Page:
         self._counting = Counting(lab, counts, photos, lambda: self._visitor.who)
         self._videos = Videos(lab, counts, self._look_at)
         self._sheets = SheetPhotos(lab, counts, photos, lambda: self._visitor.who, self._look_at)
-        self._is_looking = False
+        self._is_looking = self._is_shown = False
         self._can_begin: _Beginning | None = None
         self._agreement = ""
+        self._emulated = counts.emulated_robot or EMULATED
 
     async def show(self) -> None:
         await self._load()
@@ -94,10 +99,47 @@ class _Page:
         self._robot = Part(self._robot_stand, self._show_robot)
         self._asked = Part(self._asked_stand, self._show_asked)
         self._ending = Part(self._may_end, self._show_ending)
-        self._steps = Part(self._step, _show_steps)
-        self._steps.show()
-        with ui.element("section").props('aria-label="Current step"'):
+        self._steps = Part(lambda: (self._step(), self._job() is None), self._turn_to)
+        with ui.element("div").classes("lab-steps-bar"):
+            self._steps.show()
+        with ui.element("div").classes("lab-wide") as self._name_box:
+            self._show_name()
+        self._name_box.set_visibility(not self._visitor.who)
+        self._holder = Part(lambda: self._robot_stand().operator, self._show_holder)
+        self._holder.show()
+        with ui.element("section").props('aria-label="Current step"').classes("lab-current"):
             self._asked.show()
+        with self._fold("Score") as self._score_fold:
+            await self._counting.show()
+        with self._fold("Robot") as self._robot_fold:
+            for part in (self._robot, self._ending):
+                part.show()
+        self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
+        self._listed = self._counts.trials()
+        self._photos, self._filmed = ui.refreshable(self._sheets.show), ui.refreshable(self._videos.show)
+        with self._fold("Score from photo or video") as self._photo_fold:
+            self._photos()
+            self._filmed()
+        self._table = ui.refreshable(self._show_table)
+        with self._fold("All trials") as self._table_fold:
+            self._table()
+        self._known = Part(lambda: self._visitor.who, self._show_known)
+        with self._fold("Notes"):
+            self._known.show()
+            self._show_note()
+        self._name_folds()
+        self._open_step(self._step())
+        self._is_shown = True
+        watching(self._lab, self._look)
+        ui.timer(1.0, self._look)  # another program may write to the ledger
+
+    def _fold(self, title: str) -> ui.expansion:
+        """A section that is open only during its step, or if the visitor opens it."""
+        return (
+            ui.expansion(title).classes("lab-expansion").props(f'header-class="lab-fold" data-fold="{title}"')
+        )
+
+    def _show_name(self) -> None:
         name = Form().text(
             "who",
             "Your name",
@@ -106,29 +148,48 @@ class _Page:
         )
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
-        with ui.element("section").props('aria-label="Robot"').classes("lab-part"):
-            section("Robot")
-            for part in (self._robot, self._ending):
-                part.show()
-        self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
-        self._listed = self._counts.trials()
-        self._photos = ui.refreshable(self._sheets.show)
-        self._photo_part = ui.element("section").props('aria-label="Photos of sheets"').classes("lab-part")
-        with self._photo_part:
-            section("Score from a photo")
-            self._photos()
-        self._photo_part.set_visibility(bool(self._sheets.sheets()))
-        self._filmed = ui.refreshable(self._videos.show)
-        with ui.element("section").props('aria-label="Video"'):
-            self._filmed()
-        with ui.element("section").props('aria-label="Score"').classes("lab-part"):
-            await self._counting.show()
-        self._table = ui.refreshable(self._show_table)
-        with ui.element("section").props('aria-label="All trials"').classes("lab-part"):
-            self._table()
-            self._show_note()
-        watching(self._lab, self._look)
-        ui.timer(1.0, self._look)  # another program may write to the ledger
+
+    def _show_known(self, who: str) -> None:
+        if who:
+            with ui.row().classes("lab-row"):
+                ui.label(f"Scores are saved as {who}.")
+                ui.button("Change name", on_click=lambda: self._name_box.set_visibility(True)).props(
+                    "flat no-caps"
+                )
+
+    def _name_folds(self) -> None:
+        """Put the number of trials into the titles of the sections."""
+        trials = self._counts.trials()
+        n_waiting = sum(each.trial.state == "driven" for each in trials)
+        titles = {
+            self._score_fold: f"Score: {n_waiting} to score" if n_waiting else "Score",
+            self._table_fold: f"All trials: {len(trials)}" if trials else "All trials",
+            self._robot_fold: "Connect a robot" if self._job() is None else "Robot",
+        }
+        for fold, title in titles.items():
+            if fold.text != title:
+                fold.text = title
+        self._photo_fold.set_visibility(bool(self._sheets.sheets()) or self._videos.has_job)
+
+    def _turn_to(self, at: tuple[str, bool]) -> None:
+        """Show the steps; open the section of the current one and close the others."""
+        step, _ = at
+        _show_steps(step)
+        if self._is_shown:
+            self._name_box.set_visibility(not self._visitor.who)
+            self._open_step(step)
+            ui.run_javascript(_TO_GRID if step == "Score" else "scrollTo(0, 0)")
+
+    def _open_step(self, step: str) -> None:
+        is_free = self._job() is None
+        for fold, is_current in (
+            (self._score_fold, step == "Score"),
+            (self._robot_fold, is_free and step == "Place"),
+        ):
+            fold.value = is_current
+            fold.classes(**{"add" if is_current else "remove": "lab-current"})
+        if step == "Score" and self._sheets.has_photos:
+            self._photo_fold.value = True
 
     async def _load(self) -> None:
         """Read what the disk has for this page."""
@@ -156,26 +217,29 @@ class _Page:
             self._is_looking = False
 
     async def _show_changes(self) -> None:
-        for part in (self._robot, self._asked, self._ending, self._steps):
+        for part in (self._robot, self._asked, self._ending, self._steps, self._known, self._holder):
             part.look()
         if self._counts.trials() is not self._listed:
             self._listed = self._counts.trials()
             await self._counting.refresh()
             self._table.refresh()
+        self._name_folds()
         await self._counting.look()
         if self._pictured != (now := self._sheets.stand()):
             self._pictured = now
             self._photos.refresh()
-            self._photo_part.set_visibility(bool(self._sheets.sheets()))
+            if self._sheets.has_photos:
+                self._photo_fold.value = True
         if self._tracked != (now := self._videos.stand()):
             self._tracked = now
             self._filmed.refresh()
 
     async def _look_at(self, number: int) -> None:
-        """Count this trial, below."""
+        """Show the grid of this trial."""
         with ui.context.client:  # the button that was pressed may be gone by then
+            self._score_fold.value = True
             await self._counting.choose(number)
-            ui.run_javascript("document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})")
+            ui.run_javascript(_TO_GRID)
 
     async def _named(self, who: str) -> None:
         self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
@@ -223,35 +287,52 @@ class _Page:
             _show_preflight(now.preflight)
         if now.said:
             ui.label(now.said).classes("lab-problem").props('role="status"')
-        if now.operator:
+
+    def _show_holder(self, operator: str) -> None:
+        if operator:
             show_holder(self._lab, self._visitor)
 
     def _asked_stand(self) -> _AskedStand:
         job = self._job()
         if job is None:
-            return _AskedStand(None)
+            is_complete = self._can_begin is not None and self._can_begin.is_complete
+            return _AskedStand(None, n_trials=len(self._counts.trials()), is_complete=is_complete)
         ask = job.ask
         return _AskedStand(job, ask, None if ask is not None else job.card, self._may())
 
     def _step(self) -> str:
-        """The step that the study is at; empty if nothing waits and no robot is connected."""
+        """The step that the study is at; empty if all trials are complete."""
         state = self._asked_stand()
         if state.ask is not None:
             return _STEP_OF.get(state.ask["question"], "Place")
         if state.job is not None:
             return "Drive" if state.card is not None else "Place"
-        return "Score" if any(each.trial.state == "driven" for each in self._counts.trials()) else ""
+        if any(each.trial.state == "driven" for each in self._counts.trials()):
+            return "Score"
+        return "" if self._can_begin is None or self._can_begin.is_complete else "Place"
 
     def _show_asked(self, now: _AskedStand) -> None:
         """Show the question, or the trial that is being driven."""
         if now.job is None:
-            return
-        if now.ask is not None:
-            show_question(now.job, now.ask, self._counts, may=now.may, jump=self._counting.choose)
+            self._show_rest()
+        elif now.ask is not None:
+            show_question(now.job, now.ask, self._counts, may=now.may)
         elif now.card is not None:
             Driving(now.job, now.card, self._counts).show()
         else:
             ui.label("Preparing the next trial…").props('role="status"')
+
+    def _show_rest(self) -> None:
+        """Say how far the trials are while no robot is connected."""
+        if self._can_begin is not None and self._can_begin.is_complete:
+            n_scored = sum(each.trial.state == "scored" for each in self._counts.trials())
+            with ui.row().classes("lab-row"):
+                ui.label(f"All {n_scored} trials scored.").props('role="status"')
+                ui.button("Open results", on_click=lambda: ui.navigate.to(f"/study/{self._name}")).props(
+                    "unelevated no-caps"
+                )
+        elif not self._counts.trials():
+            ui.label(f"No trials yet. Connect a robot to drive {self._counts.n_planned} trials.")
 
     def _may_end(self) -> _AskedStand:
         return _AskedStand(self._job(), may=self._may())
@@ -265,11 +346,10 @@ class _Page:
         if self._can_begin is None:
             return
         if self._can_begin.is_complete:
-            ui.label("All robot runs are complete.")
             return
-        if not self._counts.trials():
-            ui.label("No trials yet. Connect a robot to drive trials.")
         found = self._can_begin.ports
+        last = self._lab.jobs.get(self._name)
+        is_lost = last is not None and last.is_failed and bool(last.port)
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         self._form = form = Form()
         form.summary()
@@ -281,20 +361,23 @@ class _Page:
             self._lab.take_robot(self._visitor)
 
         def emulate() -> Any:
-            port.value = EMULATED
+            port.value = self._emulated
             return form.submit(begin)
 
         with ui.element("div").classes("lab-form"):
             port = form.text(
                 "port",
                 "Port",
-                likely[0] if likely else EMULATED,
-                options=[*(guess.port for guess in found), *emulated_robots()],
+                last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
+                options=[*(guess.port for guess in found), self._emulated],
                 is_needed=True,
                 explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",
             )
             with ui.row().classes("lab-row"):
-                ui.button("Connect robot", on_click=lambda: form.submit(begin)).props("unelevated no-caps")
+                text = "Reconnect" if is_lost else "Connect robot"
+                ui.button(text, on_click=lambda: form.submit(begin)).props("unelevated no-caps").classes(
+                    "lab-primary"
+                )
                 ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
             with ui.expansion("Advanced").classes("lab-expansion"):
                 form.choice("counts", "Scored by", _SCORERS, "page")
@@ -324,7 +407,6 @@ class _Page:
             return str(error)
 
     def _show_table(self) -> None:
-        section("All trials")
         found = self._counts.trials()
         if not found:
             ui.label("No trials yet.")
@@ -363,11 +445,7 @@ class _Page:
 
     async def _choose(self, number: Any) -> None:
         if type(number) is int:
-            with ui.context.client:  # the button that was pressed may be gone by then
-                await self._counting.choose(number)
-                ui.run_javascript(
-                    "document.querySelector('[data-counting]')?.scrollIntoView({block: 'center'})"
-                )
+            await self._look_at(number)
 
     def _show_note(self) -> None:
         note = Form().text("note", "Note on the study", explanation="Press Enter to save the note.")
@@ -414,6 +492,8 @@ class _AskedStand:
     ask: dict[str, Any] | None = None
     card: dict[str, Any] | None = None
     may: bool = False
+    n_trials: int = 0
+    is_complete: bool = False
 
 
 def _show_steps(current: str) -> None:

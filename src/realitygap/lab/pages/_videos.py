@@ -38,6 +38,11 @@ class Videos:
         shown = None if job is None else (id(job), job.outcome)
         return shown, bool(self._waiting())
 
+    @property
+    def has_job(self) -> bool:
+        """Whether a video is tracked, or was."""
+        return self._job() is not None
+
     def show(self) -> None:
         """Show it; where no line waits to be counted, only how a video went."""
         job = self._job()

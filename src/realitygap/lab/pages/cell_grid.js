@@ -16,17 +16,18 @@ export default {
     name: String,
   },
   template: `
-    <svg :viewBox="box" class="lab-grid" :role="locked ? 'img' : 'group'" :aria-label="name" ref="svg"
+    <svg :viewBox="box" class="lab-grid" :role="locked ? 'img' : 'grid'" :aria-label="name" ref="svg"
          :class="{ 'lab-over-picture': picture }" @pointerdown="down" @pointermove="move" @pointerup="up" @pointercancel="up">
-      <image v-if="picture" :href="picture.address" :x="picture.left" :y="rows - picture.top" :width="picture.width"
+      <image v-if="picture" aria-hidden="true" :href="picture.address" :x="picture.left" :y="rows - picture.top" :width="picture.width"
              :height="picture.height" preserveAspectRatio="none" />
       <g :transform="'translate(0,' + rows + ') scale(1,-1)'">
-        <rect v-for="cell in columns * rows" :key="cell - 1" :data-cell="cell - 1"
-              :x="(cell - 1) % columns" :y="Math.floor((cell - 1) / columns)" width="1" height="1"
-              :class="['lab-cell', marked.has(cell - 1) ? 'lab-marked' : '', doubtful(cell - 1) ? 'lab-doubtful' : '']"
-              :role="locked ? null : 'checkbox'" :aria-checked="locked ? null : String(marked.has(cell - 1))"
-              :aria-label="locked ? null : label(cell - 1)" :tabindex="locked ? null : (cell - 1 === focus ? 0 : -1)"
-              @keydown="key" />
+        <g v-for="row in rows" :key="row" :role="locked ? null : 'row'">
+          <rect v-for="cell in columns" :key="cell" :data-cell="number(row, cell)" :x="cell - 1" :y="row - 1" width="1" height="1"
+                :class="['lab-cell', marked.has(number(row, cell)) ? 'lab-marked' : '', doubtful(number(row, cell)) ? 'lab-doubtful' : '']"
+                :role="locked ? null : 'gridcell'" :aria-selected="locked ? null : String(marked.has(number(row, cell)))"
+                :aria-label="locked ? null : label(number(row, cell))"
+                :tabindex="locked ? null : (number(row, cell) === focus ? 0 : -1)" @keydown="key" />
+        </g>
         <line v-for="(wall, k) in walls" :key="'w' + k" :x1="wall[0]" :y1="wall[1]" :x2="wall[2]" :y2="wall[3]"
               class="lab-wall" />
         <polyline v-for="(piece, k) in pieces" :key="'p' + k" :points="joined(piece)" class="lab-followed" />
@@ -57,9 +58,11 @@ export default {
   methods: {
     arrow(pose) { return `translate(${pose[0]},${pose[1]}) rotate(${(pose[2] * 180) / Math.PI})`; },
     joined(line) { return line.map((at) => at.join(",")).join(" "); },
+    number(row, column) { return (row - 1) * this.columns + column - 1; },
     label(cell) {
       const place = `column ${(cell % this.columns) + 1}, row ${Math.floor(cell / this.columns) + 1}`;
-      return this.doubtful(cell) ? `${place}, ${Math.round(100 * this.sure[cell])} % sure` : place;
+      const state = this.marked.has(cell) ? "crossed" : "not crossed";
+      return `${place}, ${state}${this.doubtful(cell) ? `, ${Math.round(100 * this.sure[cell])} % sure` : ""}`;
     },
     doubtful(cell) { return this.sure && this.sure[cell] !== undefined && this.sure[cell] < 0.9; },
     at(event) {

@@ -31,17 +31,25 @@ TABLES = HERE / "data" / "reproduced"
 FIGURES = HERE / "images" / "reproduced"
 INPUTS_STUDY = HERE.parent / "examples" / "constant-input.toml"
 WANTED_TABLES = (
-    "table-2",
-    "table-3",
-    "table-4",
-    "table-5",
-    "table-6",
-    "table-7",
-    "table-8",
-    "table-9",
+    "table-results",
+    "table-comparisons",
+    "table-plateaus",
+    "table-champions",
+    "table-spread",
+    "table-variety",
+    "table-chance",
+    "table-audit",
     "structures",
 )
-WANTED_FIGURES = ("figure-4", "figure-5", "figure-6a", "figure-8", "figure-7")
+WANTED_FIGURES = {
+    "figure-4": "figure-coverage",
+    "figure-5": "figure-individuals-coverage",
+    "figure-6a": "figure-paths-0",
+    "figure-8": "figure-individuals-novelty",
+    "figure-7": "figure-networks",
+}
+"""Names of the page's figures, which are the paper's numbers, and those of the report's files."""
+
 CELLS = 72
 NEAT_SETS = ("rosenzweig-remy", "rosenzweig-remy-neat-python")
 RUNS_OF_SETS = 1000
@@ -64,7 +72,8 @@ def make(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
     tables |= {"published.csv": published(result.folder), "constant-input.csv": comparisons(inputs.folder)}
     tables["neat-sets.csv"] = neat_sets({name: _with_settings(name, folder) for name in NEAT_SETS})
     figures = {
-        f"{name}.svg": (folder / "figures" / f"{name}.svg").read_text("utf-8") for name in WANTED_FIGURES
+        f"{number}.svg": (folder / "figures" / f"{name}.svg").read_text("utf-8")
+        for number, name in WANTED_FIGURES.items()
     }
     return tables, figures
 

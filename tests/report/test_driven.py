@@ -88,10 +88,9 @@ def test_the_report_shows_the_robots_arm_beside_the_simulated_ones(folder, tmp_p
     assert "6 of 8 runs are there" in page
     assert "EMULATED, n = 1" in page
     assert "driven over the robot’s own protocol, with a simulated robot behind it" in page
-    for figure in ("figure-4", "figure-5", "figure-8"):
-        assert f'id="{figure}"' in page
-    for figure, condition in (("5", "robot"), ("8", "searching")):
-        drawn = page.partition(f'id="figure-{figure}"')[2].partition("</figure>")[0]
+    for search, condition, counterpart in (("coverage", "robot", "5"), ("novelty", "searching", "8")):
+        drawn = page.partition(f'id="figure-individuals-{search}"')[2].partition("</figure>")[0]
+        assert f"Counterpart of the paper’s Figure {counterpart}." in drawn
         assert f"Condition {condition}, run 0" in drawn, (
             "as in the paper, whose Figures 5 and 8 the robot drew"
         )

@@ -255,7 +255,7 @@ def test_notebooks_show_arena_robot_genome_and_trajectory(tiny_study):
 def test_rows_without_networks_have_a_page(out, no_replay):
     folder = write_results(out, [describe("c")], {"c": random_runs(6)})
     page = write_report(folder).read_text("utf-8")
-    assert "Figure 5." in page
+    assert 'id="figure-individuals-coverage"' in page
 
 
 @pytest.mark.parametrize(
@@ -272,20 +272,27 @@ def test_a_drawing_is_saved_by_its_ending_and_always_alike(tiny_study, tmp_path,
 def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     page = write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures").read_text("utf-8")
     names = {each.name for each in (tmp_path / "figures").iterdir()}
-    for number in ("2", "4", "5", "6a", "6b", "7", "8", "9", "10", "11", "12"):
-        assert {f"figure-{number}.svg", f"figure-{number}.pdf"} <= names
-        root = ET.fromstring((tmp_path / "figures" / f"figure-{number}.svg").read_bytes())
+    figures = re.findall(r'<figure id="(figure-[^"]+)"', page)
+    assert len(figures) == 12
+    for figure in figures:
+        root = ET.fromstring((tmp_path / "figures" / f"{figure}.svg").read_bytes())
         assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
-        assert (tmp_path / "figures" / f"figure-{number}.pdf").read_bytes().startswith(b"%PDF-")
+        assert (tmp_path / "figures" / f"{figure}.pdf").read_bytes().startswith(b"%PDF-")
     tables = {f"{name}.csv" for name, _, _ in tables_of(page)}
     assert tables <= names
-    assert {"table-1.csv", "table-2.csv", "structures.csv", "data-species.csv", "figures.txt"} <= names
+    others = {"structures.csv", "data-species.csv", "data-comparisons.csv", "figures.txt"}
+    assert {"table-parameters.csv", "table-results.csv", *others} <= names
     for name in names - {"figures.txt"}:
         assert name.rsplit(".", 1)[0] in page
-    with (tmp_path / "figures" / "table-2.csv").open(encoding="utf-8") as file:
+    with (tmp_path / "figures" / "table-results.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["Condition"] for row in rows] == ["coverage", "novelty", "turn", "ends"]
     assert rows[0]["The paper: run 0"] == "0.154"
+    with (tmp_path / "figures" / "table-comparisons.csv").open(encoding="utf-8") as file:
+        shown = list(csv.DictReader(file))
+    compared = pl.read_csv(tmp_path / "figures" / "data-comparisons.csv")
+    conclusions = [row["Conclusion"] for row in shown if row["Conclusion"]]
+    assert sorted(conclusions) == sorted(compared["conclusion"])
 
 
 def test_a_page_without_export_names_no_files(tiny_html):
@@ -425,5 +432,5 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
 
 
 def test_the_page_shows_the_lineage_below_the_species(tiny_html):
-    assert tiny_html.index('id="figure-11"') < tiny_html.index('id="figure-12"')
+    assert tiny_html.index('id="figure-species"') < tiny_html.index('id="figure-lineage"')
     assert "Ancestors of coverage, run" in tiny_html

@@ -90,14 +90,44 @@ def test_page_can_be_heard(tiny_page):
         for tag, attributes in page.tags
         if tag == "svg" and "aria-hidden" not in attributes and "replay" not in attributes.get("id", "")
     ]
-    assert len(pictures) == 22, "Figures 2, 4, 5, 6a, 6b and 7 to 12, each wide and narrow"
+    assert len(pictures) == 25, "12 figures, each wide and narrow, and the path of the first screen"
     assert all(each["role"] == "img" and len(each["aria-label"]) > 40 for each in pictures)
     headings = [tag for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
     assert headings[0] == "h1"
-    assert set(headings[1:]) == {"h2"}
+    assert set(headings[1:]) == {"h2", "h3"}
     assert [tag for tag, _ in page.tags].count("caption") == [tag for tag, _ in page.tags].count("table")
     assert ("a", {"class": "skip", "href": "#main"}) in page.tags
     assert ("html", {"lang": "en"}) in page.tags
+
+
+def test_figures_and_tables_are_numbered_in_the_order_of_the_page(tiny_page):
+    html, _ = tiny_page
+    for word, count in (("Figure", 12), ("Table", 7)):
+        numbers = re.findall(rf"<b>{word} (\d+)\.</b>", html)
+        assert list(map(int, numbers)) == list(range(1, count + 1))
+    figures = re.findall(r"<figure id=.*?</figure>", html, re.S)
+    counterparts = [re.findall(r"paper’s Figure (\d)", figure) for figure in figures]
+    assert [each for found in counterparts for each in found] == list("45668972")
+
+
+def test_navigation_lists_the_sections_in_the_order_of_the_page(tiny_page):
+    html, _ = tiny_page
+    headings = re.findall(r'<h2 id="([^"]+)">([^<]+)</h2>', html)
+    assert headings[0] == ("findings", "Findings")
+    navigations = re.findall(r'<nav aria-label="Contents">(.*?)</nav>', html, re.S)
+    assert len(navigations) == 2, "beside the text, and folded on a phone"
+    for navigation in navigations:
+        assert re.findall(r'<a href="#([^"]+)">([^<]+)</a>', navigation) == headings[1:]
+
+
+def test_findings_lead_to_the_tables_that_they_name(tiny_page):
+    html, page = tiny_page
+    findings = html.partition('<ol class="findings">')[2].partition("</ol>")[0]
+    links = re.findall(r'<a href="#caption-([a-z]+)">(Table \d+)</a>', findings)
+    assert links
+    for anchor, table in links:
+        assert f'<caption id="caption-{anchor}"><b>{table}.</b>' in html
+    assert "No difference in coverage between conditions is supported by 7 runs each." in page.words
 
 
 def test_page_says_what_was_run(tiny_page, tiny_study):
@@ -202,16 +232,16 @@ def test_other_version_is_announced_and_not_warned_of(out, monkeypatch, recwarn)
     _, page = report(folder.path)
     assert "Results of another version" in page.words
     assert "results version 99" in page.words
-    assert "cannot read the settings of condition c" in page.words
+    assert "cannot read its settings" in page.words
     assert len(recwarn) == 0
 
 
 @pytest.mark.parametrize(("n", "generations"), [(1, 3), (2, 1), (1, 1)])
 def test_the_smallest_studies_have_a_page(out, no_replay, n, generations):
     folder = write_results(out, [describe("only")], {"only": random_runs(n, generations)})
-    _, page = report(folder)
+    html, page = report(folder)
     assert f"With n = {n} there is no interval" in page.words
-    assert "Figure 6." in page.words
+    assert 'id="figure-paths-0"' in html
     assert "Choices" not in page.words
 
 

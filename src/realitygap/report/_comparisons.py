@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+import polars as pl
 
 from realitygap import _special as special
 from realitygap._medians import CONFIDENCE, Interval
@@ -334,6 +336,21 @@ def _comparison(
         else None,
         equivalence_interval=samples.equivalence_interval(),
     )
+
+
+def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
+    """Return one row per comparison: its numbers, the bounds of its intervals, and the conclusion."""
+    rows = []
+    for each in comparisons:
+        row: dict[str, Any] = {}
+        for field in dataclasses.fields(each):
+            value = getattr(each, field.name)
+            if field.name.endswith("interval"):
+                row |= {f"{field.name}_{end}": getattr(value, end, None) for end in ("low", "high")}
+            else:
+                row[field.name] = value
+        rows.append(row | {"conclusion": each.verdict})
+    return pl.DataFrame(rows, infer_schema_length=None)
 
 
 # on the page

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy.typing as npt
 
 from realitygap.drawing import FONT, Ink
+from realitygap.report._marks import Panel, frames_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,6 +87,8 @@ class Drawing:
         figure: what it was drawn as, for other formats.
         draw: what makes the figure of a width [in]; None if it has one width only.
         name: what the ids in `svg` begin with.
+        marks: values that a page shows on hover.
+        frames: where these are in `svg`, one for each panel of `marks`.
     """
 
     svg: str
@@ -94,6 +97,8 @@ class Drawing:
     figure: Figure | None = field(default=None, repr=False, compare=False)
     draw: Callable[[float], Figure] | None = field(default=None, repr=False, compare=False)
     name: str = field(default="", repr=False, compare=False)
+    marks: tuple[Panel, ...] = field(default=(), repr=False, compare=False)
+    frames: tuple[tuple[float, ...], ...] = field(default=(), repr=False, compare=False)
 
     def _repr_svg_(self) -> str:
         return self.svg
@@ -109,21 +114,31 @@ class Drawing:
         return _drawn(self, self.draw, width, 1)
 
 
-def draw_wide(draw: Callable[[float], Figure], name: str, caption: str, alt: str) -> Drawing:
+def draw_wide(
+    draw: Callable[[float], Figure],
+    name: str,
+    caption: str,
+    alt: str,
+    *,
+    marks: tuple[Panel, ...] = (),
+    width: float = WIDE,
+) -> Drawing:
     """A figure in the width of a desktop's page, which `Drawing.in_width` draws in another one.
 
     Args:
         draw: makes the figure of a width [in].
         name: what the ids in the drawing begin with.
-        caption, alt: as in `Drawing`.
+        caption, alt, marks: as in `Drawing`.
+        width: on a desktop's page [in].
     """
-    return _drawn(Drawing("", caption, alt, draw=draw, name=name), draw, WIDE, 0)
+    return _drawn(Drawing("", caption, alt, draw=draw, name=name, marks=marks), draw, width, 0)
 
 
 def _drawn(drawing: Drawing, draw: Callable[[float], Figure], width: float, number: int) -> Drawing:
     with house_style():
         figure = draw(width)
-        return replace(drawing, svg=to_svg(figure, f"{drawing.name}-{number}", drawing.alt), figure=figure)
+        svg = to_svg(figure, f"{drawing.name}-{number}", drawing.alt)
+    return replace(drawing, svg=svg, figure=figure, frames=frames_of(figure, drawing.marks))
 
 
 @contextmanager

@@ -4,34 +4,25 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import polars as pl
 
 from realitygap.errors import RecordError
 from realitygap.records import write_whole
-from realitygap.report._drawing import Drawing
+from realitygap.report._comparisons import comparisons_frame
 from realitygap.report._formats import drawing_bytes
+from realitygap.report._placed import figures_in
 from realitygap.report._species_figure import SpeciesCounts
 from realitygap.report._structures import structures_frame
 from realitygap.report._tally import Tally
 
 _NOTES = "figures.txt"
 """What is in each file."""
-
-
-class PlacedFigure(Protocol):
-    """A figure with its title, as on the page."""
-
-    @property
-    def title(self) -> str: ...
-    @property
-    def drawing(self) -> Drawing: ...
 
 
 @dataclass(frozen=True)
@@ -73,14 +64,14 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
         ) from error
     notes = []
     figures = []
-    for figure in sorted(_figures(list(content.values())), key=_number):
-        name = _slug(figure.title)
+    for figure in sorted(figures_in(content), key=lambda each: each.number):
+        name = figure.anchor
         for ending in (".svg", ".pdf"):
             write_whole(
                 folder / (name + ending), drawing_bytes(figure.drawing, ending, figure.title), within=folder
             )
         figures.append(name)
-        notes.append(f"{name}.svg, {name}.pdf\n    {figure.title}. {figure.drawing.caption}")
+        notes.append(f"{name}.svg, {name}.pdf\n    {figure.title}. {figure.caption}")
     tables = []
     for name, caption, rows in tables_of(page):
         write_whole(folder / f"{name}.csv", _csv(rows), within=folder)
@@ -97,42 +88,25 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
     return Exported(folder, tuple(figures), tuple(tables), tuple(data))
 
 
-def _figures(values: Any) -> Iterator[PlacedFigure]:
-    """All figures in the page's content, in its order."""
-    for value in values:
-        if isinstance(getattr(value, "drawing", None), Drawing):
-            yield value
-        elif isinstance(value, list):
-            yield from _figures(value)
-        elif isinstance(value, Mapping):
-            yield from _figures(list(value.values()))
-
-
-def _number(figure: PlacedFigure) -> tuple[int, str]:
-    digits = re.search(r"\d+", figure.title)
-    return (int(digits[0]) if digits else 1000, figure.title)
-
-
 def _frames(tally: Tally, content: Mapping[str, Any]) -> Iterator[tuple[str, str, pl.DataFrame]]:
     yield (
         "data-coverage-by-generation",
-        "Behind Figure 4: the highest coverage of each generation of each run, along the line and by ends of steps.",
+        "The highest coverage of each generation of each run, along the line and by ends of steps.",
         tally.best,
     )
-    yield "data-coverage-by-run", "Behind Table 2: the highest coverage of each run.", tally.runs
+    yield "data-coverage-by-run", "The highest coverage of each run.", tally.runs
+    if content["compared"]:
+        frame = comparisons_frame(content["compared"])
+        yield "data-comparisons", "Differences between conditions, in full precision.", frame
     gallery = content["gallery"]
     structures = structures_frame(gallery["structure_groups"])
     yield "data-structures", "All structures of the networks in the last generations.", structures
     species: SpeciesCounts = gallery["species_counts"]
     yield (
         "data-species",
-        "Behind Figure 11: the number of species in each generation of each run.",
+        "The number of species in each generation of each run.",
         species.counts,
     )
-
-
-def _slug(title: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "figure"
 
 
 def _csv(rows: list[list[str]]) -> bytes:
@@ -153,9 +127,9 @@ def tables_of(page: str) -> list[tuple[str, str, list[list[str]]]]:
     for table in reader.tables:
         if not table.caption or table.n_head == 0:
             continue  # filled in by a script, and empty without
-        number = re.match(r"Table (\d+\w*)\.", table.caption)
-        name = f"table-{number[1]}" if number else _slug(table.id.removeprefix("caption-") or "table")
+        name = table.id.removeprefix("caption-") or "table"
         name = {"common": "settings", "differ": "settings-by-condition"}.get(name, name)
+        name = f"table-{name}" if table.caption.startswith("Table ") else name
         found.append((name, table.caption, table.rows()))
     return found
 
@@ -213,6 +187,7 @@ class _TableReader(HTMLParser):
         self._text: list[str] | None = None
         self._span = (1, 1)
         self._in_head = False
+        self._is_control = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         values = dict(attrs)
@@ -227,6 +202,8 @@ class _TableReader(HTMLParser):
             self._open.row += 1
             self._open.column = 0
             self._open.n_head += self._in_head
+        elif tag == "details":
+            self._is_control = True
         elif tag in ("td", "th", "caption"):
             self._text = []
             self._span = (int(values.get("colspan") or 1), int(values.get("rowspan") or 1))
@@ -241,6 +218,8 @@ class _TableReader(HTMLParser):
             self._open = None
         elif tag == "thead":
             self._in_head = False
+        elif tag == "details":
+            self._is_control = False
         elif tag in ("td", "th", "caption") and self._text is not None:
             text = " ".join("".join(self._text).split())
             self._text = None
@@ -251,5 +230,5 @@ class _TableReader(HTMLParser):
                 table.place("" if text == "–" else text.replace("−", "-"), *self._span)
 
     def handle_data(self, data: str) -> None:
-        if self._text is not None:
+        if self._text is not None and not self._is_control:
             self._text.append(data)

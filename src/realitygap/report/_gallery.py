@@ -12,53 +12,59 @@ from realitygap.report._arena_figure import draw_arena_and_robot
 from realitygap.report._drawing import Drawing
 from realitygap.report._individuals_figure import draw_better, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
+from realitygap.report._placed import FigureOnPage
 from realitygap.report._species_figure import count_species, draw_species
 from realitygap.report._structures import Structures
 from realitygap.report._tally import Tally, settings_of
 
 
-def content(tally: Tally, on_page: Callable[[str, str, Drawing], Any]) -> dict[str, Any]:
+def content(tally: Tally) -> dict[str, Any]:
     """What the page shows of these figures, or why one is missing.
 
     Args:
         tally: the study.
-        on_page: makes of anchor, title and drawing what the template shows.
     """
 
-    def placed(number: str, drawn: Drawing | str) -> Any:
-        return drawn if isinstance(drawn, str) else on_page(f"figure-{number}", f"Figure {number}", drawn)
-
-    def draw(number: str, condition: str, figure: Callable[..., Drawing]) -> Any:
+    def draw(what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = "") -> Any:
+        anchor = f"figure-{what}"
         try:
-            return placed(number, figure(tally, condition, name=f"figure-{number}"))
+            return FigureOnPage(anchor, figure(tally, condition, name=anchor), counterpart)
         except RecordVersionError:
             return (
-                f"Figure {number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
-                f"{condition}. Use the version that ran the study."
+                f"A figure of condition {condition} is missing: this realitygap ({__version__}) cannot read its "
+                "settings. Use the version that ran the study."
             )
 
     networks, structures = _networks_figure.content(tally)
     found: dict[str, Any] = {
-        "arena": draw("2", tally.runs["condition"][0], draw_arena_and_robot),
-        "networks": placed("7", networks),
+        "arena": draw("arena", tally.runs["condition"][0], draw_arena_and_robot, "Figure 2"),
+        "networks": networks
+        if isinstance(networks, str)
+        else FigureOnPage("figure-networks", networks, "Figure 7"),
         "structures": [_listed(group, tally) for group in structures],
         "structure_groups": structures,
     }
     objective, novelty = _first(tally, "coverage"), _first(tally, "novelty", noise=0.5)
     found["individuals"] = [
-        draw(number, condition, figure)
-        for number, condition, figure in (
-            ("5", _first(tally, "coverage", driven=True), draw_individuals),
-            ("8", _first(tally, "novelty", noise=0.5, driven=True), draw_individuals),
-            ("9", novelty, draw_better),
+        draw(what, condition, figure, counterpart)
+        for what, condition, figure, counterpart in (
+            ("individuals-coverage", _first(tally, "coverage", driven=True), draw_individuals, "Figure 5"),
+            (
+                "individuals-novelty",
+                _first(tally, "novelty", noise=0.5, driven=True),
+                draw_individuals,
+                "Figure 8",
+            ),
+            ("better", novelty, draw_better, "Figure 9"),
         )
         if condition is not None
     ]
     species = count_species(tally)
     condition = objective or str(tally.runs["condition"][0])
-    found["species"] = placed("11", draw_species(tally, condition, species=species, name="figure-11"))
+    drawing = draw_species(tally, condition, species=species, name="figure-species")
+    found["species"] = FigureOnPage("figure-species", drawing)
     found["species_counts"] = species
-    found["lineage"] = draw("12", condition, draw_lineage)
+    found["lineage"] = draw("lineage", condition, draw_lineage)
     return found
 
 

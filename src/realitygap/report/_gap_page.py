@@ -13,7 +13,8 @@ from realitygap.report._gap_maps_figure import draw_gap_maps
 from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
 from realitygap.report._gap_replay_figure import draw_gap_replay
 from realitygap.report._gap_why_figure import draw_gap_why
-from realitygap.report._page import LABELS, on_page
+from realitygap.report._page import LABELS
+from realitygap.report._placed import FigureOnPage, number_figures
 from realitygap.report._template import render_page
 from realitygap.study import GapBetween
 
@@ -72,6 +73,18 @@ def _content(gap: GapBetween) -> dict[str, Any]:
     study, why = gap.study, gap.why
     result = study.result
     labels = list(dict.fromkeys(result.labels))
+    figures = [
+        FigureOnPage(anchor, drawing)
+        for anchor, drawing in (
+            ("pairs", draw_gap_pairs(study)),
+            ("differences", draw_gap_differences(study)),
+            ("maps", draw_gap_maps(study)),
+            ("replay", draw_gap_replay(study)),
+        )
+        if drawing is not None
+    ]
+    figure_of_why = None if why is None else FigureOnPage("why", draw_gap_why(why, study))
+    number_figures([*figures, figure_of_why])
     return {
         "version": __version__,
         "title": f"The gap from {result.source} to {result.target}",
@@ -82,20 +95,8 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         "measures": [_row(result, each.name, each.title, each.meaning) for each in SHOWN],
         "apart": [_row(result, *each) for each in _APART],
         "advice": None if why is None else why.advice,
-        "figures": [
-            on_page(anchor, f"Figure {number}", drawing)
-            for number, (anchor, drawing) in enumerate(
-                (
-                    ("pairs", draw_gap_pairs(study)),
-                    ("differences", draw_gap_differences(study)),
-                    ("maps", draw_gap_maps(study)),
-                    ("replay", draw_gap_replay(study)),
-                ),
-                1,
-            )
-            if drawing is not None
-        ],
-        "why": None if why is None else on_page("why", "Figure 5", draw_gap_why(why, study)),
+        "figures": figures,
+        "why": figure_of_why,
         "controllers": [
             (each.name, *(f"{side.means[k]:.3f}" for side in (study.source, study.target)))
             for k, each in enumerate(study.controllers)

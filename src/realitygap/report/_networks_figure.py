@@ -169,10 +169,10 @@ def content(tally: Tally) -> tuple[Drawing | str, list[Structures]]:
     """The figure, or why it is missing, and the structures counted."""
     structures = count_structures(tally)
     try:
-        return draw_networks(tally, structures, name="figure-7"), structures
+        return draw_networks(tally, structures, name="figure-networks"), structures
     except (ValueError, RealityGapError):
         return (
-            f"Figure 7 is missing: this realitygap ({__version__}) cannot read the genomes. Use the version that ran "
-            "the study.",
+            f"The figure of networks is missing: this realitygap ({__version__}) cannot read the genomes. Use the "
+            "version that ran the study.",
             structures,
         )

@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +28,18 @@ from realitygap.records import (
 )
 from realitygap.report import _gallery
 from realitygap.report._assumed import sim_assumptions
+from realitygap.report._bests_figure import draw_bests
+from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import compare_choices, draw_choices
+from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
-from realitygap.report._drawing import NARROW, Drawing, inline
 from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
+from realitygap.report._findings import find, leading_conditions
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
+from realitygap.report._placed import FigureOnPage, number_figures
 from realitygap.report._replay import content as replay_content
 from realitygap.report._score_figure import draw_scores
 from realitygap.report._statistics_section import statistics_content
@@ -59,18 +62,6 @@ LABELS = {
 
 _MOST_GAPS = 12
 """Conditions whose missing runs are listed; of more it is said how many."""
-
-
-@dataclass(frozen=True)
-class FigureOnPage:
-    """A figure in two widths, of which the page shows the one that fits; `drawing` is the wide one."""
-
-    anchor: str
-    title: str
-    caption: str
-    wide: str
-    narrow: str
-    drawing: Drawing
 
 
 def write_report(
@@ -141,15 +132,71 @@ def _content(tally: Tally) -> dict[str, Any]:
     """Everything the template shows."""
     with ThreadPoolExecutor(max_workers=1) as beside:
         digest = beside.submit(tally.folder.digest)
-        statistics = beside.submit(statistics_content, tally)
-        shown = _words_and_figures(tally)
-        return shown | {"digest": digest.result(), "statistics": statistics.result()}
+        computed = beside.submit(_statistics, tally)
+        content = _words_and_figures(tally)
+        statistics, comparisons, champions = computed.result()
+    findings = find(tally, comparisons, champions, content["tasks"])
+    content |= {
+        "digest": digest.result(),
+        "statistics": statistics,
+        "findings": findings,
+        "compared": comparisons,
+    }
+    sections = _sections(content)
+    number_figures(figure for _, _, figures in sections for figure in figures)
+    content["sections"] = [(anchor, title) for anchor, title, _ in sections if title]
+    content["tables"] = {name: number for number, name in enumerate(_tables(content), 1)}
+    return content
+
+
+def _statistics(tally: Tally) -> tuple[dict[str, Any], list[Comparison], list[Champions]]:
+    comparisons, champions = compare_conditions(tally), retry_champions(tally)
+    return statistics_content(tally, comparisons, champions), comparisons, champions
+
+
+def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[Any]]]:
+    """Anchor, title, and figures of each section in the order of the page; the first screen has no title."""
+    gallery = content["gallery"]
+    sections = [
+        ("findings", "", [content["bests"]]),
+        ("results", "Results", [content["coverage"], *content["scores"]]),
+        ("comparisons", "Comparisons", [content["choices"]]),
+        ("paths", "Paths and replay", content["paths"]),
+        ("networks", "Networks and species", [gallery[each] for each in ("networks", "species", "lineage")]),
+        ("questions", "The paper’s questions and numbers", []),
+        ("methods", "Methods and settings", [gallery["arena"]]),
+        ("again", "Reproduce and cite", []),
+        ("data", "Data", []),
+    ]
+    has_comparisons = content["statistics"]["comparisons"] or content["choices"]
+    return [each for each in sections if each[0] != "comparisons" or has_comparisons]
+
+
+def _tables(content: Mapping[str, Any]) -> list[str]:
+    """The numbered tables in the order of the page."""
+    statistics = content["statistics"]
+    there = {
+        "results": True,
+        "scores": content["tasks"],
+        "comparisons": statistics["comparisons"],
+        "plateaus": statistics["deception"],
+        "champions": not statistics["champions"]["problem"],
+        "spread": True,
+        "variety": statistics["variety"],
+        "chance": statistics["chance"],
+        "audit": content["audit"],
+        "parameters": True,
+    }
+    return [name for name, is_there in there.items() if is_there]
 
 
 def _words_and_figures(tally: Tally) -> dict[str, Any]:
     summary = summarize(tally)
     description = tally.description
+    gallery = _gallery.content(tally)
+    replay = replay_content(tally, leading_conditions(tally)[0])
     return {
+        "counts": _counts(tally),
         "title": description.get("title") or description.get("name") or "A study",
         "name": description.get("name") or "–",
         "banners": _banners(tally),
@@ -168,15 +215,17 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "n_published": max((len(values) for values in summary["published"].drop_nulls()), default=0),
         "interval_notes": _interval_notes(summary),
         "confidence": f"{100 * CONFIDENCE:.0f} %",
-        "coverage": _coverage_figure(tally),
+        "bests": FigureOnPage("figure-bests", draw_bests(tally, links=_links(replay))),
+        "coverage": FigureOnPage("figure-coverage", draw_coverage(tally), "Figure 4"),
         "tasks": summarize_tasks(tally.folder).to_dicts(),
         "scores": _score_figures(tally),
-        "paths": _path_figures(tally),
+        "paths": [*gallery["individuals"][:1], *_path_figures(tally), *gallery["individuals"][1:]],
         "choices": _choices_figure(tally),
-        "gallery": _gallery.content(tally, on_page),
-        "replay": replay_content(tally),
+        "gallery": gallery,
+        "replay": replay,
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
+        "script_hashes": [replay["script_hash"]],
         "columns": column_table(),
         "exported": None,
     }
@@ -185,43 +234,32 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # figures
 
 
-def on_page(anchor: str, title: str, drawing: Drawing) -> FigureOnPage:
-    from markupsafe import Markup
-
-    pictures = (Markup(inline(drawing.svg)), Markup(inline(drawing.in_width(NARROW).svg)))
-    return FigureOnPage(anchor, title, drawing.caption, *pictures, drawing)
-
-
-def _coverage_figure(tally: Tally) -> FigureOnPage:
-    return on_page("figure-4", "Figure 4", draw_coverage(tally))
+def _links(replay: Mapping[str, Any]) -> dict[tuple[str, int], str]:
+    """Address of the best trial in the replay of each run that the page plays, by condition and replicate."""
+    return {(run.name, run.replicate): run.link for run in replay["runs"] if run.link}
 
 
 def _score_figures(tally: Tally) -> list[FigureOnPage]:
     """A figure for each score of another task than coverage."""
-    drawn = draw_scores(tally.folder)
-    numbers = ["Figure S"] if len(drawn) == 1 else [f"Figure S{k + 1}" for k in range(len(drawn))]
     return [
-        on_page(f"figure-scores-{k}", number, drawing)
-        for k, (number, drawing) in enumerate(zip(numbers, drawn, strict=True))
+        FigureOnPage(f"figure-scores-{k}", drawing) for k, drawing in enumerate(draw_scores(tally.folder))
     ]
 
 
 def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
     """A figure for a condition that selects by coverage and one by novelty, or why there is none."""
-    names = _conditions_with_paths(tally)
     found: list[FigureOnPage | str] = []
-    for index, condition in enumerate(names):
-        number = f"Figure 6{'ab'[index] if len(names) > 1 else ''}"
-        anchor = f"figure-6-{index}"
+    for condition in _conditions_with_paths(tally):
+        anchor = f"figure-paths-{len(found)}"
         try:
             drawn = draw_paths(tally, condition, name=anchor)
         except RecordVersionError:
             found.append(
-                f"{number} is missing: this realitygap ({__version__}) cannot read the settings of condition "
-                f"{condition}, so it cannot recompute its paths. Use the version that ran the study."
+                f"The figure of the paths of {condition} is missing: this realitygap ({__version__}) cannot read its "
+                "settings, so it cannot recompute its paths. Use the version that ran the study."
             )
         else:
-            found.append(on_page(anchor, number, drawn))
+            found.append(FigureOnPage(anchor, drawn, "Figure 6"))
     return found
 
 
@@ -239,7 +277,7 @@ def _conditions_with_paths(tally: Tally) -> list[str]:
 def _choices_figure(tally: Tally) -> FigureOnPage | None:
     if not compare_choices(tally):
         return None
-    return on_page("figure-10", "Figure 10", draw_choices(tally))
+    return FigureOnPage("figure-choices", draw_choices(tally))
 
 
 # words
@@ -298,6 +336,11 @@ def _gaps(there: list[int], n: int) -> list[tuple[int, int]]:
     """First and last of each stretch of 0 to n - 1 that is not `there`, a list in order."""
     edges = [-1, *(number for number in there if number < n), n]
     return [(before + 1, after - 1) for before, after in itertools.pairwise(edges) if after > before + 1]
+
+
+def _counts(tally: Tally) -> list[str]:
+    """Return the numbers of runs and trials, in words."""
+    return [f"{_count(tally.runs.height)} runs", f"{_count(tally.n_trials())} trials"]
 
 
 def _facts(tally: Tally) -> list[tuple[str, str]]:

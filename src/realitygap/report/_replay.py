@@ -13,6 +13,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ import polars as pl
 
 from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
-from realitygap.report._path_figure import typical_replicate
+from realitygap.report._path_figure import arena_extent, typical_replicate
 from realitygap.report._tally import Tally, label_of, settings_of
 from realitygap.report._template import template_text
 from realitygap.runs import Condition, replay
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
 """What numbers are rounded to: positions and readings [m], headings [rad], inputs and outputs of networks."""
 
-N_PENS = 8
-"""Trials shown at once."""
+N_PENS = 4
+"""Trials shown at once: of more, bodies and rays cover one another."""
 
 MOST_STEPS = 105_000
 """Steps embedded in a page, of all trials together: some 18 bytes each."""
@@ -47,6 +48,7 @@ class _Run:
         data: what the script reads; None where no trial could be embedded.
         n_embedded, n_trials: of the run.
         note: what is missing and why; empty where nothing is.
+        link: address of its best trial, at the first step; empty where no trial could be embedded.
     """
 
     name: str
@@ -55,23 +57,54 @@ class _Run:
     n_embedded: int
     n_trials: int
     note: str
+    link: str = ""
 
 
-def content(tally: Tally) -> dict[str, Any]:
-    """What the template needs for the replay; trials that cannot be recomputed are left out, and it is said."""
+@dataclass(frozen=True)
+class Lead:
+    """The trial that the first screen plays.
+
+    Attributes:
+        picture: Its whole path as one `svg` element, for readers without a script.
+        caption: What is shown.
+    """
+
+    picture: Markup
+    caption: str
+
+
+def content(tally: Tally, lead: str) -> dict[str, Any]:
+    """What the template needs for the replay; trials that cannot be recomputed are left out, and it is said.
+
+    Args:
+        tally: The study.
+        lead: Name of the condition whose best embedded trial the first screen plays. If it has none, the first
+            condition that has some takes its place.
+    """
     from markupsafe import Markup
 
     with_runs = set(tally.runs["condition"])
     there = [condition for condition in tally.conditions if condition["name"] in with_runs]
     room = MOST_STEPS // max(len(there), 1)
     runs = [_pack_run(tally, condition, room) for condition in there]
-    packed = [run.data for run in runs if run.data is not None]
+    with_trials = [run for run in runs if run.data is not None]
+    packed = [run.data for run in with_trials]
+    first = _lead_of(tally, with_trials, lead) if packed else None
     script = template_text("replay.js")
     return {
         "css": Markup(template_text("replay.css")),
         "script": Markup(script),
-        "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        "data": _as_json({"units": UNITS, "pens": N_PENS, "measure": tally.measure, "conditions": packed}),
+        "script_hash": hash_of(script),
+        "data": as_json(
+            {
+                "units": UNITS,
+                "pens": N_PENS,
+                "measure": tally.measure,
+                "lead": first[:2] if first else [],
+                "conditions": packed,
+            }
+        ),
+        "lead": first[2] if first else None,
         "there": bool(packed),
         "n_pens": N_PENS,
         "runs": runs,
@@ -89,7 +122,12 @@ def _notes(runs: Sequence[_Run]) -> list[str]:
     return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
 
 
-def _as_json(values: Mapping[str, Any]) -> Markup:
+def hash_of(script: str) -> str:
+    """The hash of a script, as a page's policy names it."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def as_json(values: Mapping[str, Any]) -> Markup:
     """JSON that can stand in a script element: nothing in it ends the element, whatever the names are."""
     from markupsafe import Markup
 
@@ -97,6 +135,50 @@ def _as_json(values: Mapping[str, Any]) -> Markup:
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return Markup(text)
+
+
+# the first screen
+
+
+def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, Lead]:
+    """Index of the condition, index of its best trial, the first of several alike, and what is shown of it."""
+    index = next((k for k, each in enumerate(runs) if each.name == lead), 0)
+    name, run = runs[index].name, runs[index].replicate
+    trials = (runs[index].data or {})["trials"]
+    best = _best_of(trials, tally)
+    generation, individual = trials[best][:2]
+    row = tally.rows_of(name, run).row(
+        by_predicate=(pl.col("generation") == generation) & (pl.col("individual") == individual), named=True
+    )
+    condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
+    label = label_of(tally.condition(name))
+    caption = (
+        f"{label}. Best path of the typical run of {name} (run {run}): generation {generation}, individual "
+        f"{individual}, coverage {row[f'coverage_{tally.measure}']:.3f}."
+    )
+    return index, best, Lead(_picture(condition, replay(condition, row), caption), caption)
+
+
+def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
+    """The arena with the whole path of each robot [mm], in the classes of the style sheet."""
+    from markupsafe import Markup
+
+    arena = condition.placed_arena
+    (left, right), (bottom, top) = arena_extent(arena)
+    grid = arena.grid
+
+    def path(points: npt.NDArray[np.float64]) -> str:
+        placed = (points[:, :2] - [left, top]) * [1000, -1000]
+        return "M" + "L".join(f"{x:.0f} {y:.0f}" for x, y in placed)
+
+    corners = np.array([[0, 0], [grid.columns, 0], [grid.columns, grid.rows], [0, grid.rows], [0, 0]])
+    reach = path(corners * grid.cell + [grid.x, grid.y])
+    walls = "".join(path(np.array(wall).reshape(2, 2)) for wall in arena.walls)
+    trails = "".join(f'<path class="trail pen0" d="{path(robot.poses)}"/>' for robot in trajectory.robots)
+    return Markup(
+        '<svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}"><path class="reach" d="{}"/>'
+        '<path class="walls" d="{}"/>{}</svg>'
+    ).format(1000 * (right - left), 1000 * (top - bottom), text, reach, walls, Markup(trails))
 
 
 # one run
@@ -136,7 +218,15 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         "total": rows.height,
         "trials": trials,
     }
-    return _Run(name, replicate, data, len(trials), rows.height, note)
+    key = [name, replicate, *trials[_best_of(trials, tally)][:2]]
+    link = f"#replay={'/'.join(quote(str(part), safe='') for part in key)}@0"
+    return _Run(name, replicate, data, len(trials), rows.height, note, link)
+
+
+def _best_of(trials: Sequence[Sequence[Any]], tally: Tally) -> int:
+    """Index of the packed trial with most cells, the first of several alike."""
+    counted = 3 if tally.measure == "ends" else 2
+    return max(range(len(trials)), key=lambda k: trials[k][counted])
 
 
 def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:

@@ -12,12 +12,11 @@ import polars as pl
 
 from realitygap._medians import Interval
 from realitygap.platforms import is_physical
-from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions, retry_champions
+from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (
     INTERVAL_NAME,
     MARGIN,
     Comparison,
-    compare_conditions,
     comparisons_content,
     same_but_for,
     signed,
@@ -39,16 +38,23 @@ from realitygap.report._tally import Tally, label_of, settings_of
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
 
 
-def statistics_content(tally: Tally) -> dict[str, Any]:
-    """Everything that the template of the section shows."""
-    comparisons = compare_conditions(tally)
+def statistics_content(
+    tally: Tally, comparisons: Sequence[Comparison], champions: Sequence[Champions]
+) -> dict[str, Any]:
+    """Everything that the template of the section shows.
+
+    Args:
+        tally: The study.
+        comparisons: Its conditions compared, from `compare_conditions`.
+        champions: Its best networks on fresh noise, from `retry_champions`.
+    """
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     return {
         "interval": INTERVAL_NAME,
         "labels": ", ".join(sorted({label_of(each) for each in with_runs})),
         "comparisons": comparisons_content(comparisons),
         "deception": _deception(tally, comparisons, with_runs),
-        "champions": _champions(tally, with_runs),
+        "champions": _champions(tally, champions, with_runs),
         "spread": _spread(tally),
         "variety": _variety(tally, with_runs),
         "chance": _chance(tally),
@@ -166,8 +172,9 @@ def _percent_span(share: Share) -> str:
 # champions
 
 
-def _champions(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    found = retry_champions(tally)
+def _champions(
+    tally: Tally, found: Sequence[Champions], conditions: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
     references = _references("noise", conditions)
     by_name = {each.condition: each for each in found}
     problems = {each.problem for each in found if each.problem}

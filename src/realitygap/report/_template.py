@@ -25,7 +25,8 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
         lstrip_blocks=True,
     )
     environment.filters.update(filters)
-    return environment.get_template(name).render({**content, "css": template_text("report.css")})
+    tokens = resources.files("realitygap.drawing").joinpath("tokens.css").read_text(encoding="utf-8")
+    return environment.get_template(name).render({**content, "css": tokens + template_text("report.css")})
 
 
 def template_text(name: str) -> str:

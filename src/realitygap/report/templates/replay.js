@@ -3,9 +3,9 @@
   const byId = (id) => document.getElementById(`replay-${id}`);
   const data = JSON.parse(byId("data").textContent);
   const { length: LENGTH, angle: ANGLE, output: OUTPUT } = data.units;
-  const LETTERS = "ABCDEFGH";
+  const LETTERS = "ABCD";
   // the patterns of the page's other figures [px]
-  const DASHES = ["", "9 3", "2 3", "8 3 2 3", "5 3", "11 3 2 3 2 3", "3 2", "14 4"];
+  const DASHES = ["", "9 3", "2 3", "8 3 2 3"];
   const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
   // trials
@@ -70,19 +70,6 @@
     return low;
   }
 
-  // state
-
-  const pens = new Array(data.pens).fill(null);
-  let shown = 0; // the condition whose trials can be chosen
-  let at = 0; // steps since the start; whole unless playing
-  let playing = false;
-  let last = null;
-  const inUse = () => pens.map((trial, pen) => ({ trial, pen })).filter(({ trial }) => trial);
-  const nSteps = () => Math.max(1, ...inUse().map(({ trial }) => trial.n));
-  const stepOf = () => Math.floor(at + 1e-9);
-  const stepS = () => (inUse()[0] || { trial: conditions[0].trials[0] }).trial.stepS;
-  const seconds = (step) => (step * stepS()).toFixed(stepS() < 0.1 ? 2 : 1);
-
   // drawing
 
   const make = (name, attributes = {}, parent = null) => {
@@ -97,167 +84,259 @@
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return element;
   };
-  const arena = byId("arena"), chart = byId("chart");
   const MM = 1000, MARGIN = 12;
-  let frame = null; // the arena as drawn: its scene, extent [mm] and the layers
-  let drawn = []; // what is drawn of each trial
-  let pixel = 1; // size of a pixel in the arena's units [mm]
-
-  const toX = (x) => x * MM - frame.left;
-  const toY = (y) => frame.top - y * MM;
   const short = (value) => value.toFixed(1);
 
-  function drawArena(condition) {
-    if (frame && frame.scene === condition.scene) return;
-    const xs = condition.walls.flatMap(([x1, , x2]) => [x1, x2]), ys = condition.walls.flatMap(([, y1, , y2]) => [y1, y2]);
-    const [gx, gy, cell, columns, rows] = condition.grid;
-    const left = Math.min(...xs, gx) * MM - MARGIN, top = Math.max(...ys, gy + rows * cell) * MM + MARGIN;
-    const width = Math.max(...xs, gx + columns * cell) * MM + MARGIN - left;
-    const height = top - Math.min(...ys, gy) * MM + MARGIN;
-    frame = { scene: condition.scene, left, top, width, height };
-    arena.replaceChildren();
-    arena.setAttribute("viewBox", `0 0 ${short(width)} ${short(height)}`);
-    frame.visited = make("path", { class: "visited" }, arena);
-    frame.tiles = make("g", {}, arena);
-    let lines = "";
-    for (let c = 1; c < columns; c++) lines += `M${short(toX(gx + c * cell))} ${short(toY(gy))}V${short(toY(gy + rows * cell))}`;
-    for (let r = 1; r < rows; r++) lines += `M${short(toX(gx))} ${short(toY(gy + r * cell))}H${short(toX(gx + columns * cell))}`;
-    make("path", { class: "lines", d: lines }, arena);
-    make("rect", { class: "reach", x: short(toX(gx)), y: short(toY(gy + rows * cell)), width: short(columns * cell * MM), height: short(rows * cell * MM) }, arena);
-    const walls = condition.walls.map(([x1, y1, x2, y2]) => `M${short(toX(x1))} ${short(toY(y1))}L${short(toX(x2))} ${short(toY(y2))}`);
-    make("path", { class: "walls", d: walls.join("") }, arena);
-    frame.trails = make("g", {}, arena);
-    frame.robots = make("g", {}, arena);
-    frame.words = make("g", {}, arena);
-    measure();
+  // an arena with the robots of some trials, drawn into an svg element
+  function makeStage(arena) {
+    let frame = null; // the arena as drawn: its scene, extent [mm] and the layers
+    let drawn = []; // what is drawn of each robot
+    let pixel = 1; // size of a pixel in the arena's units [mm]
+
+    const toX = (x) => x * MM - frame.left;
+    const toY = (y) => frame.top - y * MM;
+
+    function drawArena(condition) {
+      if (frame && frame.scene === condition.scene) return;
+      const xs = condition.walls.flatMap(([x1, , x2]) => [x1, x2]), ys = condition.walls.flatMap(([, y1, , y2]) => [y1, y2]);
+      const [gx, gy, cell, columns, rows] = condition.grid;
+      const left = Math.min(...xs, gx) * MM - MARGIN, top = Math.max(...ys, gy + rows * cell) * MM + MARGIN;
+      const width = Math.max(...xs, gx + columns * cell) * MM + MARGIN - left;
+      const height = top - Math.min(...ys, gy) * MM + MARGIN;
+      frame = { scene: condition.scene, left, top, width, height };
+      arena.replaceChildren();
+      arena.setAttribute("viewBox", `0 0 ${short(width)} ${short(height)}`);
+      frame.visited = make("path", { class: "visited" }, arena);
+      frame.tiles = make("g", {}, arena);
+      let lines = "";
+      for (let c = 1; c < columns; c++) lines += `M${short(toX(gx + c * cell))} ${short(toY(gy))}V${short(toY(gy + rows * cell))}`;
+      for (let r = 1; r < rows; r++) lines += `M${short(toX(gx))} ${short(toY(gy + r * cell))}H${short(toX(gx + columns * cell))}`;
+      make("path", { class: "lines", d: lines }, arena);
+      make("rect", { class: "reach", x: short(toX(gx)), y: short(toY(gy + rows * cell)), width: short(columns * cell * MM), height: short(rows * cell * MM) }, arena);
+      const walls = condition.walls.map(([x1, y1, x2, y2]) => `M${short(toX(x1))} ${short(toY(y1))}L${short(toX(x2))} ${short(toY(y2))}`);
+      make("path", { class: "walls", d: walls.join("") }, arena);
+      frame.trails = make("g", {}, arena);
+      frame.robots = make("g", {}, arena);
+      frame.words = make("g", {}, arena);
+      measure();
+    }
+
+    function measure() {
+      const { width, height } = arena.getBoundingClientRect();
+      if (!frame || !width) return;
+      pixel = 1 / (Math.min(width / frame.width, height / frame.height) || 1);
+      for (const text of frame.words.children) fit(text);
+      for (const part of drawn) part.step = -1;
+    }
+
+    function fit(text) {
+      text.style.fontSize = `${(13 * pixel).toFixed(2)}px`;
+      text.style.strokeWidth = `${(3 * pixel).toFixed(2)}px`;
+    }
+
+    function drawTrials(used) {
+      for (const layer of [frame.tiles, frame.trails, frame.robots, frame.words]) layer.replaceChildren();
+      // the robots of a trial have its pen; its cells and its numbers are drawn with the first one
+      const robots = used.flatMap(({ trial, pen }) => [{ trial, pen }, ...trial.others.map((other) => ({ trial: other, pen, isOther: true }))]);
+      drawn = robots.map(({ trial, pen, isOther = false }) => {
+        unpack(trial);
+        const { body, mounts } = trial.condition;
+        const corners = body.map(([forward, side]) => `${short(forward * MM)},${short(-side * MM)}`).join(" ");
+        const front = Math.max(...body.map(([forward]) => forward)) * MM;
+        const place = (k) => `translate(${short(toX(trial.x[k] * LENGTH))} ${short(toY(trial.y[k] * LENGTH))}) rotate(${(-trial.heading[k] * ANGLE * 180 / Math.PI).toFixed(2)})`;
+        const kind = `pen${pen}`;
+        const tile = make("path", { class: `tile ${kind}` }, frame.tiles);
+        make("polygon", { class: "start", points: corners, transform: place(0) }, frame.trails);
+        const trail = make("polyline", { class: `trail ${kind}`, "stroke-dasharray": DASHES[pen] }, frame.trails);
+        const onward = make("line", { class: `trail ${kind}` }, frame.trails);
+        const blocked = make("path", { class: "blocked" }, frame.trails);
+        const robot = make("g", { class: `robot ${kind}`, "data-pen": LETTERS[pen] }, frame.robots);
+        const rays = mounts.map(([forward, side]) => make("line", { class: "ray", x1: short(forward * MM), y1: short(-side * MM) }, robot));
+        make("polygon", { class: "body", points: corners }, robot);
+        make("path", { class: "nose", d: `M${short(front * 0.55)} ${short(-front * 0.3)}L${short(front * 0.9)} 0L${short(front * 0.55)} ${short(front * 0.3)}` }, robot);
+        const hits = mounts.map(() => make("circle", { class: "hit" }, robot));
+        const letter = make("text", {}, frame.words);
+        letter.textContent = LETTERS[pen];
+        fit(letter);
+        return { trial, pen, isOther, tile, trail, onward, blocked, robot, rays, hits, letter, step: -1 };
+      });
+      frame.robots.classList.toggle("several", used.length > 1);
+    }
+
+    // what changes from step to step
+    function drawStep(part, step) {
+      const { trial } = part;
+      if (part.step === step) return;
+      part.step = step;
+      const points = [], crosses = new Set();
+      const arm = 4 * pixel;
+      for (let k = 0; k <= step; k++) {
+        const x = toX(trial.x[k] * LENGTH), y = toY(trial.y[k] * LENGTH);
+        if (!trial.stalled[k]) points.push(`${short(x)},${short(y)}`);
+        else crosses.add(`M${short(x - arm)} ${short(y - arm)}l${short(2 * arm)} ${short(2 * arm)}m0 ${short(-2 * arm)}l${short(-2 * arm)} ${short(2 * arm)}`);
+      }
+      part.trail.setAttribute("points", points.join(" "));
+      part.blocked.setAttribute("d", [...crosses].join(""));
+      part.robot.classList.toggle("stalled", Boolean(trial.stalled[step]));
+      part.letter.textContent = LETTERS[part.pen] + (trial.stalled[step] ? " ×" : "");
+    }
+
+    // several trials share a cell: each has its own place in it, so that they differ without color as well
+    function drawCells(at) {
+      const firsts = drawn.filter((part) => !part.isOther), all = new Set(), several = firsts.length > 1;
+      for (const part of firsts) {
+        const { trial, pen } = part;
+        const [gx, gy, cell, columns] = trial.condition.grid;
+        const side = cell * MM, across = 2, inset = side * 0.1, room = (side - 2 * inset) / across, size = room * 0.6;
+        let tiles = "";
+        for (let k = 0, n = reached(trial.steps, Math.min(at, trial.n)); k < n; k++) {
+          const x = toX(gx + (trial.cells[k] % columns) * cell), y = toY(gy + (Math.floor(trial.cells[k] / columns) + 1) * cell);
+          all.add(`M${short(x)} ${short(y)}h${short(side)}v${short(side)}h${short(-side)}z`);
+          if (several) {
+            const left = x + inset + (pen % across) * room + (room - size) / 2;
+            const top = y + inset + Math.floor(pen / across) * room + (room - size) / 2;
+            tiles += `M${short(left)} ${short(top)}h${short(size)}v${short(size)}h${short(-size)}z`;
+          }
+        }
+        part.tile.setAttribute("d", tiles);
+      }
+      frame.visited.setAttribute("d", [...all].join(""));
+    }
+
+    function drawPose(part, at) {
+      const { trial } = part;
+      const step = Math.min(Math.floor(at + 1e-9), trial.n), next = Math.min(step + 1, trial.n);
+      const share = Math.min(Math.max(still.matches ? 0 : at - step, 0), 1) * (next > step);
+      drawStep(part, step);
+      const between = (values, unit) => (values[step] + (values[next] - values[step]) * share) * unit;
+      const x = toX(between(trial.x, LENGTH)), y = toY(between(trial.y, LENGTH));
+      let turn = (trial.heading[next] - trial.heading[step]) * ANGLE;
+      turn -= 2 * Math.PI * Math.round(turn / (2 * Math.PI));
+      const heading = trial.heading[step] * ANGLE + turn * share;
+      part.robot.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)}) rotate(${(-heading * 180 / Math.PI).toFixed(2)})`);
+      part.onward.setAttribute("x1", short(toX(trial.x[step] * LENGTH)));
+      part.onward.setAttribute("y1", short(toY(trial.y[step] * LENGTH)));
+      part.onward.setAttribute("x2", short(x));
+      part.onward.setAttribute("y2", short(y));
+      // letters around the center, each at its own place: at the start all robots are on one spot
+      const around = drawn.some((other) => other.pen !== part.pen) ? 48 : 0, angle = (part.pen / pens.length - 0.25) * 2 * Math.PI;
+      part.at = [x + around * Math.cos(angle), y + around * Math.sin(angle)];
+      trial.condition.mounts.forEach(([forward, side, direction], k) => {
+        const reading = between(trial.readings[k], LENGTH);
+        const alongX = (forward + reading * Math.cos(direction)) * MM, alongY = -(side + reading * Math.sin(direction)) * MM;
+        part.rays[k].setAttribute("x2", short(alongX));
+        part.rays[k].setAttribute("y2", short(alongY));
+        const hits = trial.readings[k][step] * LENGTH < trial.condition.range - LENGTH / 2;
+        part.hits[k].setAttribute("r", hits ? short(2.6 * pixel) : 0);
+        part.hits[k].setAttribute("cx", short(alongX));
+        part.hits[k].setAttribute("cy", short(alongY));
+      });
+    }
+
+    // letters that would cover one another are moved apart, up and down, and stay inside the picture
+    function drawLetters() {
+      const high = 22 * pixel, half = (part) => (part.letter.textContent.length > 1 ? 18 : 9) * pixel;
+      for (let round = 0; round < 12; round++) {
+        for (const [k, one] of drawn.entries()) {
+          for (const other of drawn.slice(k + 1)) {
+            const apart = other.at[1] - one.at[1];
+            if (Math.abs(other.at[0] - one.at[0]) >= half(one) + half(other) || Math.abs(apart) >= high) continue;
+            const push = ((high - Math.abs(apart)) / 2 + 0.01) * (apart < 0 ? -1 : 1);
+            one.at[1] -= push;
+            other.at[1] += push;
+          }
+        }
+        for (const part of drawn) part.at[1] = Math.min(Math.max(part.at[1], high / 2), frame.height - high / 2);
+      }
+      for (const part of drawn) {
+        part.letter.setAttribute("x", short(part.at[0]));
+        part.letter.setAttribute("y", short(part.at[1]));
+      }
+    }
+
+    return {
+      show: (condition, used) => {
+        drawArena(condition);
+        drawTrials(used);
+      },
+      clear: drawArena,
+      measure,
+      cells: drawCells,
+      draw: (at) => {
+        for (const part of drawn) drawPose(part, at);
+        drawLetters();
+      },
+    };
   }
 
-  function measure() {
-    const width = arena.getBoundingClientRect().width;
-    if (!frame || !width) return;
-    const scale = Math.min(width / frame.width, arena.getBoundingClientRect().height / frame.height) || 1;
-    pixel = 1 / scale;
-    for (const text of frame.words.children) fit(text);
+  // time
+
+  // steps since the start, whole unless playing; `length` and `rate` [steps/s] are functions
+  function makeClock(length, rate, draw, changed) {
+    const clock = { at: 0, playing: false };
+    let last = null;
+    clock.step = () => Math.floor(clock.at + 1e-9);
+    clock.play = () => {
+      if (clock.step() >= length()) clock.at = 0;
+      clock.playing = true;
+      last = null;
+      changed();
+      requestAnimationFrame(tick);
+    };
+    clock.goTo = (step) => {
+      clock.playing = false;
+      clock.at = Math.min(Math.max(Math.round(step), 0), length());
+      changed();
+      draw();
+    };
+    clock.pause = () => clock.playing && clock.goTo(clock.step());
+    function tick(now) {
+      if (!clock.playing) return;
+      // a page that was in the background goes on where it was
+      if (last !== null) clock.at += (Math.min(now - last, 250) / 1000) * rate();
+      last = now;
+      if (clock.at >= length()) {
+        clock.goTo(length());
+        return;
+      }
+      draw();
+      requestAnimationFrame(tick);
+    }
+    return clock;
   }
 
-  function fit(text) {
-    text.style.fontSize = `${(text.dataset.size * pixel).toFixed(2)}px`;
-    text.style.strokeWidth = `${(3 * pixel).toFixed(2)}px`;
+  const PLAY = "M4 2.5v11L13 8z", PAUSE = "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z";
+
+  // once in view, and only once; not with reduced motion
+  function playInView(element, clock, mayPlay) {
+    if (still.matches || !("IntersectionObserver" in window)) return;
+    const observer = new IntersectionObserver(([entry]) => {
+      if (entry.intersectionRatio < 0.6) return;
+      observer.disconnect();
+      if (mayPlay()) clock.play();
+    }, { threshold: [0.6] });
+    observer.observe(element);
   }
+
+  // state
+
+  const pens = new Array(data.pens).fill(null);
+  let shown = 0; // the condition whose trials can be chosen
+  const inUse = () => pens.map((trial, pen) => ({ trial, pen })).filter(({ trial }) => trial);
+  const nSteps = () => Math.max(1, ...inUse().map(({ trial }) => trial.n));
+  const stepS = () => (inUse()[0] || { trial: conditions[0].trials[0] }).trial.stepS;
+  const seconds = (step) => (step * stepS()).toFixed(stepS() < 0.1 ? 2 : 1);
+  const arena = byId("arena"), chart = byId("chart");
+  const stage = makeStage(arena);
+  const clock = makeClock(nSteps, () => Number(byId("speed").value) / stepS(), () => draw(), showPlaying);
+  const stepOf = clock.step;
 
   function drawTrials() {
-    const used = inUse();
-    for (const layer of [frame.tiles, frame.trails, frame.robots, frame.words]) layer.replaceChildren();
-    // the robots of a trial have its pen; its cells and its numbers are drawn with the first one
-    const robots = used.flatMap(({ trial, pen }) => [{ trial, pen }, ...trial.others.map((other) => ({ trial: other, pen, isOther: true }))]);
-    drawn = robots.map(({ trial, pen, isOther = false }) => {
-      unpack(trial);
-      const { body, mounts } = trial.condition;
-      const corners = body.map(([forward, side]) => `${short(forward * MM)},${short(-side * MM)}`).join(" ");
-      const front = Math.max(...body.map(([forward]) => forward)) * MM;
-      const place = (k) => `translate(${short(toX(trial.x[k] * LENGTH))} ${short(toY(trial.y[k] * LENGTH))}) rotate(${(-trial.heading[k] * ANGLE * 180 / Math.PI).toFixed(2)})`;
-      const kind = `pen${pen}`;
-      const tile = make("path", { class: `tile ${kind}` }, frame.tiles);
-      make("polygon", { class: "start", points: corners, transform: place(0) }, frame.trails);
-      const trail = make("polyline", { class: `trail ${kind}`, "stroke-dasharray": DASHES[pen] }, frame.trails);
-      const onward = make("line", { class: `trail ${kind}` }, frame.trails);
-      const blocked = make("path", { class: "blocked" }, frame.trails);
-      const robot = make("g", { class: `robot ${kind}`, "data-pen": LETTERS[pen] }, frame.robots);
-      const rays = mounts.map(([forward, side]) => make("line", { class: "ray", x1: short(forward * MM), y1: short(-side * MM) }, robot));
-      make("polygon", { class: "body", points: corners }, robot);
-      make("path", { class: "nose", d: `M${short(front * 0.55)} ${short(-front * 0.3)}L${short(front * 0.9)} 0L${short(front * 0.55)} ${short(front * 0.3)}` }, robot);
-      const hits = mounts.map(() => make("circle", { class: "hit" }, robot));
-      const letter = make("text", { "data-size": 13 }, frame.words);
-      letter.textContent = LETTERS[pen];
-      const words = used.length === 1 && !isOther ? mounts.map(() => make("text", { class: "reading", "data-size": 12 }, frame.words)) : [];
-      return { trial, pen, isOther, tile, trail, onward, blocked, robot, rays, hits, letter, words, step: -1 };
-    });
-    for (const text of frame.words.children) fit(text);
-    frame.robots.classList.toggle("several", used.length > 1);
+    const used = inUse(), [only] = used;
+    stage.show((only || { trial: { condition: conditions[shown] } }).trial.condition, used);
     const labels = [...new Set(used.map(({ trial }) => trial.condition.label))].map((label) => tag("span", label, { class: "label" }));
-    const [only] = used;
     const title = used.length === 1 ? `${only.trial.condition.name}, run ${only.trial.condition.run}, generation ${only.trial.generation}, individual ${only.trial.individual}` : `${used.length || "No"} trials`;
     byId("labels").replaceChildren(...labels, ` ${title}`);
-  }
-
-  // what changes from step to step
-  function drawStep(part, step) {
-    const { trial } = part;
-    if (part.step === step) return;
-    part.step = step;
-    const points = [], crosses = new Set();
-    const arm = 4 * pixel;
-    for (let k = 0; k <= step; k++) {
-      const x = toX(trial.x[k] * LENGTH), y = toY(trial.y[k] * LENGTH);
-      if (!trial.stalled[k]) points.push(`${short(x)},${short(y)}`);
-      else crosses.add(`M${short(x - arm)} ${short(y - arm)}l${short(2 * arm)} ${short(2 * arm)}m0 ${short(-2 * arm)}l${short(-2 * arm)} ${short(2 * arm)}`);
-    }
-    part.trail.setAttribute("points", points.join(" "));
-    part.blocked.setAttribute("d", [...crosses].join(""));
-    part.robot.classList.toggle("stalled", Boolean(trial.stalled[step]));
-    part.letter.textContent = LETTERS[part.pen] + (trial.stalled[step] ? " ×" : "");
-  }
-
-  // several trials share a cell: each has its own place in it, so that they differ without color as well
-  function drawCells() {
-    const firsts = drawn.filter((part) => !part.isOther), all = new Set(), several = firsts.length > 1;
-    for (const part of firsts) {
-      const { trial, pen } = part;
-      const [gx, gy, cell, columns] = trial.condition.grid;
-      const side = cell * MM, across = 4, inset = side * 0.1, room = (side - 2 * inset) / across, size = room * 0.66;
-      let tiles = "";
-      for (let k = 0, n = reached(trial.steps, Math.min(stepOf(), trial.n)); k < n; k++) {
-        const x = toX(gx + (trial.cells[k] % columns) * cell), y = toY(gy + (Math.floor(trial.cells[k] / columns) + 1) * cell);
-        all.add(`M${short(x)} ${short(y)}h${short(side)}v${short(side)}h${short(-side)}z`);
-        if (several) {
-          const left = x + inset + (pen % across) * room + (room - size) / 2;
-          const top = y + inset + Math.floor(pen / across) * room + (room - size) / 2;
-          tiles += `M${short(left)} ${short(top)}h${short(size)}v${short(size)}h${short(-size)}z`;
-        }
-      }
-      part.tile.setAttribute("d", tiles);
-    }
-    frame.visited.setAttribute("d", [...all].join(""));
-  }
-
-  function drawPose(part) {
-    const { trial } = part;
-    const step = Math.min(stepOf(), trial.n), next = Math.min(step + 1, trial.n);
-    const share = Math.min(Math.max(still.matches ? 0 : at - step, 0), 1) * (next > step);
-    drawStep(part, step);
-    const between = (values, unit) => (values[step] + (values[next] - values[step]) * share) * unit;
-    const x = toX(between(trial.x, LENGTH)), y = toY(between(trial.y, LENGTH));
-    let turn = (trial.heading[next] - trial.heading[step]) * ANGLE;
-    turn -= 2 * Math.PI * Math.round(turn / (2 * Math.PI));
-    const heading = trial.heading[step] * ANGLE + turn * share;
-    part.robot.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)}) rotate(${(-heading * 180 / Math.PI).toFixed(2)})`);
-    part.onward.setAttribute("x1", short(toX(trial.x[step] * LENGTH)));
-    part.onward.setAttribute("y1", short(toY(trial.y[step] * LENGTH)));
-    part.onward.setAttribute("x2", short(x));
-    part.onward.setAttribute("y2", short(y));
-    // letters around the center, each at its own place: at the start all robots stand on one spot
-    const around = drawn.some((other) => other.pen !== part.pen) ? 48 : 0, angle = (part.pen / pens.length - 0.25) * 2 * Math.PI;
-    part.letter.setAttribute("x", short(x + around * Math.cos(angle)));
-    part.letter.setAttribute("y", short(y + around * Math.sin(angle)));
-    trial.condition.mounts.forEach(([forward, side, direction], k) => {
-      const reading = between(trial.readings[k], LENGTH);
-      const alongX = (forward + reading * Math.cos(direction)) * MM, alongY = -(side + reading * Math.sin(direction)) * MM;
-      part.rays[k].setAttribute("x2", short(alongX));
-      part.rays[k].setAttribute("y2", short(alongY));
-      const hits = trial.readings[k][step] * LENGTH < trial.condition.range - LENGTH / 2;
-      part.hits[k].setAttribute("r", hits ? short(2.6 * pixel) : 0);
-      part.hits[k].setAttribute("cx", short(alongX));
-      part.hits[k].setAttribute("cy", short(alongY));
-      const word = part.words[k];
-      if (!word) return;
-      // a label beyond the ray's end, inside the picture; on a phone the table below has to do
-      const reach = 20 * pixel, sine = Math.sin(heading), cosine = Math.cos(heading);
-      const endX = alongX + reach * Math.cos(direction), endY = alongY - reach * Math.sin(direction);
-      const wordX = x + endX * cosine + endY * sine, wordY = y - endX * sine + endY * cosine;
-      word.setAttribute("x", short(Math.min(Math.max(wordX, 20 * pixel), frame.width - 20 * pixel)));
-      word.setAttribute("y", short(Math.min(Math.max(wordY, 10 * pixel), frame.height - 10 * pixel)));
-      word.textContent = frame.width / pixel < 480 ? "" : (trial.readings[k][step] * LENGTH).toFixed(3);
-    });
   }
 
   // coverage over time
@@ -269,7 +348,7 @@
     const { width, height } = chart.getBoundingClientRect();
     chart.replaceChildren();
     plot = null;
-    if (!width || !frame) return;
+    if (!width) return;
     chart.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const n = nSteps(), used = inUse();
     const highest = Math.max(0.1, ...used.map(({ trial }) => count(trial) / cellsOf(trial.condition)));
@@ -297,11 +376,11 @@
 
   function drawCursor() {
     if (!plot) return;
-    const left = plot.toLeft(still.matches ? stepOf() : at).toFixed(1);
+    const left = plot.toLeft(still.matches ? stepOf() : clock.at).toFixed(1);
     plot.cursor.setAttribute("x1", left);
     plot.cursor.setAttribute("x2", left);
     for (const { trial, steps, dot } of plot.curves) {
-      dot.setAttribute("cx", plot.toLeft(Math.min(still.matches ? stepOf() : at, trial.n)).toFixed(1));
+      dot.setAttribute("cx", plot.toLeft(Math.min(still.matches ? stepOf() : clock.at, trial.n)).toFixed(1));
       dot.setAttribute("cy", plot.toTop(reached(steps, Math.min(stepOf(), trial.n)) / cellsOf(trial.condition)).toFixed(1));
     }
   }
@@ -376,7 +455,7 @@
     byId("caption").textContent = used.length
       ? `After ${seconds(step)} s: condition/run/generation/individual, pose, distance each sensor measures, what the network sees and answers, and coverage so far along the line and at the ends of steps.`
       : "No trial is chosen. Choose one or more from the table of trials.";
-    drawCells();
+    stage.cells(step);
   }
 
   function describe() {
@@ -396,10 +475,10 @@
   }
 
   function draw(always = false) {
-    for (const part of drawn) drawPose(part);
+    stage.draw(clock.at);
     drawNumbers(always);
     drawCursor();
-    if (!playing) {
+    if (!clock.playing) {
       const text = describe();
       arena.setAttribute("aria-label", text);
       chart.setAttribute("aria-label", `Coverage so far. ${text}`);
@@ -408,8 +487,7 @@
   }
 
   function redraw() {
-    drawArena((inUse()[0] || { trial: { condition: conditions[shown] } }).trial.condition);
-    at = Math.min(at, nSteps());
+    clock.at = Math.min(clock.at, nSteps());
     drawTrials();
     drawTable();
     drawChart();
@@ -545,7 +623,7 @@
   });
   byId("across").addEventListener("click", () => choose(conditions.map(({ trials }) => best(trials)), "Best of each condition"));
   byId("clear").addEventListener("click", () => {
-    pause();
+    clock.pause();
     pens.fill(null);
     redraw();
     tell("No trial is shown.");
@@ -553,57 +631,25 @@
   conditions.forEach(({ name, run }, k) => byId("condition").append(tag("option", `${name} (run ${run})`, { value: k })));
   byId("condition").addEventListener("change", (event) => {
     shown = Number(event.target.value);
-    if (inUse().length === 0) drawArena(conditions[shown]);
+    if (inUse().length === 0) stage.clear(conditions[shown]);
     drawMatrix();
   });
 
-  // time
+  // playback
 
   function showPlaying() {
-    byId("icon").setAttribute("d", playing ? "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z" : "M4 2.5v11L13 8z");
-    byId("play-text").textContent = playing ? "Pause" : "Play";
+    byId("icon").setAttribute("d", clock.playing ? PAUSE : PLAY);
+    byId("play-text").textContent = clock.playing ? "Pause" : "Play";
   }
 
-  function play() {
-    if (inUse().length === 0) return tell("Choose a trial first.");
-    if (stepOf() >= nSteps()) at = 0;
-    playing = true;
-    last = null;
-    showPlaying();
-    requestAnimationFrame(tick);
-    return undefined;
-  }
+  const toggleTime = () => {
+    if (clock.playing) clock.pause();
+    else if (inUse().length === 0) tell("Choose a trial first.");
+    else clock.play();
+  };
+  const { goTo } = clock;
 
-  function pause() {
-    if (!playing) return;
-    playing = false;
-    at = stepOf();
-    showPlaying();
-    draw();
-  }
-
-  function tick(now) {
-    if (!playing) return;
-    // a page that was in the background goes on where it was
-    if (last !== null) at += (Math.min(now - last, 250) / 1000 / stepS()) * Number(byId("speed").value);
-    last = now;
-    if (at >= nSteps()) {
-      at = nSteps();
-      pause();
-      return;
-    }
-    draw();
-    requestAnimationFrame(tick);
-  }
-
-  function goTo(step) {
-    playing = false;
-    at = Math.min(Math.max(Math.round(step), 0), nSteps());
-    showPlaying();
-    draw();
-  }
-
-  byId("play").addEventListener("click", () => (playing ? pause() : play()));
+  byId("play").addEventListener("click", toggleTime);
   byId("first").addEventListener("click", () => goTo(0));
   byId("back").addEventListener("click", () => goTo(stepOf() - 1));
   byId("next").addEventListener("click", () => goTo(stepOf() + 1));
@@ -619,7 +665,7 @@
       tell(`Speed ${speed.options[speed.selectedIndex].text}.`);
     };
     const deeds = {
-      " ": () => (playing ? pause() : play()),
+      " ": toggleTime,
       ArrowLeft: () => goTo(stepOf() - stride), ArrowRight: () => goTo(stepOf() + stride),
       Home: () => goTo(0), End: () => goTo(nSteps()),
       "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1), "−": () => faster(-1),
@@ -627,7 +673,7 @@
     if (!Object.hasOwn(deeds, event.key)) return;
     event.preventDefault();
     deeds[event.key]();
-    if (event.currentTarget === byId("stage") && !playing && !"+=-−".includes(event.key)) tell(describe());
+    if (event.currentTarget === byId("stage") && !clock.playing && !"+=-−".includes(event.key)) tell(describe());
   }
   byId("stage").addEventListener("keydown", keys);
   byId("scrub").addEventListener("keydown", keys);
@@ -665,8 +711,7 @@
     if (found.length) {
       shown = conditions.indexOf(found[0].condition);
       byId("condition").value = shown;
-      playing = false;
-      showPlaying();
+      clock.pause();
       choose([...new Set(found)], "As linked");
       goTo(step === undefined || !Number.isFinite(Number(step)) ? nSteps() : Number(step));
     }
@@ -675,22 +720,71 @@
     return found.length > 0;
   }
 
+  // the first screen: the best path of one condition, which plays in some eight seconds
+
+  function makeLead(place) {
+    const [condition, index] = data.lead, trial = conditions[condition].trials[index];
+    const svg = make("svg", { role: "img", "aria-label": place.querySelector("svg").getAttribute("aria-label") });
+    place.replaceChildren(svg);
+    const leadStage = makeStage(svg);
+    const byLead = (id) => document.getElementById(`lead-${id}`);
+    const draw = () => {
+      leadStage.draw(lead.at);
+      leadStage.cells(lead.step());
+      byLead("clock").textContent = `${(lead.step() * trial.stepS).toFixed(trial.stepS < 0.1 ? 2 : 1)} s, step ${lead.step()} of ${trial.n}`;
+    };
+    const lead = makeClock(() => trial.n, () => Math.max(1 / trial.stepS, trial.n / 8), draw, () => {
+      byLead("icon").setAttribute("d", lead.playing ? PAUSE : PLAY);
+      byLead("play-text").textContent = lead.playing ? "Pause" : "Play";
+    });
+    leadStage.show(trial.condition, [{ trial, pen: 0 }]);
+    byLead("play").addEventListener("click", () => (lead.playing ? lead.pause() : lead.play()));
+    byLead("open").setAttribute("href", `#replay=${trial.key}@0`);
+    byLead("controls").hidden = false;
+    onResize(place, () => {
+      leadStage.measure();
+      draw();
+    });
+    lead.goTo(still.matches ? trial.n : 0);
+    playInView(place, lead, () => true);
+    return lead;
+  }
+
+  function onResize(element, deed) {
+    if ("ResizeObserver" in window) new ResizeObserver(deed).observe(element);
+    else window.addEventListener("resize", deed);
+  }
+
+  // on paper, replays are at their last step
+  function printLast(clocks) {
+    let before = null;
+    const set = (isPrinted) => {
+      if (isPrinted === Boolean(before)) return;
+      const steps = isPrinted ? clocks.map(() => Infinity) : before;
+      before = isPrinted ? clocks.map(({ at }) => at) : null;
+      clocks.forEach((each, k) => each.goTo(steps[k]));
+    };
+    window.addEventListener("beforeprint", () => set(true));
+    window.addEventListener("afterprint", () => set(false));
+    window.matchMedia("print").addEventListener("change", ({ matches }) => set(matches));
+  }
+
   byId("without").hidden = true;
   byId("figure").hidden = false;
   if (!follow()) {
-    // a picture that says something without being played: the best trial, at its end
-    pens[0] = best(conditions[0].trials);
-    at = pens[0].n;
+    pens[0] = conditions[data.lead[0]].trials[data.lead[1]];
+    [shown] = data.lead;
+    byId("condition").value = shown;
     redraw();
+    playInView(byId("stage"), clock, () => clock.at === 0 && !clock.playing && inUse().length > 0);
   }
   window.addEventListener("hashchange", follow);
-  const resized = () => {
-    measure();
-    for (const part of drawn) part.step = -1;
+  onResize(byId("stage"), () => {
+    stage.measure();
     drawChart();
     draw(true);
-  };
-  if ("ResizeObserver" in window) new ResizeObserver(resized).observe(byId("stage"));
-  else window.addEventListener("resize", resized);
+  });
   still.addEventListener("change", () => draw(true));
+  const place = document.getElementById("lead-stage");
+  printLast(place ? [clock, makeLead(place)] : [clock]);
 })();

@@ -1,0 +1,114 @@
+"""Values of a figure that the page shows on hover, and where they are in the drawing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_MARKS = 2500
+"""Marks of runs in one figure: some 5 bytes each. Of more runs the first ones of each condition have marks."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """Marks that are highlighted together.
+
+    Attributes:
+        text: What the page shows of a mark; {name}, {label}, {x}, and {y} stand for its values.
+        points: (m, 2) x and y in the units of the axes.
+        name: Of the series.
+        labels: One for each mark; none if `text` has no {label}.
+        link: Address within the page that a click on one of `linked` marks leads to; empty for none.
+        linked: Index of the mark with the link.
+    """
+
+    text: str
+    points: npt.NDArray[np.float64]
+    name: str = ""
+    labels: tuple[str, ...] = ()
+    link: str = ""
+    linked: int = 0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """The marks of one panel.
+
+    Attributes:
+        axes: The `gid` of the axes that they are in.
+        series: The marks.
+        decimals: Of x and y: all values are rounded to them.
+    """
+
+    axes: str
+    series: tuple[Series, ...]
+    decimals: tuple[int, int]
+
+
+def frames_of(figure: Figure, panels: Sequence[Panel]) -> tuple[tuple[float, ...], ...]:
+    """Return where the panels are in a figure that was drawn with linear axes.
+
+    Returns:
+        For each panel a, b, c, d, left, top, right, and bottom, in points from the upper left corner: a value x that
+        is k units of its last decimal is at a + b k, and y at c + d k.
+    """
+    axes_by_name = {axes.get_gid(): axes for axes in figure.axes}
+    height = float(figure.bbox.height)
+    frames = []
+    for panel in panels:
+        axes = axes_by_name[panel.axes]
+        units = [10.0**-decimals for decimals in panel.decimals]
+        (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), units])
+        box = axes.get_window_extent()
+        frames.append((x0, x1 - x0, height - y0, y0 - y1, box.x0, height - box.y1, box.x1, height - box.y0))
+    return tuple(tuple(_short(value) for value in frame) for frame in frames)
+
+
+def marks_content(panels: Sequence[Panel], frames: Sequence[Sequence[Sequence[float]]]) -> dict[str, Any]:
+    """Return what the page's script reads: frames in each width, and panels with values as whole numbers.
+
+    Args:
+        panels: The marks.
+        frames: Those of `frames_of`, of each form of the figure.
+    """
+    return {"frames": frames, "panels": [_panel_content(panel) for panel in panels]}
+
+
+def _panel_content(panel: Panel) -> dict[str, Any]:
+    texts = list(dict.fromkeys(each.text for each in panel.series))
+    return {
+        "decimals": panel.decimals,
+        "texts": texts,
+        "series": [_series_content(each, panel, texts) for each in panel.series],
+    }
+
+
+def _series_content(series: Series, panel: Panel, texts: Sequence[str]) -> list[Any]:
+    xs, ys = (
+        np.rint(values * 10**decimals).astype(int).tolist()
+        for values, decimals in zip(series.points.T, panel.decimals, strict=True)
+    )
+    row = [texts.index(series.text), series.name, ys, 0 if xs == list(range(len(xs))) else xs]
+    more = [list(series.labels) or 0, series.link or 0, series.linked]
+    while more and not more[-1]:
+        more.pop()
+    return row + more
+
+
+def _short(value: float) -> float:
+    """Return a coordinate to a thousandth of a point, and a small factor to 6 digits."""
+    return round(value, 3) if abs(value) >= 1 or value == 0 else float(f"{value:.6g}")
+
+
+def decimals_for(values: npt.NDArray[np.float64]) -> int:
+    """Return the decimals that show 4 digits of the largest value."""
+    largest = float(np.nanmax(np.abs(values), initial=0.0))
+    return 3 if largest == 0 else min(12, max(0, 3 - math.floor(math.log10(largest))))

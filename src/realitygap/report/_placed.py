@@ -1,0 +1,70 @@
+"""A figure on a page: in two widths, with its number and the values that it shows on hover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from realitygap.report._drawing import NARROW, Drawing, inline
+from realitygap.report._marks import marks_content
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+
+@dataclass
+class FigureOnPage:
+    """A figure in two widths, of which the page shows the one that fits.
+
+    Attributes:
+        anchor: Its id on the page; the same in all studies.
+        drawing: The wide form.
+        counterpart: The paper's figure that shows the same; empty for none.
+        number: On the page, from 1; `number_figures` sets it.
+    """
+
+    anchor: str
+    drawing: Drawing
+    counterpart: str = ""
+    number: int = 0
+    wide: Markup = field(init=False)
+    narrow: Markup = field(init=False)
+    marks: dict[str, Any] | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        from markupsafe import Markup
+
+        narrow = self.drawing.in_width(NARROW)
+        self.wide, self.narrow = Markup(inline(self.drawing.svg)), Markup(inline(narrow.svg))
+        frames = (self.drawing.frames, narrow.frames)
+        self.marks = marks_content(self.drawing.marks, frames) if self.drawing.marks else None
+
+    @property
+    def title(self) -> str:
+        """The name of the figure, such as Figure 1."""
+        return f"Figure {self.number}"
+
+    @property
+    def caption(self) -> str:
+        """The caption of the drawing, and the paper's figure that shows the same."""
+        more = f" Counterpart of the paper’s {self.counterpart}." if self.counterpart else ""
+        return self.drawing.caption + more
+
+
+def number_figures(figures: Iterable[Any]) -> None:
+    """Number figures in the order given; reasons why one is missing (text) and None have no number."""
+    found = [each for each in figures if isinstance(each, FigureOnPage)]
+    for number, figure in enumerate(found, 1):
+        figure.number = number
+
+
+def figures_in(content: Any) -> Iterator[FigureOnPage]:
+    """Yield all figures in the content of a page."""
+    if isinstance(content, FigureOnPage):
+        yield content
+    elif isinstance(content, list):
+        for each in content:
+            yield from figures_in(each)
+    elif isinstance(content, Mapping):
+        yield from figures_in(list(content.values()))

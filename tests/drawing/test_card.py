@@ -62,7 +62,7 @@ def test_numbers_that_are_not_there_leave_their_marks_out():
     bars = [Bar(None, None, None, 0, 1), Bar(0.5, None, None, 0, 1), Bar(0.0, -1.0, 1.0, -1, 1)]
     page = Card("a", parts=[Table(["bar", "spark"], [[bar, Spark((), 0, 1)] for bar in bars])]).to_html()
     assert page.count("<circle") == 2
-    assert page.count('class="rg-interval"') == 1
+    assert page.count('class="rg-card-interval"') == 1
     assert "polyline" not in page.partition("</style>")[2]
 
 

@@ -40,7 +40,7 @@ def gap_card(result: GapResult, pictures: Sequence[Picture] = ()) -> Card:
         result.verdict,
         "The simulator cannot reproduce what was observed." if result.misspecified else "",
         parts=[
-            Table(["measure", "estimate [95 % interval]", ""], rows),
+            Table(["measure", "estimate [95 % interval]", "interval"], rows),
             *pictures,
             Table(["not measured", "reason, and what is needed"], refused),
             Table(["measure", "estimate", "n", "meaning"], every, "All measures", closed=True),

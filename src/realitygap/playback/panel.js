@@ -107,7 +107,7 @@ function render({ model, el }) {
       if (performance.now() - since > PATIENCE_MS && !lost) {
         halt();
         lost = true;
-        status.textContent = "The kernel is busy or gone. The robot was stopped.";
+        status.textContent = "The kernel is busy or gone. The pad let go.";
       }
       return;
     }

@@ -64,7 +64,7 @@ def transfer_card(result: TransferResult) -> Card:
         bar = Bar(quality.estimate, quality.low, quality.high, min(0.0, *ends), max(ends)) if ends else ""
         simulated = "–" if each.simulated is None else f"{each.simulated:.3f}"
         rows.append([each.strategy, f"{each.budget:,}", str(quality), bar, str(each.regret), simulated])
-    heads = ["strategy", "budget", f"{result.score} on the target", "", "regret", "in simulation"]
+    heads = ["strategy", "budget", f"{result.score} on the target", "interval", "regret", "in simulation"]
     return Card(
         f"Transfer: {result.study} ({result.condition}) → {result.target}",
         [result.label],

@@ -86,13 +86,18 @@ def test_a_card_of_another_task_or_without_counts_has_its_own_score_or_none(tmp_
 
 def test_a_card_reads_only_files_that_are_new(folder, monkeypatch):
     before = folder._repr_html_()
-    monkeypatch.setattr("realitygap.records._cards.read_rows", None)
-    assert folder._repr_html_() == before
+    assert f"Digest: {folder.digest()}" in before
+    with monkeypatch.context() as patch:
+        patch.setattr(type(folder), "digest_with", None)
+        assert folder._repr_html_() == before
+    again = ResultsFolder.open(folder.path)
+    monkeypatch.setattr("realitygap.records._cards.MOST_DIGESTED_BYTES", 1)
+    assert again._repr_html_() == before.replace(f"<p>Digest: {folder.digest()}</p>\n", "")
 
 
 def test_a_card_of_many_bytes_leaves_medians_out(folder, monkeypatch):
     monkeypatch.setattr("realitygap.records._cards.MOST_READ_BYTES", 1)
-    page = folder._repr_html_()
+    page = ResultsFolder.open(folder.path)._repr_html_()
     assert "polyline points" not in page
     assert "Medians of so many runs: realitygap.summarize(folder)." in page
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -13,14 +13,16 @@ import polars as pl
 from realitygap._medians import median_interval
 from realitygap.drawing import Card, Spark, Table, card_of
 from realitygap.errors import RealityGapError
-from realitygap.records._chunk import ChunkName, read_rows
+from realitygap.records._chunk import read_rows
 from realitygap.records._ledger_kinds import Trial
 from realitygap.records._ledger_reader import LedgerReader
+from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._published_results import PublishedResults
 
+MOST_DIGESTED_BYTES = 1_500_000
 MOST_READ_BYTES = 24_000_000
 MOST_READ_FILES = 64
-"""Size and number of the result files that a card reads for medians: more take over half a second."""
+"""Size and number of the result files that a card reads: more take over half a second. The digest needs all rows."""
 
 MOST_SPARK = 60
 """Points of a line of medians."""
@@ -29,14 +31,21 @@ _KEYS = ["replicate", "generation"]
 
 
 @dataclass(frozen=True)
-class _Best:
-    """The best of each generation in a file, and the size and time of the file that it was read from."""
+class _Read:
+    """What was read of a folder for its card.
 
-    identity: tuple[int, int]
-    frame: pl.DataFrame
+    Attributes:
+        identity: Size and time of each file that it was read from.
+        bests: The best of each generation of each run by condition; None if nobody scored one.
+        digest: Of the results; empty if they are too large.
+    """
+
+    identity: tuple[tuple[str, int, int], ...]
+    bests: Mapping[str, pl.DataFrame | None]
+    digest: str = ""
 
 
-_read: WeakKeyDictionary[PublishedResults, dict[str, _Best]] = WeakKeyDictionary()
+_read: WeakKeyDictionary[PublishedResults, _Read] = WeakKeyDictionary()
 
 
 @card_of.register(PublishedResults)
@@ -60,10 +69,14 @@ def _folder_card(folder: PublishedResults) -> Card:
     code = [
         f"folder = realitygap.ResultsFolder.open({path!r})",
         "realitygap.summarize(folder)",
-        "folder.digest()",
         "folder.scan()",
     ]
-    parts: list[Table | str] = [_conditions_table(folder, description)]
+    read = _read_again(folder, description)
+    parts: list[Table | str] = [_conditions_table(folder, read)]
+    if read is not None and read.digest:
+        parts.append(f"Digest: {read.digest}")
+    else:
+        code.append("folder.digest()")
     if folder.version_note:
         parts.append(folder.version_note)
     return Card(
@@ -75,54 +88,64 @@ def _folder_card(folder: PublishedResults) -> Card:
     )
 
 
-def _conditions_table(folder: PublishedResults, description: Mapping[str, Any]) -> Table:
-    files = folder.files()
-    n_bytes = sum(path.stat().st_size for _, path in files)
-    is_small = n_bytes <= MOST_READ_BYTES and len(files) <= MOST_READ_FILES
-    rows = []
-    bests = {
-        name: _bests(folder, name, files, description) if is_small else None for name in folder.conditions
-    }
-    lines = {name: _line(best) for name, best in bests.items()}
+def _conditions_table(folder: PublishedResults, read: _Read | None) -> Table:
+    if read is None:
+        rows = [[name, f"{folder.count_of(name):,}"] for name in folder.conditions]
+        return Table(["condition", "runs"], rows, "Medians of so many runs: realitygap.summarize(folder).")
+    lines = {name: _line(read.bests[name]) for name in folder.conditions}
     ends = [value for line in lines.values() for value in line]
-    for name in folder.conditions:
-        best = bests[name]
-        n = folder.count_of(name)
-        spark = Spark(lines[name], min(ends), max(ends)) if lines[name] else ""
-        rows.append([name, f"{n:,}", _median(best), spark])
-    note = "" if is_small else "Medians of so many runs: realitygap.summarize(folder)."
-    heads = ["condition", "runs", "median best of a run [95 % interval]", "best by generation"]
-    if not is_small:
-        heads, rows = heads[:2], [row[:2] for row in rows]
-    return Table(heads, rows, note)
+    table = [
+        [
+            name,
+            f"{folder.count_of(name):,}",
+            _median(read.bests[name]),
+            Spark(lines[name], min(ends), max(ends)) if lines[name] else "",
+        ]
+        for name in folder.conditions
+    ]
+    return Table(["condition", "runs", "median best of a run [95 % interval]", "best by generation"], table)
 
 
-def _bests(
-    folder: PublishedResults,
-    condition: str,
-    files: Iterable[tuple[ChunkName, Any]],
-    description: Mapping[str, Any],
-) -> pl.DataFrame | None:
-    """Return the best of each generation of each run of a condition, None if nobody scored it."""
-    column = _score_column(condition, description)
-    known = _read.setdefault(folder, {})
-    frames = []
-    for name, path in files:
-        if name.condition != condition:
-            continue
-        status = path.stat()
-        identity = (status.st_size, status.st_mtime_ns)
-        best = known.get(str(name))
-        if best is None or best.identity != identity:
-            frame = read_rows(path, [*_KEYS, column])[1]
-            known[str(name)] = best = _Best(identity, _best_of(frame, column))
-        frames.append(best.frame)
-    frames += [_best_of(frame, column) for frame in folder.driven_frames(condition)]
-    best_of_all = pl.concat(frames) if frames else None
-    return None if best_of_all is None or best_of_all["best"].null_count() else best_of_all
+def _read_again(folder: PublishedResults, description: Mapping[str, Any]) -> _Read | None:
+    """Return the bests of a folder, read again if a file has changed; None if they are too many."""
+    files = folder.files()
+    paths = [path for _, path in files]
+    ledger = folder.path / LEDGER_NAME
+    stats = [(path.name, path.stat()) for path in (*paths, *([ledger] if ledger.exists() else ()))]
+    identity = tuple((name, status.st_size, status.st_mtime_ns) for name, status in stats)
+    known = _read.get(folder)
+    if known is not None and known.identity == identity:
+        return known
+    n_bytes = sum(status.st_size for _, status in stats)
+    if n_bytes > MOST_READ_BYTES or len(files) > MOST_READ_FILES:
+        return None
+    columns = {name: _score_column(name, description) for name in folder.conditions}
+    frames: dict[str, list[pl.DataFrame]] = {name: [] for name in folder.conditions}
+
+    def look(condition: str, frame: pl.DataFrame) -> None:
+        frames[condition].append(_best_of(frame, columns[condition]))
+
+    digest = ""
+    if n_bytes <= MOST_DIGESTED_BYTES:
+        digest = folder.digest_with(look)
+    else:
+        for name, path in files:
+            look(name.condition, read_rows(path, [*_KEYS, columns[name.condition]])[1])
+    for condition in frames:
+        for frame in folder.driven_frames(condition):
+            look(condition, frame)
+    joined = {condition: pl.concat(parts) if parts else None for condition, parts in frames.items()}
+    bests = {
+        condition: None if best is None or best["best"].null_count() else best
+        for condition, best in joined.items()
+    }
+    _read[folder] = _Read(identity, bests, digest)
+    return _read[folder]
 
 
 def _best_of(frame: pl.DataFrame, column: str) -> pl.DataFrame:
+    if column not in frame.columns:
+        frame = frame.with_columns(pl.lit(None, pl.Float64).alias(column))
     return frame.group_by(_KEYS, maintain_order=True).agg(pl.col(column).cast(pl.Float64).max().alias("best"))
 
 

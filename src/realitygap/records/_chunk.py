@@ -147,8 +147,8 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> tuple[Chunk, 
     return chunk, _read_checked(chunk, sealed)[0]
 
 
-def digest_rows(path: Path, digest: RowsDigest) -> Chunk:
-    """Feed the rows of a chunk to `digest`, after they were held to the digest in the file.
+def digest_rows(path: Path, digest: RowsDigest) -> tuple[Chunk, pl.DataFrame]:
+    """Feed the rows of a chunk to `digest`, after a check against the digest in the file, and return both.
 
     Raises:
         RecordError: the file is torn, foreign, or not what its name says.
@@ -156,7 +156,7 @@ def digest_rows(path: Path, digest: RowsDigest) -> Chunk:
     chunk, sealed = _open(path)
     frame, streams = _read_checked(chunk, sealed)
     digest.update(streams, frame.height)
-    return chunk
+    return chunk, frame
 
 
 def _open(path: Path) -> tuple[Chunk, bytes]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -338,11 +338,24 @@ class PublishedResults:
             RecordError: as `chunks`.
         """
         self._warn_of_version()
+        return self.digest_with(lambda _condition, _frame: None)
+
+    def digest_with(self, look: Callable[[str, pl.DataFrame], None]) -> str:
+        """Return the digest without a warning about its version.
+
+        Args:
+            look: Called with the condition and the rows of each file.
+
+        Raises:
+            RecordError: As `chunks`.
+        """
         rows: dict[str, RowsDigest] = {}
         chunks: list[Chunk] = []
         for name in self._names():
             digest = rows.setdefault(name.condition, RowsDigest())
-            chunks.append(digest_rows(self._trials / str(name), digest))
+            chunk, frame = digest_rows(self._trials / str(name), digest)
+            chunks.append(chunk)
+            look(name.condition, frame)
         self._check_together(chunks)
         hashes = {chunk.condition: chunk.condition_hash for chunk in chunks}
         hashes |= self._digest_driven(rows)

@@ -90,9 +90,12 @@ def test_a_card_reads_only_files_that_are_new(folder, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(type(folder), "digest_with", None)
         assert folder._repr_html_() == before
-    again = ResultsFolder.open(folder.path)
     monkeypatch.setattr("realitygap.records._cards.MOST_DIGESTED_BYTES", 1)
-    assert again._repr_html_() == before.replace(f"<p>Digest: {folder.digest()}</p>\n", "")
+    page = ResultsFolder.open(folder.path)._repr_html_()
+    assert "Digest: " not in page
+    assert "\nfolder.digest()\n" in page
+    table = slice(before.index("<table>"), before.index("</table>"))
+    assert page[table] == before[table]
 
 
 def test_a_card_of_many_bytes_leaves_medians_out(folder, monkeypatch):

@@ -32,7 +32,7 @@ _KEYS = ["replicate", "generation"]
 
 @dataclass(frozen=True)
 class _Read:
-    """What was read of a folder for its card.
+    """The content of a folder that its card needs.
 
     Attributes:
         identity: Size and time of each file that it was read from.

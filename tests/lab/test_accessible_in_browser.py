@@ -91,7 +91,7 @@ def test_pages_without_a_study(lab, look):
     for path, text in (
         ("", "No studies yet."),
         ("new", "Start study"),
-        ("calibrate", "What to calibrate"),
+        ("calibrate", "No calibrations yet."),
         ("gap", "Measure"),
         ("robot", "No robot connected."),
     ):
@@ -144,6 +144,7 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
 
 def test_a_calibration_whose_plot_grows(lab, look):
     page = look("calibrate")
+    page.get_by_role("button", name="Next").click()
     open_advanced(page, page.get_by_label("Number of trials"))
     page.get_by_label("Number of trials").fill("4")
     page.get_by_role("button", name="Calibrate", exact=True).click()

@@ -7,23 +7,37 @@ import re
 import pytest
 
 from realitygap.emulator import Emulator, serve_tcp
+from realitygap.lab.pages._calibrate import _KINDS, PLACING_S
+from realitygap.platforms import class_of
 from realitygap.records import read_observations
-from realitygap.world import read_calibration
+from realitygap.study._calibrate.kinds import KINDS
+from realitygap.world import load_arena, load_robot, read_calibration
 
-from .conftest import PHONE
+from .conftest import DESKTOP, FOR_CHILDREN, PHONE
 
 pytestmark = pytest.mark.slow
 
 
-def begin(page, **fields: str) -> None:
+STEP_S = 0.5
+"""Time of a command [s]."""
+REJECTED = """
+import sys
+if "realitygap.lab._work" in sys.orig_argv:
+    from realitygap.lab import _calibrate_work
+    calibrate = _calibrate_work.calibrate
+    def rejected(*given, **options):
+        made = calibrate(*given, **options)
+        return made.model_copy(update={"misspecified": True, "misspecification_p": 0.01})
+    _calibrate_work.calibrate = rejected
+"""
+
+
+def begin(page, kind: str = "sensors", **fields: str) -> None:
     for label, value in fields.items():
         page.get_by_label(label, exact=True).first.fill(value)
+    page.get_by_role("button", name="Next", exact=True).click()
+    page.locator(f'[data-kind="{kind}"]').click()
     page.get_by_role("button", name="Calibrate", exact=True).click()
-
-
-def choose(page, label: str, option: str) -> None:
-    page.get_by_label(label, exact=True).click()
-    page.get_by_role("option", name=option).click()
 
 
 def measure(page, ahead: str, left: str, turned: str) -> None:
@@ -42,6 +56,43 @@ def n_plotted(page) -> int:
     """Of how many trials there are readings in the plot, as it says of itself."""
     said = page.locator(".lab-plot").get_attribute("aria-label")
     return int(re.search(r"of (\d+) trial", said)[1])
+
+
+def test_cards_state_the_trials_and_minutes_of_each_kind():
+    robot = load_robot(class_of("scribbler:port").base_robot)
+    for kind, (_, _, n_trials, minutes) in _KINDS.items():
+        plans = KINDS[kind].plans(load_arena("paper"), robot, None)
+        seconds = sum(len(plan.commands) * STEP_S + PLACING_S for plan in plans)
+        assert (n_trials, minutes) == (len(plans), round(seconds / 60)), kind
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_wizard_leads_from_the_robot_to_a_result_and_shows_a_rejection(lab, visit, size):
+    (lab.root.parent / FOR_CHILDREN).mkdir()
+    (lab.root.parent / FOR_CHILDREN / "sitecustomize.py").write_text(REJECTED)
+    page = visit("calibrate", size=size)
+    step = page.locator(".lab-steps [aria-current=step]")
+    page.get_by_text("No calibrations yet.").wait_for()
+    page.get_by_label("Name", exact=True).fill("not a name!")
+    for _ in range(2):
+        page.get_by_role("button", name="Next").click()
+        step.filter(has_text="What").wait_for()
+        page.locator('[data-kind="path"]').press("Space")
+        page.locator('[data-kind="path"][aria-checked="true"]').wait_for()
+        page.get_by_role("button", name="Calibrate", exact=True).click()
+        if page.get_by_label("Name", exact=True).input_value() == "refused":
+            break
+        page.get_by_role("alert").filter(has_text="You entered 'not a name!'.").wait_for()
+        step.filter(has_text="Robot").wait_for()
+        page.get_by_label("Name", exact=True).fill("refused")
+        page.wait_for_timeout(600)  # a field waits a moment for more letters
+    step.filter(has_text="Result").wait_for()
+    page.get_by_text("Rejected: the simulator can't reproduce this robot (p = 0.01).").wait_for()
+    assert page.locator(".lab-fitted .lab-bar-interval").count() > 0
+    assert page.locator(".lab-fitted tbody").get_by_text("dentified").count() > 0
+    page.get_by_role("button", name="Measure the gap").click()
+    page.wait_for_url("**/gap?sim=sim:refused.toml")
+    assert page.get_by_label("Simulator", exact=True).input_value() == "sim:refused.toml"
 
 
 def test_sensors_of_an_emulated_robot_are_calibrated_with_a_plot(lab, visit):
@@ -68,8 +119,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
     """The emulator is at a socket, of which nobody says that it is one with a witness: somebody has to place it."""
     with serve_tcp(Emulator("s2"), speed=20) as server:
         page = visit("calibrate")
-        choose(page, "What to calibrate", "Path")
-        begin(page, Robot=f"scribbler:{server.name}", Name="led")
+        begin(page, "path", Robot=f"scribbler:{server.name}", Name="led")
         for number in (1, 2):
             page.locator(".lab-question").get_by_text(f"Trial {number} of").wait_for()
             page.get_by_role("button", name="Robot is in place").click()
@@ -94,8 +144,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         page.get_by_role("button", name="Stop calibration").click()
         page.get_by_text("Recorded trials are saved").wait_for()
         assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2
-        choose(page, "What to calibrate", "Path")
-        begin(page, Robot=f"scribbler:{server.name}", Name="led")
+        begin(page, "path", Robot=f"scribbler:{server.name}", Name="led")
         page.get_by_text("before you said what you saw").wait_for()
         page.get_by_role("button", name="Use this trial").click()
         page.get_by_label("Turn to the left").wait_for()

@@ -77,7 +77,12 @@ def _tell_made(channel: Channel, made: Calibration, out: Path) -> None:
         figure = save_sensor_figure(made, out.with_suffix(".svg")).read_text("utf-8")
     fitted = [each.model_dump() for each in made.fitted]
     channel.say(
-        "made", fitted=fitted, notes=list(made.notes), misspecified=bool(made.misspecified), figure=figure
+        "made",
+        fitted=fitted,
+        notes=list(made.notes),
+        misspecified=bool(made.misspecified),
+        p=made.misspecification_p,
+        figure=figure,
     )
 
 

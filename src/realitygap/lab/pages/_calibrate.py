@@ -19,15 +19,35 @@ from ._grid import CellGrid
 from ._handover import show_holder
 from ._notices import notify
 from ._part import Part, watching
+from ._steps import show_steps
 
 _KINDS = {
-    "path": ("Path", "The paper's method: five full steps ahead, and five that turn."),
-    "sensors": ("Sensors", "The paper's method: fifty readings at each distance from a wall."),
-    "motion": ("Motion", "Motors and drift."),
-    "contact": ("Contact", "Effect of walls on the motion."),
-    "all": ("All", "Motion, sensors, and contact together."),
+    "path": ("Path", "The paper's method: five full steps ahead, and five that turn.", 10, 4),
+    "sensors": ("Sensors", "The paper's method: fifty readings at each distance from a wall.", 18, 14),
+    "motion": ("Motion", "Motors and drift.", 10, 12),
+    "contact": ("Contact", "Effect of walls on the motion.", 10, 12),
+    "all": ("All", "Motion, sensors, and contact together.", 20, 15),
 }
-"""Name and meaning of each kind of calibration."""
+"""Name, meaning, trials on a Scribbler, and their time [min] of each kind of calibration."""
+PLACING_S = 20.0
+"""Time to place a robot before a trial [s]."""
+_OF_ROBOT = ("platform", "name")
+"""Fields of the first step."""
+_STEPS = ("Robot", "What", "Run", "Result")
+_BAR = """
+<q-td :props="props"><svg viewBox="0 0 100 12" width="120" height="14" aria-hidden="true" preserveAspectRatio="none">
+  <rect x="0" y="5" width="100" height="2" class="lab-bar-prior" />
+  <rect :x="props.value[0]" y="3" :width="props.value[1]" height="6" class="lab-bar-interval" />
+  <rect :x="props.value[2] - 0.8" y="0" width="1.6" height="12" class="lab-bar-estimate" />
+</svg></q-td>
+"""
+"""An interval as a bar within the range of its prior."""
+_STATE = """
+<q-td :props="props">
+  <span :class="props.value === 'Identified' ? 'lab-ok' : 'lab-warning'">{{ props.value }}</span>
+  <div v-if="props.row.advice" class="lab-hint">{{ props.row.advice }}</div>
+</q-td>
+"""
 _INKS = ("#0072b2", "#c94f00", "#00805c", "#b0508c")
 
 
@@ -45,6 +65,9 @@ class _Page:
         self._lab = lab
         self._visitor = visitor
         self._chart: ui.echart | None = None
+        self._is_new = False
+        self._chosen = "sensors"
+        self._stage = "Robot"
 
     def show(self) -> None:
         hint(
@@ -52,6 +75,8 @@ class _Page:
             "robot, the page tells you where to place it. Trials are saved: calibrate again under the same name to "
             "continue."
         )
+        self._steps = Part(self._step, lambda step: show_steps(_STEPS, step))
+        self._steps.show()
         self._form_box = ui.element("div").classes("lab-form")
         with self._form_box:
             self._show_form()
@@ -64,6 +89,8 @@ class _Page:
             self._asked.show()
             self._made()
             self._plot()
+        self._again = ui.button("New calibration", on_click=self._begin_again).props("outline no-caps")
+        self._fold_form()
         watching(self._lab, self._look)
 
     def _stand(self) -> Any:
@@ -81,7 +108,32 @@ class _Page:
     def _may(self, job: CalibrationJob) -> bool:
         return not job.has_robot or self._lab.may_operate(self._visitor)
 
+    def _step(self) -> str:
+        job = self._lab.calibration
+        if self._is_new or job is None:
+            return self._stage
+        if not job.is_over:
+            return "Run"
+        return "Result" if job.made is not None else self._stage
+
+    def _begin_again(self) -> None:
+        self._is_new = True
+        self._show_stage("Robot")
+        self._fold_form()
+        self._steps.look()
+
+    def _fold_form(self) -> None:
+        """Show the form unless a calibration runs or its result is shown."""
+        step = self._step()
+        self._form_box.set_visibility(step in ("Robot", "What"))
+        self._again.set_visibility(step == "Result")
+
     def _look(self) -> None:
+        job = self._lab.calibration
+        if job is not None and not job.is_over:
+            self._is_new = False
+        self._fold_form()
+        self._steps.look()
         self._asked.look()
         self._work.look()
         before, now, job = self._seen, self._stand(), self._lab.calibration
@@ -95,49 +147,103 @@ class _Page:
         self._made.refresh()
 
     def _show_form(self) -> None:
-        form = Form()
+        self._form = form = Form()
         form.summary()
-        kinds = {kind: name for kind, (name, _) in _KINDS.items()}
-        kind = form.choice("kind", "What to calibrate", kinds, "sensors")
-        meaning = hint(_KINDS["sensors"][1])
-        kind.on_value_change(lambda event: meaning.set_text(_KINDS[event.value][1]))
-        form.text(
-            "platform",
-            "Robot",
-            "sim",
-            options=["sim", *emulated_robots()],
-            is_needed=True,
-            explanation="scribbler:PORT, thymio:PORT, twin:FILE, sim, or sim:FILE. Emulated robots: "
-            f"{', '.join(emulated_robots())}.",
-        )
-        form.text("name", "Name", "my-robot", is_needed=True, explanation="Name of the calibration file.")
-        with ui.expansion("Advanced").classes("lab-expansion"):
-            form.choice("observe", "Observation level", ["cells", "encoders", "track"], "cells")
+        with ui.element("div").classes("lab-form") as self._robot_box:
+            section("Robot")
             form.text(
-                "base",
-                "Robot model",
-                explanation="Robot, or its file, to start the fit from. Default: that of the platform.",
+                "platform",
+                "Robot",
+                "sim",
+                options=["sim", *emulated_robots()],
+                is_needed=True,
+                explanation="scribbler:PORT, thymio:PORT, twin:FILE, sim, or sim:FILE. Emulated robots: "
+                f"{', '.join(emulated_robots())}.",
             )
-            form.number(
-                "budget",
-                "Number of trials",
-                None,
-                1,
-                10_000,
-                explanation="Total number of trials. Default: depends on what you calibrate.",
+            form.text("name", "Name", "my-robot", is_needed=True, explanation="Name of the calibration file.")
+            ui.button("Next", on_click=self._go_to_kinds).props("unelevated no-caps")
+        with ui.element("div").classes("lab-form") as self._kind_box:
+            section("What to calibrate")
+            with (
+                ui.element("div")
+                .classes("lab-kinds")
+                .props('role="radiogroup" aria-label="What to calibrate"')
+            ):
+                self._cards = {kind: self._show_card(kind) for kind in _KINDS}
+            hint(
+                f"Minutes are for a Scribbler, with {PLACING_S:.0f} s to place it before each trial. "
+                "Simulated robots take less."
             )
-            form.text(
-                "witness",
-                "Witness",
-                explanation="HOST:PORT of the witness of an emulator in another program.",
-            )
+            with ui.expansion("Advanced").classes("lab-expansion"):
+                form.choice("observe", "Observation level", ["cells", "encoders", "track"], "cells")
+                form.text(
+                    "base",
+                    "Robot model",
+                    explanation="Robot, or its file, to start the fit from. Default: that of the platform.",
+                )
+                form.number(
+                    "budget",
+                    "Number of trials",
+                    None,
+                    1,
+                    10_000,
+                    explanation="Total number of trials. Default: depends on what you calibrate.",
+                )
+                form.text(
+                    "witness",
+                    "Witness",
+                    explanation="HOST:PORT of the witness of an emulator in another program.",
+                )
+
+        async def start() -> None:
+            if not await form.submit(begin) and any(self._form.is_wrong(key) for key in _OF_ROBOT):
+                self._show_stage("Robot")
 
         def begin(values: dict[str, Any]) -> None:
             name = values.pop("name")
+            values["kind"] = self._chosen
             base = values["base"] or class_of(values["platform"]).base_robot
             self._lab.calibrate(name, {**values, "base": base}, self._visitor)
 
-        ui.button("Calibrate", on_click=lambda: form.submit(begin)).props("unelevated no-caps")
+        with self._kind_box, ui.row().classes("lab-row"):
+            ui.button("Calibrate", on_click=start).props("unelevated no-caps")
+            ui.button("Back", on_click=lambda: self._show_stage("Robot")).props("flat no-caps")
+        self._show_stage("Robot")
+
+    def _go_to_kinds(self) -> None:
+        """Go on to the kinds of calibration if the robot and the name can be used."""
+        problems = {key: text for key, text in self._form.problems().items() if key in _OF_ROBOT}
+        self._form.show_problems(problems)
+        if not problems:
+            self._show_stage("What")
+
+    def _show_stage(self, stage: str) -> None:
+        self._stage = stage
+        self._robot_box.set_visibility(stage == "Robot")
+        self._kind_box.set_visibility(stage == "What")
+        self._steps.look()
+
+    def _show_card(self, kind: str) -> ui.element:
+        """One of the cards, as a radio button: arrow keys and Space choose."""
+        name, meaning, n_trials, minutes = _KINDS[kind]
+        with ui.element("div").classes("lab-kind").props(f'role="radio" data-kind="{kind}"') as card:
+            ui.label(name).classes("lab-label")
+            hint(meaning)
+            ui.label(f"{n_trials} trials · {minutes} min").classes("lab-value")
+        card.on("click", lambda: self._choose(kind))
+        card.on("keydown.space.prevent", lambda: self._choose(kind))
+        card.on("keydown.enter.prevent", lambda: self._choose(kind))
+        self._mark(card, is_chosen=kind == self._chosen)
+        return card
+
+    def _choose(self, kind: str) -> None:
+        self._chosen = kind
+        for name, card in self._cards.items():
+            self._mark(card, is_chosen=name == kind)
+
+    @staticmethod
+    def _mark(card: ui.element, *, is_chosen: bool) -> None:
+        card.props(f'aria-checked="{"true" if is_chosen else "false"}" tabindex="0"')
 
     def _work_state(self) -> tuple[Any, ...] | None:
         job = self._lab.calibration
@@ -155,9 +261,8 @@ class _Page:
 
     def _show_work(self, state: tuple[Any, ...] | None) -> None:
         job = self._lab.calibration
-        self._form_box.set_visibility(job is None or job.is_over)
         if job is None or state is None:
-            ui.label("No calibration has been started since the lab was opened.")
+            ui.label("No calibrations yet.")
             return
         section(f"{job.name}: {job.kind}")
         ui.label(job.progress).classes("lab-problem lab-lines" if job.is_failed else "").props(
@@ -181,7 +286,7 @@ class _Page:
     def _show_made(self) -> None:
         job = self._lab.calibration
         if job is not None and job.made is not None:
-            _show_fit(job.made)
+            _show_fit(job.made, job.name)
 
 
 def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
@@ -268,18 +373,31 @@ def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
     }
 
 
-def _show_fit(made: dict[str, Any]) -> None:
+def _show_fit(made: dict[str, Any], name: str) -> None:
     if made["misspecified"]:
+        p = f" (p = {made['p']:.2g})" if made["p"] < 1 else ""
         ui.label(
-            "Rejected: the simulator can't reproduce this robot. Don't use this calibration for conclusions."
+            f"Rejected: the simulator can't reproduce this robot{p}. Don't use this calibration for conclusions."
         ).classes("lab-rejected").props('role="alert"')
+    with ui.row().classes("lab-row"):
+        target = f"sim:{name}.toml"
+        ui.button("Use in a study", on_click=lambda: ui.navigate.to(f"/new?platform={target}")).props(
+            "unelevated no-caps"
+        )
+        ui.button("Measure the gap", on_click=lambda: ui.navigate.to(f"/gap?sim={target}")).props(
+            "outline no-caps"
+        )
     section("Parameters with 90 % intervals")
+    fitted = made["fitted"]
+    n_identified = sum(each["identified"] for each in fitted)
+    ui.label(f"{n_identified} of {len(fitted)} parameters are identified.")
     columns = [
         {"name": name, "label": label, "field": name, "align": "left"}
         for name, label in (
             ("name", "Parameter"),
             ("estimate", "Estimate"),
             ("interval", "Interval"),
+            ("bar", "Within the prior"),
             ("state", "Identified"),
         )
     ]
@@ -288,15 +406,23 @@ def _show_fit(made: dict[str, Any]) -> None:
             "name": each["name"],
             "estimate": f"{each['estimate']:.4g} {each['unit']}",
             "interval": f"{each['low']:.4g} to {each['high']:.4g}",
+            "bar": _bar(each),
             "state": "Identified" if each["identified"] else "Not identified",
+            "advice": each.get("advice", ""),
         }
-        for each in made["fitted"]
+        for each in fitted
     ]
-    ui.table(rows=rows, columns=columns, row_key="name").classes("lab-table lab-fitted").props(
-        "flat bordered dense wrap-cells"
-    )
+    table = ui.table(rows=rows, columns=columns, row_key="name").classes("lab-table lab-fitted")
+    table.props("flat bordered dense wrap-cells")
+    table.add_slot("body-cell-bar", _BAR)
+    table.add_slot("body-cell-state", _STATE)
     for note in made["notes"]:
         hint(note)
-    with ui.row().classes("lab-row"):
-        ui.link("New study", "/new")
-        ui.link("Measure the gap", "/gap")
+
+
+def _bar(fitted: dict[str, Any]) -> list[float]:
+    """Left end, width, and estimate of an interval within its prior [%]."""
+    low, high = fitted["prior_low"], fitted["prior_high"]
+    width = high - low if high > low else 1.0
+    ends = [min(max(100 * (fitted[key] - low) / width, 0.0), 100.0) for key in ("low", "high", "estimate")]
+    return [round(ends[0], 1), round(max(ends[1] - ends[0], 1.0), 1), round(ends[2], 1)]

@@ -175,6 +175,10 @@ class Form:
         """Return what is wrong in each field, by key; empty if nothing is."""
         return {key: text for key in self._fields if (text := self._checked(key))}
 
+    def is_wrong(self, key: str) -> bool:
+        """Return whether a mistake is shown at this field."""
+        return bool(self._fields[key].problem.text)
+
     def clear(self) -> None:
         """Forget all fields, because others will be added."""
         self._fields.clear()

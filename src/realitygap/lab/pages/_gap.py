@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from nicegui import app, run, ui
@@ -15,6 +16,7 @@ from realitygap.platforms import emulated_robots
 
 from ._fields import Form
 from ._frame import framed, hint, section, visitor_of
+from ._new import CALIBRATED
 from ._part import Part, watching
 
 _QUESTIONS = {
@@ -30,8 +32,9 @@ def add_gap(lab: Lab) -> None:
     @ui.page("/gap", response_timeout=30)
     async def gap(request: Request) -> None:
         reports = await run.io_bound(lab.gap_reports) or []
+        sim = request.query_params.get("sim", "")
         with framed(lab, "Gap", "/gap", is_wide=True):
-            _Page(lab, visitor_of(request), reports).show()
+            _Page(lab, visitor_of(request), reports, sim if re.fullmatch(CALIBRATED, sim) else "sim").show()
 
     @app.get("/gaps/{name}")
     def report(name: str) -> Response:
@@ -43,8 +46,8 @@ def add_gap(lab: Lab) -> None:
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor, reports: list[str]) -> None:
-        self._lab, self._visitor, self._reports = lab, visitor, reports
+    def __init__(self, lab: Lab, visitor: Visitor, reports: list[str], sim: str) -> None:
+        self._lab, self._visitor, self._reports, self._sim = lab, visitor, reports, sim
 
     def show(self) -> None:
         hint(
@@ -85,7 +88,7 @@ class _Page:
         form.summary()
         sim = ["sim", "jyro"]
         form.text(
-            "sim", "Simulator", "sim", options=sim, is_needed=True, explanation="sim, sim:FILE, or jyro."
+            "sim", "Simulator", self._sim, options=sim, is_needed=True, explanation="sim, sim:FILE, or jyro."
         )
         form.text(
             "target",

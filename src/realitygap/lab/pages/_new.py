@@ -8,6 +8,7 @@ from importlib import resources
 from typing import Any, Literal
 
 from nicegui import events, run, ui
+from starlette.requests import Request
 
 from realitygap.errors import StudyError
 from realitygap.lab._checks import Check
@@ -44,6 +45,8 @@ selection = "novelty"
 noise = 0.1
 """
 _EMPTY = "Two conditions"
+CALIBRATED = r"sim:[A-Za-z0-9][A-Za-z0-9._-]{0,90}\.toml"
+"""Platform of a calibration, as addresses of pages name it."""
 
 MOST_SHOWN = 50
 """Number of conditions that the form shows."""
@@ -85,10 +88,16 @@ def add_new(lab: Lab) -> None:
     """Add the page."""
 
     @ui.page("/new", response_timeout=30)
-    async def new() -> None:
+    async def new(request: Request) -> None:
         await run.io_bound(lab.checks.prepare)
+        draft = _Draft()
+        platform = request.query_params.get("platform", "")
+        if re.fullmatch(CALIBRATED, platform):
+            for condition in draft.data["condition"]:
+                condition["platform"] = platform
+                condition.pop("noise", None)  # the calibrated robot has its own
         with framed(lab, "New study", "", above=[("Studies", "/")]):
-            _Page(lab, _Draft()).show()
+            _Page(lab, draft).show()
 
 
 class _Page:

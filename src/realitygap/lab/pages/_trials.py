@@ -28,6 +28,7 @@ from ._notices import WRONG, attempt
 from ._part import Part, watching
 from ._photos import SheetPhotos
 from ._questions import show_question
+from ._steps import show_steps
 from ._videos import Videos
 
 EMULATED = "emulator://s2?fluke=2"
@@ -174,7 +175,7 @@ class _Page:
     def _turn_to(self, at: tuple[str, bool]) -> None:
         """Show the steps; open the section of the current one and close the others."""
         step, _ = at
-        _show_steps(step)
+        show_steps(_STEPS, step)
         if self._is_shown:
             self._name_box.set_visibility(not self._visitor.who)
             self._open_step(step)
@@ -494,15 +495,6 @@ class _AskedStand:
     may: bool = False
     n_trials: int = 0
     is_complete: bool = False
-
-
-def _show_steps(current: str) -> None:
-    with ui.element("ol").classes("lab-steps").props('aria-label="Steps"'):
-        for step in _STEPS:
-            with ui.element("li") as item:
-                ui.label(step)
-            if step == current:
-                item.props('aria-current="step"')
 
 
 def _show_preflight(found: dict[str, Any]) -> None:

@@ -136,6 +136,27 @@ def _floor_arena(path: Path) -> Any:
     return _arena(arena)
 
 
+_MAP = b"""\
+image: map.png
+resolution: 0.05
+origin: [-1.0, -1.0, 0.1]
+negate: 0
+occupied_thresh: 0.98
+free_thresh: 0.95
+"""
+
+
+def _map(path: Path) -> Any:
+    """Read an arena from a map of ROS; the bytes are those of its YAML file or of its image."""
+    from realitygap.vision import arena_of_map
+
+    if path.suffix == ".yaml":
+        path.with_name("map.png").write_bytes(_image("PNG", 16))
+    else:
+        path.with_name("map.yaml").write_bytes(_MAP)
+    return arena_of_map(path.with_name("map.yaml"))
+
+
 def _calibration(path: Path) -> Any:
     from realitygap.world import load_calibration
 
@@ -459,6 +480,8 @@ def _formats() -> dict[str, Format]:
         "robot.toml": Format(_ROBOT, _reader("robot.toml", _robot)),
         "arena.toml": Format(_ARENA, _reader("arena.toml", _arena)),
         "arena.svg": Format(_SVG, _reader("arena.svg", _arena)),
+        "map.yaml": Format(_MAP, _reader("map.yaml", _map)),
+        "map.png": Format(_image("PNG", 16), _reader("map.png", _map)),
         "twin.toml": Format(_valid_twin(), _reader("twin.toml", _twin)),
         "calibration.toml": Format(_valid_calibration(), _reader("fit.toml", _calibration)),
         "lens.toml": Format(_LENS, _reader("lens.toml", _lens)),

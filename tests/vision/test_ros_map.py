@@ -169,6 +169,9 @@ WRONG = {
     "mode": ({"mode": "magic"}, "mode: expected trinary, scale, raw, came 'magic'"),
     "negate": ({"negate": 2}, "negate: expected a number from 0 to 1, came 2"),
     "image": ({"image": "other.pgm"}, "image: there is no file .*other.pgm"),
+    "another folder": ({"image": "../room.pgm"}, "image: expected a file in the folder of the map, came"),
+    "another place": ({"image": "/etc/hostname"}, "image: expected a file in the folder of the map, came"),
+    "large": ({"resolution": 10**400}, "resolution: expected a number from 0.0001 to 1000, came"),
     "image's name": ({"image": 7}, "image: expected the name of an image file, came 7"),
     "itself": ({"image": "room.yaml"}, "image: room.yaml is no image that can be read"),
 }
@@ -185,6 +188,11 @@ def test_a_wrong_value_has_one_message(tmp_path, values, message):
     [
         (b"image: [", "not YAML"),
         (b"\xff\xfe\x00", "not a YAML file of a map"),
+        (
+            b"image: a\norigin: [0x" + b"f" * 5000 + b"]\nresolution: 1",
+            "a value has 5,002 letters, expected at most",
+        ),
+        (b"a: &a [1]\nimage: [*a, *a]\n", "it has references"),
         (b"- 1\n- 2\n", "it has no image, resolution, origin"),
         (b"!!python/object/apply:os.system ['touch owned']\n", "not YAML"),
     ],

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._limits import MOST_TOML_BYTES, open_image, read_file
+from realitygap._limits import open_image, read_file
 from realitygap.errors import DescriptionError, from_extra
 from realitygap.records import write_whole
+from realitygap.settings import shown
 from realitygap.world import Arena, ArenaFile, Obstacle, Pose
 
 MOST_SIDE = 8192
@@ -39,6 +40,9 @@ _TOLERANCE = 1.5
 
 _FINE = 4
 """Parts of a pixel to which the border of free space is traced."""
+
+_MOST_YAML_BYTES = 65_536
+_MOST_LETTERS = 1_000
 
 _KEYS = ("image", "resolution", "origin")
 _MODES = ("trinary", "scale", "raw")
@@ -98,11 +102,11 @@ def read_map(path: str | Path) -> OccupancyMap:
     resolution = _number(path, "resolution", values["resolution"], 1e-4, 1e3)
     origin = values["origin"]
     if not (isinstance(origin, list) and len(origin) in (2, 3)):
-        raise DescriptionError(f"{path}: origin: expected [x, y, yaw], came {origin!r}.")
+        raise DescriptionError(f"{path}: origin: expected [x, y, yaw], came {shown(origin)}.")
     x, y, yaw = (_number(path, "origin", value, -1e4, 1e4) for value in [*origin, 0.0][:3])
     mode = values.get("mode", "trinary")
     if mode not in _MODES:
-        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, came {mode!r}.")
+        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, came {shown(mode)}.")
     free_thresh = _number(path, "free_thresh", values.get("free_thresh", FREE_THRESH), 0.0, 1.0)
     occupied = _number(path, "occupied_thresh", values.get("occupied_thresh", OCCUPIED_THRESH), 0.0, 1.0)
     if not free_thresh < occupied:
@@ -290,7 +294,7 @@ def _values(path: Path) -> dict[str, Any]:
     """Return the values of the YAML file, all that a map needs among them."""
     yaml = from_extra("yaml", "ros")
     try:
-        text = read_file(path, MOST_TOML_BYTES).decode()
+        text = read_file(path, _MOST_YAML_BYTES).decode()
     except FileNotFoundError:
         raise DescriptionError(f"There is no map {path}. Name the YAML file of a map.") from None
     except OSError as error:
@@ -298,6 +302,14 @@ def _values(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise DescriptionError(f"{path}: not a YAML file of a map ({error}).") from None
     try:
+        for event in yaml.parse(text, yaml.SafeLoader):
+            # a list of references to lists of references takes all memory once it is printed
+            if isinstance(event, yaml.AliasEvent):
+                raise DescriptionError(f"{path}: it has references (*), expected plain values.")
+            if isinstance(event, yaml.ScalarEvent) and len(event.value) > _MOST_LETTERS:
+                raise DescriptionError(
+                    f"{path}: a value has {len(event.value):,} letters, expected at most {_MOST_LETTERS:,}."
+                )
         values = yaml.safe_load(text)
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         said = str(error).split("\n")[0]
@@ -313,19 +325,24 @@ def _values(path: Path) -> dict[str, Any]:
 def _number(path: Path, key: str, value: Any, least: float, most: float) -> float:
     if isinstance(value, bool) and key == "negate":
         value = int(value)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not is_number or not least <= value <= most:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (is_number and least <= value <= most):
         raise DescriptionError(
-            f"{path}: {key}: expected a number from {least:g} to {most:g}, came {value!r}."
+            f"{path}: {key}: expected a number from {least:g} to {most:g}, came {shown(value)}."
         )
     return float(value)
 
 
 def _gray(path: Path, name: Any) -> NDArray[np.float64]:
     """Return the gray values of the image, 0 to 255."""
-    if not isinstance(name, str) or not name:
-        raise DescriptionError(f"{path}: image: expected the name of an image file, came {name!r}.")
+    if not isinstance(name, str) or not name or "\x00" in name:
+        raise DescriptionError(f"{path}: image: expected the name of an image file, came {shown(name)}.")
     file = path.parent / name
+    if not file.resolve().is_relative_to(path.parent.resolve()):
+        raise DescriptionError(
+            f"{path}: image: expected a file in the folder of the map, came {shown(name)}. Copy the image there, and "
+            "change its name in the YAML file."
+        )
     try:
         with open_image(file, MOST_SIDE) as picture:
             return np.asarray(picture.convert("L"), dtype=np.float64)

@@ -49,7 +49,7 @@ def test_best_search_and_noise_are_named_with_intervals_and_corrected_p(out):
         "No effect of noise from 10 % to 80 % on the best coverage of objective search and novelty search is supported."
     )
     for finding in (best, search, noise):
-        assert re.search(r"[+±−]0\.\d{3} \[[+±−]0\.\d{3}, [+±−]0\.\d{3}\], p [=<≤] ?\S", finding.evidence)
+        assert re.search(r"[+±−]0\.\d{3} \[[+±−]0\.\d{3}, [+±−]0\.\d{3}\], p\s[=<≤]\s\S", finding.evidence)
         assert finding.table == "comparisons"
 
 

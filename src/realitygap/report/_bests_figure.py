@@ -122,6 +122,10 @@ def _series(
     for index, (row, offsets) in enumerate(zip(rows, positions, strict=True)):
         if not len(row.values):
             continue
+        interval = row.interval
+        within = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
+        text = f"{{name}}: median {{x}}{within}, n = {len(row.values):,}, {row.label}"
+        series.append(Series(text, np.array([[row.median, float(index)]]), row.name))
         runs = row.replicates[: row.n_drawn]
         linked = next((k for k, run in enumerate(runs) if (row.name, run) in links), 0)
         points = np.column_stack([row.values[: row.n_drawn], index + offsets])
@@ -136,10 +140,6 @@ def _series(
                 linked,
             )
         )
-        interval = row.interval
-        within = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
-        text = f"{{name}}: median {{x}}{within}, n = {len(row.values):,}, {row.label}"
-        series.append(Series(text, np.array([[row.median, float(index)]]), row.name))
     return series
 
 

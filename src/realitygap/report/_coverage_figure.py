@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,6 +21,8 @@ from realitygap.report._drawing import (
     wrap,
     write,
 )
+from realitygap.report._marks import MOST_MARKS, Series
+from realitygap.report._marks import Panel as MarkedPanel
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:
@@ -66,6 +68,7 @@ class Panel:
         n_drawn: number of runs, from the first, of which lines are drawn.
         run_bests: (n,) best score of each run.
         published: published best scores, one per run of their own.
+        replicates: (n,) number of each run; a page shows them on hover.
     """
 
     title: str
@@ -74,6 +77,7 @@ class Panel:
     n_drawn: int
     run_bests: npt.NDArray[np.float64]
     published: tuple[float, ...]
+    replicates: tuple[int, ...]
 
 
 def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
@@ -96,7 +100,11 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
         "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
     return draw_wide(
-        lambda width: draw_panels(panels, width, _coverage_axis(panels)), "coverage", caption, alt
+        lambda width: draw_panels(panels, width, _coverage_axis(panels)),
+        "coverage",
+        caption,
+        alt,
+        marks=marks_of(panels, 3),
     )
 
 
@@ -119,6 +127,7 @@ def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> Panel:
         n_drawn=count_drawable(values),
         run_bests=tally.run_bests(name, tally.measure),
         published=tuple(condition.get("published") or ()),
+        replicates=tuple(int(run) for run in tally.replicates(name)),
     )
 
 
@@ -139,6 +148,36 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
         distinct, counts = np.unique(np.round(pairs, 9), axis=0, return_counts=True)
         found.append((distinct, counts))
     return found
+
+
+def marks_of(panels: Sequence[Panel], decimals: int) -> tuple[MarkedPanel, ...]:
+    """Return what a page shows on hover: the median with its interval, and the first runs of each panel."""
+    n_marks = sum(panel.values.shape[1] for panel in panels)
+    n_runs = max(1, MOST_MARKS // max(1, n_marks))
+    return tuple(
+        MarkedPanel(f"panel-{index}", _series(panel, n_runs, decimals), (0, decimals))
+        for index, panel in enumerate(panels)
+    )
+
+
+def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
+    if not len(panel.values):
+        return ()
+    medians = []
+    notes = []
+    for values in panel.values.T:
+        there = values[np.isfinite(values)]
+        interval = median_interval(there)
+        within = "" if interval is None else f" [{interval.low:.{decimals}f}, {interval.high:.{decimals}f}]"
+        medians.append(float(np.median(there)))
+        notes.append(f"{within}, n = {len(there):,}")
+    text = f"{panel.title}, generation {{x}}: median {{y}}{{label}}"
+    series = [Series(text, np.column_stack([np.arange(len(medians)), medians]), labels=tuple(notes))]
+    for run, values in zip(panel.replicates[:n_runs], panel.values[:n_runs], strict=True):
+        there = np.isfinite(values)
+        points = np.column_stack([np.flatnonzero(there), values[there]])
+        series.append(Series(f"{panel.title}, run {{name}}, generation {{x}}: {{y}}", points, str(run)))
+    return tuple(series)
 
 
 # drawing
@@ -163,6 +202,7 @@ def draw_panels(panels: list[Panel], width: float, axis: Axis) -> Figure:
         x = left + column * (panel_width + gap)
         y = row * (title_height + panel_height + tick_height) + title_height
         axes = place_axes(figure, x, y, panel_width, panel_height)
+        axes.set_gid(f"panel-{index}")
         _draw_panel(axes, panel, axis, first_column=column == 0)
         _write_title(axes, panel, letters, note_below=notes_below)
         if column == 0:

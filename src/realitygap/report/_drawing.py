@@ -279,12 +279,26 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
 
 
 def inline(svg: str) -> str:
-    """A drawing as part of an HTML page: no namespaces, no size of its own, colors as CSS variables."""
+    """A drawing as part of an HTML page: no namespaces, size, or fonts of its own, colors as CSS variables."""
     start, rest = svg.split(">", 1)
     start = re.sub(r' (?:xmlns(?::\w+)?|width|height)="[^"]*"', "", start)
     colors = {color: f"var(--ink-{name})" for name, color in Ink.names().items()}
     pattern = re.compile(r"(?<=[:] )(?:" + "|".join(colors) + r")(?=[;\"])")
-    return f"{start}>{pattern.sub(lambda match: colors[match[0]], rest)}"
+    rest = pattern.sub(lambda match: colors[match[0]], rest).replace(_FONT_STYLE, "")
+    return f"{start}>{_PATH.sub(lambda match: _closer(match[0]), rest)}"
+
+
+_FONT_STYLE = f"font-family: {FONT}; "
+"""The style sheet of a page gives it to all texts in figures."""
+
+_PATH = re.compile(' d="[^"]*"')
+
+
+def _closer(path: str) -> str:
+    """A path without the spaces that it does not need."""
+    for letter in "LCQM":
+        path = path.replace(f" {letter} ", letter)
+    return path.replace('"M ', '"M').replace(" z", "z")
 
 
 def _drop_baggage(root: ET.Element) -> None:

@@ -329,7 +329,8 @@ def _difference(comparisons: Sequence[Comparison]) -> str:
 
 def _p(p: float, *, bound: bool = False) -> str:
     text = "< 0.001" if p < 0.001 else p_in_words(p)
-    return f"p {text}" if text.startswith("<") else f"p {'≤' if bound else '='} {text}"
+    text = f"p {text}" if text.startswith("<") else f"p {'≤' if bound else '='} {text}"
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _value(value: float, interval: Interval | None, *, signs: bool = False) -> str:

@@ -15,11 +15,20 @@ from realitygap.report._coverage_figure import (
     Panel,
     count_drawable,
     draw_panels,
+    marks_of,
     say_interval,
     say_runs,
 )
 from realitygap.report._drawing import Drawing, draw_wide
-from realitygap.report._tally import bests_of, label_of, labeled_conditions, settings_of, task_of
+from realitygap.report._marks import decimals_for
+from realitygap.report._tally import (
+    bests_of,
+    label_of,
+    labeled_conditions,
+    replicates_of,
+    settings_of,
+    task_of,
+)
 from realitygap.runs import Condition
 
 
@@ -51,6 +60,7 @@ def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
                     n_drawn=count_drawable(values),
                     run_bests=values.max(axis=1),
                     published=(),
+                    replicates=replicates_of(folder, condition["name"]),
                 )
             )
     return [
@@ -83,7 +93,8 @@ def _draw(of: tuple[str, float, float], panels: list[Panel], labels: Sequence[st
         f"Best {score} by generation in {len(panels)} panels, one per condition: a line for each run, the median with "
         "its interval, and the best of the runs. Their numbers are in the table of scores."
     )
-    return draw_wide(lambda width: draw_panels(panels, width, axis), name, caption, alt)
+    marks = marks_of(panels, decimals_for(np.concatenate([panel.run_bests for panel in panels])))
+    return draw_wide(lambda width: draw_panels(panels, width, axis), name, caption, alt, marks=marks)
 
 
 def _axis(score: str, panels: Sequence[Panel], least: float, greatest: float) -> Axis:

@@ -225,6 +225,15 @@ def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
     return best["task_fitness"].to_numpy().reshape(best["replicate"].n_unique(), -1)
 
 
+def replicates_of(folder: ResultsFolder, condition: str) -> tuple[int, ...]:
+    """Return the numbers of the runs of a condition, in order."""
+    return tuple(
+        sorted(
+            {run for frame in folder.frames(condition, ["replicate"]) for run in frame["replicate"].unique()}
+        )
+    )
+
+
 def task_of(condition: Mapping[str, Any]) -> str:
     """The kind of a condition's task."""
     return str(settings_of(condition).get("task", {}).get("kind", "coverage"))

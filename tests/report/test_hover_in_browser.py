@@ -1,0 +1,129 @@
+"""Values on hover, tables on a phone, and print, in a real browser."""
+
+from __future__ import annotations
+
+import re
+
+import polars as pl
+import pytest
+
+from realitygap.report import write_report
+from realitygap.report._tally import read_tally
+from tests.report.test_in_browser import DESKTOP, PHONE, browser, page_file, pytestmark, show  # noqa: F401
+
+pytestmark = [pytestmark, pytest.mark.slow]
+
+WHERE = """([anchor, wide, name, label]) => {
+  const { frames, panels } = JSON.parse(document.getElementById('marks').textContent)[anchor];
+  const plot = document.querySelector(`#${anchor} .${wide ? 'wide' : 'narrow'}`), svg = plot.querySelector('svg');
+  svg.scrollIntoView({ block: 'center' });
+  const box = svg.getBoundingClientRect(), scale = box.width / svg.viewBox.baseVal.width;
+  const [a, b, c, d] = frames[wide ? 0 : 1][0];
+  const [, , ys, xs, labels] = panels[0].series.find((each) => each[1] === name && each[4] && each[4].includes(label));
+  const k = labels.indexOf(label);
+  return [box.left + (a + b * xs[k]) * scale, box.top + (c + d * ys[k]) * scale];
+}"""
+"""Where on the screen the mark of a run in the figure of the best coverages is."""
+
+
+@pytest.fixture(scope="module")
+def bests(tiny_study) -> pl.DataFrame:
+    return read_tally(tiny_study).runs
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_hover_on_a_run_shows_its_number_and_the_value_of_the_csv(show, tiny_study, bests, tmp_path, size):  # noqa: F811
+    write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures")
+    runs = pl.read_csv(tmp_path / "figures" / "data-coverage-by-run.csv")
+    touch = size == PHONE
+    page = show(size=size, reduced_motion="reduce", has_touch=touch)
+    for condition, run, value in runs.select("condition", "replicate", "line").iter_rows():
+        if condition == "turn":
+            x, y = page.evaluate(WHERE, ["figure-bests", not touch, condition, str(run)])
+            page.touchscreen.tap(x, y) if touch else page.mouse.move(x, y)
+            text = page.locator("#figure-bests .tip").text_content()
+            median = runs.filter(pl.col("condition") == condition)["line"].median()
+            if value != median:  # a dot under the mark of the median is reached by the keyboard
+                assert text.removesuffix(" (click to replay)") == (
+                    f"turn, run {run}: best coverage {value:.3f}"
+                )
+    page.mouse.move(1, 1)
+
+
+def test_all_marks_of_a_series_are_highlighted_and_leave_with_the_pointer(show):  # noqa: F811
+    page = show(reduced_motion="reduce")
+    x, y = page.evaluate(WHERE, ["figure-bests", True, "coverage", "0"])
+    page.mouse.move(x, y)
+    circles = page.locator("#figure-bests .wide .hover").get_attribute("d").count("a2 2")
+    assert circles == 2 * 7
+    page.mouse.move(x, 5)
+    assert page.locator(".tip, .hover").count() == 0
+
+
+def test_arrow_keys_step_through_all_marks_and_are_read_aloud(show, tiny_study):  # noqa: F811
+    page = show(reduced_motion="reduce")
+    plot = page.locator("#figure-coverage .wide")
+    plot.focus()
+    texts = []
+    for key in ("ArrowRight", "ArrowRight", "ArrowDown", "ArrowRight", "ArrowLeft", "ArrowUp"):
+        page.keyboard.press(key)
+        texts.append(page.locator("#figure-coverage .tip").text_content())
+        assert page.locator("#marks-live").text_content() == texts[-1]
+    best = read_tally(tiny_study).generation_bests("coverage", "line")
+    assert texts[2] == f"coverage, run 0, generation 1: {best[0, 1]:.3f}"
+    assert texts[3] == f"coverage, run 0, generation 2: {best[0, 2]:.3f}"
+    assert texts[4] == texts[2]
+    assert texts[5] == texts[1]
+    assert re.fullmatch(r"coverage, generation 0: median 0\.\d{3} \[0\.\d{3}, 0\.\d{3}\], n = 7", texts[0])
+    page.keyboard.press("Escape")
+    assert page.locator(".tip").count() == 0
+
+
+def test_a_click_on_a_run_that_the_page_plays_opens_its_replay(show):  # noqa: F811
+    page = show(reduced_motion="reduce")
+    run = page.evaluate(
+        "() => document.querySelector('#replay-condition').options[1].textContent.match(/run (\\d+)/)[1]"
+    )
+    x, y = page.evaluate(WHERE, ["figure-bests", True, "novelty", run])
+    page.mouse.move(x, y)
+    if "(click to replay)" not in page.locator(".tip").text_content():
+        page.locator("#figure-bests .wide").focus()  # it is under the mark of the median
+        page.mouse.move(1, 1)
+        for _ in range(3):
+            page.keyboard.press("ArrowDown")
+        while "(click to replay)" not in page.locator(".tip").text_content():
+            before = page.locator(".tip").text_content()
+            page.keyboard.press("ArrowRight")
+            assert page.locator(".tip").text_content() != before
+        page.keyboard.press("Enter")
+    else:
+        page.mouse.click(x, y)
+    page.wait_for_function("() => location.hash.startsWith('#replay=novelty/')")
+    assert page.locator("#replay-rows .trial").text_content().startswith(f"novelty/{run}/")
+
+
+def test_wide_tables_scroll_on_a_phone_and_say_so(show):  # noqa: F811
+    page = show(size=PHONE)
+    hinted = page.evaluate(
+        """() => [...document.querySelectorAll('.scroll')].filter((box) => box.checkVisibility()).map((box) =>
+            [box.scrollWidth > box.clientWidth + 1, getComputedStyle(box, '::before').content.includes('sideways')])"""
+    )
+    assert [wide for wide, _ in hinted] == [says for _, says in hinted]
+    assert any(wide for wide, _ in hinted)
+    assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE[0]
+
+
+def test_print_has_the_first_screen_on_one_page_and_the_last_frame(show):  # noqa: F811
+    page = show(color_scheme="dark", size=(720, 1000))
+    page.emulate_media(media="print")
+    page.wait_for_timeout(200)
+    assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "30"
+    assert page.locator("#lead-clock").text_content().endswith("step 30 of 30")
+    # A4 within its margins, 178 x 261 mm at 96 dots per inch
+    page.set_viewport_size({"width": 672, "height": 986})
+    figure = page.locator("#figure-bests").bounding_box()
+    assert figure["y"] + figure["height"] <= 986
+    assert not page.locator("#lead-play").is_visible()
+    page.emulate_media(media="screen")
+    page.wait_for_timeout(100)
+    assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "0"

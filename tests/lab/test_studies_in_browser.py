@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from realitygap.records import ResultsFolder
+from realitygap.study import parse_study, run_study
 
-from .conftest import OUTAGE, PHONE, open_advanced
+from .conftest import DESKTOP, OUTAGE, PHONE, open_advanced
+from .robot_study import make_study
 
 TINY = """
 [study]
@@ -83,3 +85,38 @@ def test_no_study_reads_files_outside_the_folder(lab, visit):
     start(page, TINY + '\n[arena]\nfile = "/etc/passwd"\n')
     page.get_by_text("would be a file outside").wait_for()
     assert list(lab.root.iterdir()) == []
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_studies_have_a_picture_and_one_primary_action_and_can_be_found(lab, visit, size):
+    page = visit(size=size)
+    page.get_by_text("No studies yet. Run the paper's study (takes seconds) or create your own.").wait_for()
+    assert (
+        page.get_by_label("Filter studies").count() == 0
+        or not page.get_by_label("Filter studies").is_visible()
+    )
+    run_study(parse_study(TINY, "study.toml"), lab.root / "tiny")
+    make_study(lab.root)
+    tiny, robot = (page.locator(f'[data-study="{name}"]') for name in ("tiny", "by-robot"))
+    picture = tiny.locator(".lab-thumbnail img")
+    picture.wait_for()
+    page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
+    tiny.get_by_text("Median best coverage by condition: ").wait_for()
+    for row, action in ((tiny, "Open"), (robot, "Open trials")):
+        primary = row.locator(".q-btn--unelevated")
+        assert [each.inner_text() for each in primary.all()] == [action]
+        box = primary.bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= size[0]
+    names = page.locator("[data-study]")
+    page.get_by_role("combobox", name="Order of studies").click()
+    page.get_by_role("option", name="Name").click()
+    names.first.and_(robot).wait_for()
+    page.get_by_label("Filter studies").fill("TIN")
+    robot.wait_for(state="detached")
+    assert names.count() == 1
+    page.get_by_label("Filter studies").fill("nonsense")
+    page.get_by_text("No study has this text in its name or title.").wait_for()
+    other = visit("gap")
+    other.get_by_role("button", name="Measure the gap").click()
+    page.get_by_role("link", name="Gap gap").wait_for()

@@ -36,14 +36,16 @@ def keep_figures(
         curves: Coverage by generation of each condition.
         figures: Caption, alternative text, and drawings by name.
     """
+    keep_rows(folder, done, rows)
     with contextlib.suppress(RecordError, OSError):
-        origin = _origin(done)
-        write_json(
-            folder,
-            folder / FOLDER / _FIGURES,
-            {"of": origin, "curves": list(curves), "figures": dict(figures)},
-        )
-        write_json(folder, folder / FOLDER / _SUMMARY, {"of": origin, "rows": list(rows)})
+        values = {"of": _origin(done), "curves": list(curves), "figures": dict(figures)}
+        write_json(folder, folder / FOLDER / _FIGURES, values)
+
+
+def keep_rows(folder: Path, done: Sequence[int], rows: Sequence[Any]) -> None:
+    """Keep the summary of the conditions; nothing happens if the folder cannot be written."""
+    with contextlib.suppress(RecordError, OSError):
+        write_json(folder, folder / FOLDER / _SUMMARY, {"of": _origin(done), "rows": list(rows)})
 
 
 def keep_thumbnail(folder: Path, svg: str) -> None:

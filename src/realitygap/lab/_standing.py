@@ -27,6 +27,8 @@ class Standing:
         trials: Number of trials of the ledger in each state.
         labels: Labels of its platforms, such as SIM.
         medians: Median best coverage of each condition; empty before its figures were drawn.
+        has_thumbnail: Whether there is a small picture of its best path.
+        has_report: Whether there is a report.
         rate: Runs per second; 0 if unknown.
         is_asking: Whether it waits for an answer from a visitor.
     """
@@ -43,6 +45,8 @@ class Standing:
     trials: dict[str, int] = field(default_factory=dict)
     labels: tuple[str, ...] = ()
     medians: tuple[float, ...] = ()
+    has_thumbnail: bool = False
+    has_report: bool = False
     rate: float = 0.0
     is_asking: bool = False
 
@@ -106,6 +110,8 @@ def standing_of(state: StudyState, job: StudyJob | None) -> Standing:
         trials=state.trials,
         labels=state.labels,
         medians=state.medians,
+        has_thumbnail=state.has_thumbnail,
+        has_report=state.has_report,
         rate=rate,
         is_asking=job is not None and job.ask is not None,
     )

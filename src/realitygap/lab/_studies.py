@@ -21,7 +21,7 @@ from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 
-from ._figure_cache import read_rows
+from ._figure_cache import has_thumbnail, read_rows
 
 LABELS = ("SIM", "TWIN", "EMULATED", "REAL")
 LATELY_S = 0.8
@@ -45,6 +45,8 @@ class StudyState:
         labels: Labels of its conditions, such as SIM.
         medians: Median best coverage of each condition, in the order of the study, as its figures show it; empty
             before they were drawn.
+        has_thumbnail: Whether there is a small picture of its best path.
+        has_report: Whether there is a report.
         problem: Why it cannot be read; empty otherwise.
     """
 
@@ -59,6 +61,8 @@ class StudyState:
     used_by: str = ""
     labels: tuple[str, ...] = ()
     medians: tuple[float, ...] = ()
+    has_thumbnail: bool = False
+    has_report: bool = False
     problem: str = ""
 
     @property
@@ -201,6 +205,8 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
             sorted({each["label"] for each in described["conditions"] if each.get("label") in LABELS})
         ),
         medians=tuple(float(row["line_median"]) for row in rows or () if row["line_median"] is not None),
+        has_thumbnail=has_thumbnail(folder.path),
+        has_report=(folder.path / "report.html").is_file(),
     )
 
 

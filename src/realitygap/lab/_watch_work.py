@@ -37,7 +37,7 @@ from realitygap.report import (
 )
 
 from ._channel import Channel, Message
-from ._figure_cache import keep_figures, keep_thumbnail
+from ._figure_cache import keep_figures, keep_rows, keep_thumbnail
 
 FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "scores": draw_scores,
@@ -114,6 +114,11 @@ def _grant(channel: Channel, wish: Message, wishes: _Wishes) -> None:
     try:
         if what == "figures":
             _draw_all(say, folder, wish, lambda: _grant_quick(channel, wishes))
+        elif what == "thumbnail":
+            rows = summarize(read_tally(folder, with_uncounted=True)).select(_COLUMNS).to_dicts()
+            keep_thumbnail(folder, _thumbnail(folder, rows))
+            keep_rows(folder, wish["done"], rows)
+            say("thumbnail")
         elif what == "replay":
             say("replay", key=wish["key"], **_replay(folder, wish))
         elif what == "report":

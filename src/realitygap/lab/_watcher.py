@@ -60,6 +60,7 @@ class Watcher:
         self._not_before = 0.0
         self._is_drawing = False
         self._typical: set[str] = set()
+        self._thumbnail: tuple[int, int] | None = None
 
     def look(self, done: tuple[int, int], *, is_running: bool = False) -> None:
         """Have the figures drawn again if the study has changed, but not too often while it runs.
@@ -81,6 +82,12 @@ class Watcher:
             return
         self._stamp, self._is_drawing = stamp, True
         self._want(what="figures", names=list(LIVE) if is_running else None, done=list(done))
+
+    def want_thumbnail(self, done: tuple[int, int]) -> None:
+        """Have the small picture and the summary of these runs saved in the study's folder, once."""
+        if self._thumbnail != done:
+            self._thumbnail = done
+            self._want(what="thumbnail", done=list(done))
 
     def typical(self, condition: str, done: int) -> dict[str, Any] | None:
         """Return the typical run of a condition to be played, or why it cannot be; ask for it and return None before.

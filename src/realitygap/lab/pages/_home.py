@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import partial
 from importlib import resources
 
 from nicegui import events, run, ui
 
+from realitygap.errors import RealityGapError
 from realitygap.lab._lab import Lab
 from realitygap.lab._standing import Standing
 
@@ -20,6 +22,10 @@ DISK_S = 2.0
 MOST_CARDS = 30
 """Number of studies that are shown at first."""
 
+MOST_DRAWN = 10
+"""Number of studies without a picture that are drawn for the list."""
+
+_AT_REST = ("Paused", "Complete", "Failed", "Waiting for robot")
 PAPER = "paper"
 _ORDERS = {"changed": "Newest", "name": "Name", "state": "State"}
 
@@ -56,7 +62,7 @@ class _Page:
         self._order = "changed"
 
     def show(self) -> None:
-        with ui.row().classes("lab-row"):
+        with ui.row().classes("lab-row") as self._tools:
             ui.button("New study", on_click=lambda: ui.navigate.to("/new")).props("unelevated no-caps")
             search = ui.input(placeholder="Filter", on_change=self._search)
             search.props('outlined dense clearable debounce=200 aria-label="Filter studies"')
@@ -103,6 +109,7 @@ class _Page:
         return tuple(found)
 
     def _show_list(self, standings: tuple[Standing, ...]) -> None:
+        self._tools.set_visibility(bool(self._standings))
         if not self._standings:
             ui.label("No studies yet. Run the paper's study (takes seconds) or create your own.")
             with ui.row().classes("lab-row"):
@@ -112,11 +119,19 @@ class _Page:
         if not standings:
             ui.label("No study has this text in its name or title. Clear the filter.")
         for standing in standings[: self._n_shown]:
-            _card(self._lab, standing)
+            _show_study(self._lab, standing)
+        self._want_thumbnails(standings[: self._n_shown])
         if len(standings) > self._n_shown:
             ui.button(f"Show {len(standings) - self._n_shown:,} more", on_click=self._show_more).props(
                 "outline no-caps"
             )
+
+    def _want_thumbnails(self, standings: tuple[Standing, ...]) -> None:
+        """Have the pictures of the first studies drawn that have none."""
+        missing = [each for each in standings if each.n_done and not each.medians and each.word in _AT_REST]
+        for each in missing[:MOST_DRAWN]:
+            with contextlib.suppress(RealityGapError):  # it was removed in this moment
+                self._lab.watcher(each.name).want_thumbnail((each.n_done, each.n_driven_done))
 
     def _show_more(self) -> None:
         self._n_shown += MOST_CARDS
@@ -145,33 +160,50 @@ class _Page:
                 ui.label(progress)
 
 
-def _card(lab: Lab, standing: Standing) -> None:
-    with ui.card().classes("lab-card").props(f'data-study="{standing.name}"'):
-        with ui.row().classes("lab-row"):
-            ui.label(standing.title).props('role="heading" aria-level="2"').classes("lab-section")
-            show_state(standing)
-        if standing.title != standing.name:
-            hint(standing.name)
-        if standing.word != "Complete" and (standing.n_runs or standing.n_driven_runs):
-            share = standing.share
-            ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
-        if standing.progress:
-            ui.label(standing.progress)
-        if standing.medians:
-            _show_medians(standing.medians)
-        if standing.message:
-            ui.label(standing.message).classes("lab-problem")
-        with ui.row().classes("lab-row"):
-            if standing.n_runs or standing.n_driven_runs:
-                ui.button("Open", on_click=lambda: ui.navigate.to(f"/study/{standing.name}")).props(
-                    "unelevated no-caps"
-                )
-            if standing.has_robot:
-                text = "Answer" if standing.is_asking else "Open trials"
-                ui.button(text, on_click=lambda: ui.navigate.to(f"/study/{standing.name}/trials")).props(
-                    "outline no-caps"
-                )
-            show_control(lab, standing)
+def _show_study(lab: Lab, standing: Standing) -> None:
+    address = f"/study/{standing.name}"
+    row = ui.element("div").classes("lab-study").props(f'data-study="{standing.name}"')
+    with row:
+        with ui.element("div").classes("lab-thumbnail"):
+            if standing.has_thumbnail:
+                picture = ui.element("img").props('loading="lazy"')
+                picture.props["alt"] = f"Best path of {standing.title}"
+                picture.props["src"] = f"/figures/{standing.name}/thumbnail.svg?v={standing.n_done}"
+        with ui.element("div").classes("lab-study-words"):
+            with ui.row().classes("lab-row"):
+                ui.label(standing.title).props('role="heading" aria-level="2"').classes("lab-section")
+                show_state(standing)
+            if standing.title != standing.name:
+                hint(standing.name)
+            if standing.word != "Complete" and (standing.n_runs or standing.n_driven_runs):
+                share = standing.share
+                ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
+            if standing.progress:
+                ui.label(standing.progress)
+            if standing.message:
+                ui.label(standing.message).classes("lab-problem")
+        with ui.element("div").classes("lab-study-medians"):
+            if standing.medians:
+                _show_medians(standing.medians)
+        with ui.row().classes("lab-row lab-study-actions"):
+            _show_actions(lab, standing, address)
+
+
+def _show_actions(lab: Lab, standing: Standing, address: str) -> None:
+    """Show the buttons of a study; one of them is the primary action."""
+    needs_robot = standing.has_robot and (standing.is_asking or standing.word == "Waiting for robot")
+    main, other = "unelevated no-caps", "outline no-caps"
+    if standing.n_runs or standing.n_driven_runs:
+        ui.button("Open", on_click=lambda: ui.navigate.to(address)).props(other if needs_robot else main)
+    if standing.has_robot:
+        text = "Answer" if standing.is_asking else "Open trials"
+        ui.button(text, on_click=lambda: ui.navigate.to(f"{address}/trials")).props(
+            main if needs_robot else other
+        )
+    if standing.has_report and standing.word == "Complete":
+        report = f"/reports/{standing.name}"
+        ui.button("Report", on_click=lambda: ui.navigate.to(report, new_tab=True)).props(other)
+    show_control(lab, standing)
 
 
 def _show_medians(medians: tuple[float, ...]) -> None:
@@ -182,7 +214,7 @@ def _show_medians(medians: tuple[float, ...]) -> None:
         for k, value in enumerate(medians)
     )
     words = f"Median best coverage by condition: {min(medians):.3f} to {highest:.3f}"
-    with ui.row().classes("lab-row"):
+    with ui.element("div"):
         ui.html(
             f'<svg viewBox="0 0 {8 * len(medians)} 24" width="{8 * len(medians)}" height="24" aria-hidden="true" '
             f'class="lab-bars">{bars}</svg>',

@@ -13,6 +13,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._counts import Counts
+from realitygap.lab._figure_cache import read_thumbnail
 from realitygap.lab._lab import Lab
 from realitygap.lab._standing import Standing
 from realitygap.lab._study_job import StudyJob
@@ -85,6 +86,17 @@ def add_study(lab: Lab) -> None:
         packed = {"cache-control": "no-store", "content-encoding": "gzip"}  # which every browser reads
         headers = {**FOREIGN_HEADERS, **packed}
         return Response(drawn[width], media_type="image/svg+xml", headers=headers)
+
+    @app.get("/figures/{name}/thumbnail.svg")
+    def thumbnail(name: str) -> Response:
+        try:
+            svg = read_thumbnail(lab.studies.path(name))
+        except RealityGapError:
+            svg = None
+        if svg is None:
+            return PlainTextResponse("There is no such picture.", 404)
+        headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
+        return Response(svg, media_type="image/svg+xml", headers=headers)
 
     @app.get("/reports/{name}")
     def report(name: str) -> Response:

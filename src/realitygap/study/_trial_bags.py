@@ -51,6 +51,11 @@ def export_trials(
 def _driven(source: Path) -> list[int]:
     """The numbers of all trials that were driven."""
     if source.is_dir():
+        if not (source / LEDGER_NAME).exists():
+            raise StudyError(
+                f"{source} has no trials of a robot. For those of a simulation, save a network (realitygap export), "
+                "and drive it: realitygap try champion.json --on sim --observe track -o trials.jsonl"
+            )
         with Ledger.open(source / LEDGER_NAME, writable=False) as ledger:
             numbers = [trial.trial for trial in ledger.trials(states=("driven", "scored"))]
     else:

@@ -49,7 +49,7 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:.*",
-        r"(Any|Callable|Figure|Iterator|Iterable|Literal|Mapping|ResetNeeded|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
+        r"(Any|Callable|Figure|Panel|Iterator|Iterable|Literal|Mapping|ResetNeeded|Sequence|Path|Self|optional|ConfigDict|BaseModel)",
     ),
     (
         r"py:(class|obj)",

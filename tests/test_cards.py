@@ -131,7 +131,8 @@ def test_a_damaged_folder_has_a_line_and_a_card(tmp_path, damage):
     assert ("cannot be read" in page) == (is_told or damage == "torn file")
 
 
-def test_a_card_of_1000_runs_takes_under_half_a_second(tmp_path):
+def test_a_card_of_1000_runs_takes_under_half_a_second(folder, tmp_path):
+    folder._repr_html_()  # imports SciPy and Jinja
     made = ResultsFolder.create(tmp_path / "r", DESCRIPTION | {"replicates": 500})
     for condition in ("coverage", "a.b-c_1"):
         rows = make_rows(condition, n=20, generations=5, individuals=8)

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from importlib import resources
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -17,6 +18,17 @@ import make_speed  # noqa: E402
 import reference_pages  # noqa: E402
 
 from realitygap import __version__  # noqa: E402
+
+
+def token_colors() -> dict[str, dict[str, str]]:
+    """Return the colors that all pages share, by theme and name."""
+    sheet = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
+    light, _, dark = sheet.partition("@media")
+    return {
+        theme: dict(re.findall(r"--([\w-]+): (#\w+);", part))
+        for theme, part in (("light", light), ("dark", dark))
+    }
+
 
 project = "realitygap"
 author = "the realitygap authors"
@@ -35,6 +47,18 @@ nb_ipywidgets_js = {}  # which would be fetched from a network
 nb_mime_priority_overrides = [("html", "application/vnd.jupyter.widget-view+json", None)]
 root_doc = "index"
 html_theme = "furo"
+html_theme_options = {
+    f"{theme}_css_variables": {
+        "color-brand-primary": colors["accent"],
+        "color-brand-content": colors["accent"],
+        "color-foreground-primary": colors["text"],
+        "color-foreground-secondary": colors["muted"],
+        "color-background-primary": colors["card"],
+        "color-background-secondary": colors["ground"],
+        "color-background-border": colors["rule"],
+    }
+    for theme, colors in token_colors().items()
+}
 html_title = f"realitygap {__version__}"
 html_show_sphinx = False
 html_copy_source = False

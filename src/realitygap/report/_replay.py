@@ -187,7 +187,7 @@ def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
 def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
     name = described["name"]
     replicate = typical_replicate(tally, name)
-    rows = tally.folder.read(name, [replicate])
+    rows = tally.rows_of(name, replicate)
     try:
         condition = Condition.from_settings(name, dict(settings_of(described)))
         if condition.is_physical:

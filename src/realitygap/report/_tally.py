@@ -48,6 +48,7 @@ class Tally:
     best: pl.DataFrame
     driven: Mapping[str, Driven] = field(default_factory=dict)
     uncounted: tuple[str, ...] = ()
+    _whole_runs: dict[tuple[str, int], pl.DataFrame] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def conditions(self) -> list[Mapping[str, Any]]:
@@ -114,12 +115,19 @@ class Tally:
         return values
 
     def rows_of(self, condition: str, replicate: int, columns: Sequence[str] | None = None) -> pl.DataFrame:
-        """All rows of one run.
+        """All rows of one run; several figures show the same few runs, so whole ones are read once.
 
         Raises:
             ValueError: there is no such run.
         """
-        rows = self.folder.read(condition, [replicate], columns)
+        key = condition, replicate
+        rows = self._whole_runs.get(key)
+        if rows is None:
+            rows = self.folder.read(condition, [replicate], columns)
+            if columns is None:
+                self._whole_runs[key] = rows
+        elif columns is not None:
+            rows = rows.select(columns)
         if not rows.is_empty():
             return rows
         there = [int(run) for run in self.replicates(condition)]

@@ -23,6 +23,8 @@ from ._trials import add_trials
 def add_pages(lab: Lab) -> None:
     """Add all pages, to be served."""
     app.add_static_files("/lab-files", str(resources.files(__package__) / "static"))
+    tokens = resources.files("realitygap.drawing") / "tokens.css"
+    app.add_static_file(local_file=str(tokens), url_path="/lab-tokens/tokens.css")
     playback = resources.files("realitygap.playback")
     app.add_static_file(local_file=str(playback / "player.js"), url_path="/lab-player/player.js")
     app.add_static_file(local_file=str(playback / "player.css"), url_path="/lab-player/player.css")

@@ -42,7 +42,7 @@ def framed(
     """
     ui.on_exception(_show_mistake)
     ui.page_title(f"{title} – realitygap lab")
-    for sheet in ("lab-files/tokens.css", "lab-files/lab.css", "lab-player/player.css"):
+    for sheet in ("lab-tokens/tokens.css", "lab-files/lab.css", "lab-player/player.css"):
         ui.add_head_html(f'<link rel="stylesheet" href="/{sheet}">')
     ui.add_head_html('<script>document.documentElement.lang = "en-US"</script>')
     ui.add_head_html('<script src="/lab-files/frame.js"></script>')

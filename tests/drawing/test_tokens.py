@@ -1,0 +1,40 @@
+"""The colors that all pages share."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+
+import pytest
+
+from realitygap.drawing import Ink
+
+SHEET = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
+LIGHT, DARK = (dict(re.findall(r"--([\w-]+): (#\w{6});", part)) for part in (SHEET.partition("@media")[::2]))
+
+
+def contrast(first: str, second: str) -> float:
+    """The contrast of two colors. Source: WCAG 2.2, relative luminance."""
+
+    def luminance(color: str) -> float:
+        shares = [int(color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+        linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((luminance(first), luminance(second)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_sheet_has_the_colors_of_figures():
+    assert {name: LIGHT[f"ink-{name}"] for name in Ink.names()} == Ink.names()
+
+
+def test_both_themes_have_the_same_colors():
+    assert set(LIGHT) == set(DARK)
+
+
+@pytest.mark.parametrize("colors", [LIGHT, DARK], ids=["light", "dark"])
+def test_words_can_be_read_on_their_grounds(colors):
+    for ink in ("text", "muted", "accent", "danger", "ok", "warn", "violet"):
+        for ground in ("ground", "card"):
+            assert contrast(colors[ink], colors[ground]) >= 4.5, (ink, ground)

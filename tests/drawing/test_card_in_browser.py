@@ -43,5 +43,5 @@ def test_a_card_follows_the_theme_and_can_be_read_in_a_notebook(browser, system,
     assert [of(what, "backgroundColor") for what in ("tr", "tbody tr", "tbody tr + tr")] == [
         "rgba(0, 0, 0, 0)"
     ] * 3
-    assert of("pre", "backgroundColor") == ("rgb(20, 23, 27)" if is_dark else "rgb(244, 245, 247)")
+    assert of("pre", "backgroundColor") == ("rgb(20, 23, 27)" if is_dark else "rgb(246, 247, 249)")
     page.close()

@@ -130,9 +130,17 @@ def _template() -> Template:
         lstrip_blocks=True,
     )
     environment.filters["svg"] = _themed
-    style = resources.files("realitygap.drawing").joinpath("cards/card.css").read_text("utf-8")
-    environment.globals["style"] = " ".join(style.split())
+    environment.globals["style"] = _style()
     return environment.get_template("card.html.jinja")
+
+
+def _style() -> str:
+    """Return the rules of a card, with the colors of all pages."""
+    files = resources.files("realitygap.drawing")
+    tokens = re.sub(r"/\*.*?\*/", "", files.joinpath("tokens.css").read_text("utf-8"))
+    light, dark = re.findall(r":root \{(.*?);\s*\}", tokens, re.DOTALL)
+    style = files.joinpath("cards/card.css").read_text("utf-8")
+    return " ".join(style.replace("@light", light).replace("@dark", dark).split())
 
 
 def _printable(value: Any) -> Any:

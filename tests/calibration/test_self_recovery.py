@@ -10,32 +10,42 @@ from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.world import load_robot, paper_arena, robot_names
 
 FITTED = ("ir", "pulses", "lorentz")
-NEAR = {"amplitude": 0.6, "decay": 0.2, "noise_gain": 0.2}
-"""Shares of the file's number by which an estimate may be off."""
+NAMES = ("amplitude", "decay", "half_width", "noise_gain", "noise_uniform", "burst")
+FEWEST = 0.8
+"""Share of the 90 % intervals. There are about 65. If each held its number with a chance of .9, chance alone would fail
+one run in 100 or fewer."""
 
 
 @pytest.mark.long
-def test_every_robot_file_recovers_its_sensors() -> None:
-    """Identified estimates are near the file's numbers, with each set of sensors taken once."""
-    seen = set()
-    for name in robot_names():
+def test_every_robot_file_recovers_its_sensors_within_intervals() -> None:
+    """Intervals hold the file's numbers; what is not identified is left out, and is a small part.
+
+    Each robot has its own key: with one key for all, sensors of different robots read the same noise, and their
+    intervals miss together.
+    """
+    held: dict[tuple[str, str], bool] = {}
+    not_identified, seen = [], set()
+    for key, name in enumerate(robot_names()):
         robot = load_robot(name)
         fitted = robot.range and all(sensor.response in FITTED for sensor in robot.range)
         if not fitted or robot.range in seen:
             continue
         seen.add(robot.range)
-        with SimTarget(SimPlatform(robot=robot), paper_arena(), key=1) as target:
+        with SimTarget(SimPlatform(robot=robot), paper_arena(), key=key) as target:
             trials = target.carry_out(sensor_plans(paper_arena(), robot), "cells")
         for k, placements in enumerate(placements_of(trials, robot, paper_arena())):
             if not any(placement.readings.any() for placement in placements):
                 continue  # it looks away from the wall
-            fit = fit_sensor(robot, k, placements, np.random.default_rng([1, k]))
+            fit = fit_sensor(robot, k, placements, np.random.default_rng([key, k]))
             for each in fit.fitted:
                 number = each.name.rpartition(".")[2]
-                if number in NEAR and each.identified:
-                    off = each.estimate / getattr(robot.range[k], number) - 1
-                    assert abs(off) < NEAR[number], (name, each.name, each.estimate)
-    assert len(seen) >= 4
+                if number in NAMES and each.identified:
+                    held[name, each.name] = each.low <= getattr(robot.range[k], number) <= each.high
+                elif number in NAMES:
+                    not_identified.append((name, each.name))
+    assert len(seen) >= 5
+    assert len(held) >= 55, not_identified
+    assert np.mean(list(held.values())) >= FEWEST, [at for at, is_held in held.items() if not is_held]
 
 
 def test_sensors_that_cannot_be_fitted_are_refused_before_a_trial() -> None:

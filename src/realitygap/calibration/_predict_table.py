@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from realitygap.world import RobotModel
 
-from ._range_table import NUMBERS, MeasuredFrom, _gaps, _plain, wall_reading
+from ._range_table import NUMBERS, MeasuredFrom, gaps_to_wall, plain_number, wall_reading
 from ._simulate import Floats
 
 FARTHEST = 6
@@ -32,14 +32,14 @@ def predict_range_table(
         measured_from: The point that distances are measured from, as in `fit_range_table`.
     """
     which = np.asarray(sensor, np.int64)
-    gap, bearing = _gaps(
+    gap, bearing = gaps_to_wall(
         which, np.asarray(distance_m, np.float64), np.asarray(bearing_rad, np.float64), robot, measured_from
     )
     readings = np.empty(len(which))
     for k in np.unique(which):
         own = robot.range[k]
         at = which == k
-        numbers = {number.name: _plain(robot, int(k), number.name) for number in NUMBERS}
+        numbers = {number.name: plain_number(robot, int(k), number.name) for number in NUMBERS}
         readings[at] = wall_reading(gap[at], bearing[at], numbers, own.reach, own.rays)
     return readings
 

@@ -222,7 +222,7 @@ class _Table:
         for k in np.unique(index):
             if robot.range[k].response != "ir":
                 raise ValueError(f"range.{k} has the response {robot.range[k].response!r}, expected 'ir'.")
-        gap, bearing = _gaps(index, arrays["distance_m"], arrays["bearing_rad"], robot, measured_from)
+        gap, bearing = gaps_to_wall(index, arrays["distance_m"], arrays["bearing_rad"], robot, measured_from)
         ranks = tuple(
             np.unique(np.round(arrays[name], 6), return_inverse=True)[1]
             for name in ("distance_m", "bearing_rad")
@@ -235,7 +235,7 @@ class _Table:
         return cls(index, gap, bearing, arrays["readings"], seen, (ranks[0], ranks[1]))
 
 
-def _gaps(
+def gaps_to_wall(
     sensor: Ints, distance: Floats, bearing: Floats, robot: RobotModel, measured_from: MeasuredFrom
 ) -> tuple[Floats, Floats]:
     """Return the distance from each sensor's mount to the wall [m], and the wall's bearing from the heading [rad]."""
@@ -284,13 +284,13 @@ class _Problem:
 
     def middle(self, number: Number, sensors: Sequence[int]) -> float:
         """Return where the prior is centered."""
-        own = float(np.mean([_plain(self.robot, k, number.name) for k in sensors]))
+        own = float(np.mean([plain_number(self.robot, k, number.name) for k in sensors]))
         return max(own, LEAST[number.name]) if number.kind == "ratio" else own
 
     def values(self, point: Floats) -> dict[str, Floats]:
         """Return (s,) numbers of all sensors of the robot at a point (p,) of the standard normal scale."""
         values = {
-            n.name: np.array([_plain(self.robot, k, n.name) for k in range(len(self.robot.range))])
+            n.name: np.array([plain_number(self.robot, k, n.name) for k in range(len(self.robot.range))])
             for n in NUMBERS
         }
         for (number, sensors), z in zip(self.free, point, strict=False):  # distances follow
@@ -425,7 +425,7 @@ def wall_reading(
     return np.asarray(np.clip(np.log1p(c * light) / c if c else light, 0.0, 1.0))
 
 
-def _plain(robot: RobotModel, k: int, name: str) -> float:
+def plain_number(robot: RobotModel, k: int, name: str) -> float:
     value = getattr(robot.range[k], name)
     return float(value.center if hasattr(value, "center") else value)
 
@@ -434,7 +434,7 @@ def _compare(problem: _Problem, best: Floats) -> HeldOut:
     """Predict the places that the fit did not see."""
     table = problem.table
     own = {
-        n.name: np.array([_plain(problem.robot, k, n.name) for k in range(len(problem.robot.range))])
+        n.name: np.array([plain_number(problem.robot, k, n.name) for k in range(len(problem.robot.range))])
         for n in NUMBERS
     }
     predicted = {

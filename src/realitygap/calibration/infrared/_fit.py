@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realitygap.calibration._level import level_ends
 from realitygap.calibration._tempering import sample_posterior
 from realitygap.world import Fitted, RobotModel
 
@@ -84,9 +85,12 @@ def fit_sensor(
         raise ValueError(f"There are no readings of range.{number}: expected those of a robot that stands.")
     apart = independence(placements, rng)
     model = _model(robot, number, placements, apart.weight)
-    places = sample_posterior(
-        lambda places: model.log_likelihood(_values(model, places)), len(model.scales), rng
-    )
+
+    def log_likelihood(places: Array) -> Array:
+        return model.log_likelihood(_values(model, places))
+
+    places = sample_posterior(log_likelihood, len(model.scales), rng)
+    ends = _ends(places, level_ends(log_likelihood, places, rng))
     values = _values(model, places)
     chosen = rng.choice(len(values), n_draws, replace=n_draws > len(values))
     name = f"range.{number}"
@@ -94,7 +98,7 @@ def fit_sensor(
     is_own = {scale.name: scale.name != BATTERY.name for scale in model.scales}
     return SensorFit(
         name,
-        tuple(_fitted(name, scale, places[:, k], values[:, k]) for k, scale in enumerate(model.scales))
+        tuple(_fitted(name, scale, ends[:, k], values[:, k]) for k, scale in enumerate(model.scales))
         + (() if model.places.battery_varied or sensor.response == "lorentz" else (_unknown_battery(name),)),
         {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
         {
@@ -122,9 +126,14 @@ def _values(model: SensorModel, places: Array) -> Array:
     return np.stack([scale.of(places[:, k]) for k, scale in enumerate(model.scales)], axis=1)
 
 
-def _fitted(name: str, scale: Scale, places: Array, values: Array) -> Fitted:
-    low, high = np.quantile(values, ENDS)
-    ends = np.quantile(places, ENDS)
+def _ends(places: Array, level: Array) -> Array:
+    """Return the ends of the 90 % intervals, (2, d) places: of the posterior, and beyond it what is not refuted."""
+    low, high = np.quantile(places, ENDS, axis=0)
+    return np.stack([np.minimum(low, level[0]), np.maximum(high, level[1])])
+
+
+def _fitted(name: str, scale: Scale, ends: Array, values: Array) -> Fitted:
+    low, high = scale.of(ends)
     identified = bool(np.ptp(ends) < IDENTIFIED * (ENDS[1] - ENDS[0]))
     return Fitted(
         name=f"{name}.{scale.name}",

@@ -192,7 +192,8 @@ def _moved_in_sim(trial: TrialRecord, robot: RobotModel, arena: Arena) -> Moved:
 _SENSORS_METHOD = (
     "Readings of a robot that stands before a wall (Rosenzweig & Remy, section 2.3): likelihood of the mixture of "
     "`sim`, censored at 0 and 1, for each sensor; posterior under even priors by tempered particles (Del Moral, "
-    "Doucet & Jasra 2006); posterior predictive check (Gelman, Meng & Stern 1996); readings count less where "
+    "Doucet & Jasra 2006); intervals also hold what the profile likelihood does not refute (Venzon & Moolgavkar 1988); "
+    "posterior predictive check (Gelman, Meng & Stern 1996); readings count less where "
     "consecutive ones, or those of a placement, are alike."
 )
 

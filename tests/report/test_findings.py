@@ -50,7 +50,7 @@ def test_best_search_and_noise_are_named_with_intervals_and_corrected_p(out):
     )
     for finding in (best, search, noise):
         assert re.search(r"[+±−]0\.\d{3} \[[+±−]0\.\d{3}, [+±−]0\.\d{3}\], p\s[=<≤]\s\S", finding.evidence)
-        assert finding.table == "comparisons"
+        assert "comparisons" in finding.tables
 
 
 def test_effect_of_noise_names_its_direction_and_the_searches(out):
@@ -96,7 +96,7 @@ def test_one_condition_has_its_median_and_nothing_to_compare(out, n):
     (finding,) = found.findings
     assert finding.claim.startswith("coverage-10 has the highest median coverage: 0.")
     assert ("[" in finding.claim) == (n == 7)
-    assert finding.table == "results"
+    assert finding.tables == ("results",)
 
 
 def test_leading_condition_is_the_one_with_the_higher_mean_of_equal_medians(out):

@@ -9,7 +9,15 @@ import polars as pl
 import pytest
 
 from realitygap.records import ResultsFolder
-from realitygap.report import draw_paths, draw_scores, export_individual, summarize_tasks, write_report
+from realitygap.report import (
+    _replay,
+    draw_paths,
+    draw_scores,
+    export_individual,
+    read_tally,
+    summarize_tasks,
+    write_report,
+)
 from realitygap.study import parse_study, run_study
 
 from .test_drawing import texts
@@ -77,6 +85,14 @@ def test_the_page_has_the_table_and_the_figures_of_scores(folder, tmp_path):
     medians = [f"{row:#.4g}" for row in summarize_tasks(folder)["median"]]
     assert re.findall(r'<td class="median">([^<]*)</td>', section) == medians
     assert section.count('<figure id="figure-scores-') == 2
+
+
+def test_first_screen_plays_the_best_trial_by_the_task(folder):
+    tally = read_tally(folder)
+    replay = _replay.content(tally, "wall")
+    run = next(each for each in replay["runs"] if each.name == "wall")
+    best = tally.rows_of("wall", run.replicate)["task_fitness"].max()
+    assert replay["lead"].caption.endswith(f"score of wall {best:#.4g}.")
 
 
 def test_a_study_of_coverage_has_no_figure_of_scores(tiny_study):

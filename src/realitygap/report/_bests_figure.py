@@ -32,6 +32,8 @@ HALF = 6.2
 """Width of the figure [in], which shares the first screen with the replay."""
 
 _ROW = 0.3  # height of a condition [in]
+_SMALLEST_ROW = 0.13  # of many conditions [in]
+_ROWS = 3.6  # height that more conditions share [in]
 _BINS = 120  # places along the axis within which dots are stacked
 _STEP = 0.13  # between dots of a stack [rows]
 _REACH = 0.36  # of a stack, above and below the middle of its row [rows]
@@ -151,9 +153,10 @@ def _draw(rows: Sequence[_Row], positions: Sequence[npt.NDArray[np.float64]], wi
     names = [shorten(row.name, letters) for row in rows]
     left = 0.16 + 0.074 * max(map(len, names))
     bottom, legend, top = 0.42, 0.24 if width >= 6 else 0.44, 0.06
-    height = top + _ROW * len(rows) + bottom + legend
+    row_height = min(_ROW, max(_SMALLEST_ROW, _ROWS / len(rows)))
+    height = top + row_height * len(rows) + bottom + legend
     figure = new_figure(width, height)
-    axes = place_axes(figure, left, top, width - left - 0.12, _ROW * len(rows))
+    axes = place_axes(figure, left, top, width - left - 0.12, row_height * len(rows))
     axes.set_gid("bests")
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlim(0.0, _top(rows))
@@ -163,12 +166,12 @@ def _draw(rows: Sequence[_Row], positions: Sequence[npt.NDArray[np.float64]], wi
     axes.grid(axis="x", color=Ink.RULE, linewidth=0.5)
     axes.set_xlabel("best coverage of a run", labelpad=2)
     for index, (row, offsets) in enumerate(zip(rows, positions, strict=True)):
-        _draw_row(axes, row, index, offsets)
+        _draw_row(axes, row, index, offsets, row_height / _ROW)
     _draw_legend(figure, rows, width, legend - 0.04)
     return figure
 
 
-def _draw_row(axes: Axes, row: _Row, index: int, offsets: npt.NDArray[np.float64]) -> None:
+def _draw_row(axes: Axes, row: _Row, index: int, offsets: npt.NDArray[np.float64], scale: float) -> None:
     if index:
         draw_line(axes, [0.0, 1.0], [index - 0.5] * 2, color=Ink.RULE, linewidth=0.4)
     if not len(row.values):
@@ -180,13 +183,22 @@ def _draw_row(axes: Axes, row: _Row, index: int, offsets: npt.NDArray[np.float64
     # a piece of no length with a round end is a dot, in a fifth of the bytes of a marker
     xs = np.column_stack([values, values, np.full(len(values), np.nan)]).ravel()
     ys = np.column_stack([index + offsets, index + offsets, np.full(len(values), np.nan)]).ravel()
-    draw_line(axes, xs, ys, color=Ink.RUN, alpha=0.55, linewidth=2.6, solid_capstyle="round", zorder=2)
+    draw_line(
+        axes, xs, ys, color=Ink.RUN, alpha=0.55, linewidth=1.6 + scale, solid_capstyle="round", zorder=2
+    )
     if row.interval is not None:
         ends = [row.interval.low, row.interval.high]
         draw_line(
-            axes, ends, [index] * 2, color=Ink.BAND, linewidth=5, alpha=0.85, solid_capstyle="butt", zorder=3
+            axes,
+            ends,
+            [index] * 2,
+            color=Ink.BAND,
+            linewidth=5 * scale,
+            alpha=0.85,
+            solid_capstyle="butt",
+            zorder=3,
         )
-    style = {"marker": "o", "linestyle": "", "markersize": 5.0, "color": Ink.OURS, "zorder": 5}
+    style = {"marker": "o", "linestyle": "", "markersize": 2 + 3 * scale, "color": Ink.OURS, "zorder": 5}
     draw_line(axes, [row.median], [index], **style)
     if row.published:
         style |= {"marker": "D", "markersize": 4.0, "color": Ink.PUBLISHED, "zorder": 4}

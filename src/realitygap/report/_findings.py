@@ -31,12 +31,12 @@ class Finding:
     Attributes:
         claim: The result in one sentence.
         evidence: The numbers behind it, in one or two sentences.
-        table: Key of the table that holds these numbers.
+        tables: Keys of the tables that hold these numbers.
     """
 
     claim: str
     evidence: str
-    table: str
+    tables: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -104,16 +104,18 @@ def _best(tally: Tally, leaders: Sequence[str], comparisons: Sequence[Comparison
     claim = f"{_joined(leaders)} {verb} the highest median coverage: {' and '.join(medians)}."
     rivals = [_turned(each, leaders[0]) for each in comparisons if leaders[0] in (each.one, each.other)]
     if not rivals:
-        return Finding(claim, "", "results")
+        return Finding(claim, "", ("results",))
     lower = [each for each in rivals if each.is_shown and each.difference > 0]
     if not lower:
-        return Finding(claim, f"No comparison shows that {leaders[0]} covers more than another.", "results")
+        return Finding(
+            claim, f"No comparison shows that {leaders[0]} covers more than another.", ("results",)
+        )
     nearest = min(lower, key=lambda each: each.difference)
     return Finding(
         claim,
         f"{leaders[0]} covers more than {len(lower)} of the {_plural(len(rivals), 'condition')} compared with it. "
         f"The nearest of them is {nearest.other}: {_difference([nearest])}.",
-        "comparisons",
+        ("comparisons",),
     )
 
 
@@ -126,7 +128,7 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
             best = max(rows, key=lambda row: float(row["median"]))
             interval = "" if best["low"] is None else f" [{best['low']:#.4g}, {best['high']:#.4g}]"
             claim = f"{best['condition']} has the highest median score of {task}: {best['median']:#.4g}{interval}."
-            findings.append(Finding(claim, "", "scores"))
+            findings.append(Finding(claim, "", ("scores",)))
     return findings
 
 
@@ -139,7 +141,7 @@ def _nothing(comparisons: Sequence[Comparison]) -> Finding:
     else:
         needed = max(each.runs_for_a_claim for each in comparisons)
         evidence = f"A claim needs at least {_plural(needed, 'run')} of each condition."
-    return Finding(claim, evidence, "comparisons")
+    return Finding(claim, evidence, ("comparisons",))
 
 
 # search
@@ -169,7 +171,7 @@ def _of_search(tally: Tally, comparisons: Sequence[Comparison]) -> Finding | Non
         sentences = [*sentences[: ("novelty", "coverage") in pairs], random]
     (claim, numbers), *others = sentences
     evidence = [_capital(numbers), *(f"{text.removesuffix('.')}: {numbers}" for text, numbers in others)]
-    return Finding(claim, f"{'. '.join(evidence)}.", "comparisons")
+    return Finding(claim, f"{'. '.join(evidence)}.", ("comparisons",))
 
 
 def _selection(tally: Tally, name: str) -> Any:
@@ -231,7 +233,8 @@ def _of_noise(
     else:
         claim = f"More noise{span} raises the best coverage in some conditions and lowers it in others."
     evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
-    return Finding(claim, f"{evidence}{_on_fresh_noise(quoted, champions)}", "comparisons")
+    fresh = _on_fresh_noise(quoted, champions)
+    return Finding(claim, evidence + fresh, ("comparisons", "champions") if fresh else ("comparisons",))
 
 
 def _with_searches(tally: Tally, comparisons: Sequence[Comparison]) -> str:
@@ -262,14 +265,14 @@ def _of_changes(comparisons: Sequence[Comparison]) -> Finding | None:
         return Finding(
             f"None of the {_plural(len(changes), 'change')} against a baseline is supported.",
             "",
-            "comparisons",
+            ("comparisons",),
         )
     named = "; ".join(f"{each.one} {_difference([each])}" for each in shown[:2])
     return Finding(
         f"{len(shown)} of {_plural(len(changes), 'change')} against a baseline "
         f"{'is' if len(shown) == 1 else 'are'} supported.",
         f"Largest: {named}.",
-        "comparisons",
+        ("comparisons",),
     )
 
 
@@ -283,7 +286,8 @@ def _limits(tally: Tally, conditions: Sequence[Mapping[str, Any]], comparisons: 
     if comparisons:
         n_open = sum(not each.is_shown and not each.is_equivalent for each in comparisons)
         parts.append(f"{n_open} of {_plural(len(comparisons), 'comparison')} inconclusive")
-        parts.append(f"p corrected for {'all of them' if len(comparisons) > 1 else 'one comparison'}")
+    if len(comparisons) > 1:
+        parts.append("p corrected for all of them")
     return f"{'; '.join(parts)}; brackets hold 95 % intervals."
 
 

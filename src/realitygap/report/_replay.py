@@ -22,7 +22,7 @@ import polars as pl
 from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
 from realitygap.report._path_figure import arena_extent, typical_replicate
-from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report._tally import Tally, label_of, settings_of, task_of
 from realitygap.report._template import template_text
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
@@ -48,7 +48,8 @@ class _Run:
         data: what the script reads; None where no trial could be embedded.
         n_embedded, n_trials: of the run.
         note: what is missing and why; empty where nothing is.
-        link: address of its best trial, at the first step; empty where no trial could be embedded.
+        best: index of the best embedded trial by the task, the first of several alike.
+        link: address of that trial at the first step; empty where no trial could be embedded.
     """
 
     name: str
@@ -57,6 +58,7 @@ class _Run:
     n_embedded: int
     n_trials: int
     note: str
+    best: int = 0
     link: str = ""
 
 
@@ -144,17 +146,18 @@ def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, L
     """Index of the condition, index of its best trial, the first of several alike, and what is shown of it."""
     index = next((k for k, each in enumerate(runs) if each.name == lead), 0)
     name, run = runs[index].name, runs[index].replicate
-    trials = (runs[index].data or {})["trials"]
-    best = _best_of(trials, tally)
-    generation, individual = trials[best][:2]
+    best = runs[index].best
+    generation, individual = (runs[index].data or {})["trials"][best][:2]
     row = tally.rows_of(name, run).row(
         by_predicate=(pl.col("generation") == generation) & (pl.col("individual") == individual), named=True
     )
     condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
-    label = label_of(tally.condition(name))
+    label, task = label_of(tally.condition(name)), task_of(tally.condition(name))
+    value = float(row[tally.score_column(name)])
+    worth = f"coverage {value:.3f}" if task == "coverage" else f"score of {task} {value:#.4g}"
     caption = (
         f"{label}. Best path of the typical run of {name} (run {run}): generation {generation}, individual "
-        f"{individual}, coverage {row[f'coverage_{tally.measure}']:.3f}."
+        f"{individual}, {worth}."
     )
     return index, best, Lead(_picture(condition, replay(condition, row), caption), caption)
 
@@ -218,15 +221,10 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
         "total": rows.height,
         "trials": trials,
     }
-    key = [name, replicate, *trials[_best_of(trials, tally)][:2]]
+    best = chosen[tally.score_column(name)].arg_max() or 0
+    key = [name, replicate, *trials[best][:2]]
     link = f"#replay={'/'.join(quote(str(part), safe='') for part in key)}@0"
-    return _Run(name, replicate, data, len(trials), rows.height, note, link)
-
-
-def _best_of(trials: Sequence[Sequence[Any]], tally: Tally) -> int:
-    """Index of the packed trial with most cells, the first of several alike."""
-    counted = 3 if tally.measure == "ends" else 2
-    return max(range(len(trials)), key=lambda k: trials[k][counted])
+    return _Run(name, replicate, data, len(trials), rows.height, note, best, link)
 
 
 def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:

@@ -103,7 +103,7 @@ def test_mcap_with_json_gives_what_was_driven(tmp_path):
 def test_mcap_that_is_cut_off_has_one_message(tmp_path):
     path = json_mcap(tmp_path / "log.mcap", *drive(50))
     whole = path.read_bytes()
-    for size in (0, 4, 100, len(whole) // 2, len(whole) - 1):
+    for size in (4, 100, len(whole) // 2, len(whole) - 1):
         path.write_bytes(whole[:size])
         with pytest.raises(LogError, match=r"log.mcap is damaged, cut off.*mcap recover") as error:
             list(read_logs(path, JSON_MAP, ROBOT))
@@ -117,3 +117,10 @@ def test_columns_of_a_part_are_of_one_topic(tmp_path):
         list(read_logs(path, mapped, ROBOT))
     with pytest.raises(LogError, match=r"has no column /drive/lef\. .*Did you mean '/drive/left'"):
         list(open_source(path).batches(["/drive/lef"]))
+
+
+def test_empty_mcap_has_a_message_without_names_of_exceptions(tmp_path):
+    """It named `EndOfFile: EndOfFile`, and advised to recover what was never there."""
+    (tmp_path / "log.mcap").touch()
+    with pytest.raises(LogError, match=r"log.mcap is empty. Record it again.$"):
+        list(read_logs(tmp_path / "log.mcap", JSON_MAP, ROBOT))

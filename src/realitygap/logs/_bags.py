@@ -178,6 +178,8 @@ def _is_json(path: Path) -> bool:
 
 
 def _damaged(path: Path, error: Exception) -> LogError:
+    if path.is_file() and not path.stat().st_size:
+        return LogError(f"{path} is empty. Record it again.")
     said = str(error).strip().split("\n")[0].rstrip(".")[:200] or type(error).__name__
     if path.suffix == ".mcap":
         advice = f"If it was cut off, `mcap recover {path.name}` saves the whole messages."

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import card_of, widget_of
-from realitygap.kernels.tasks.coverage import to_grid, visit, visit_line
+from realitygap.kernels.tasks.coverage import BORDER_SNAP, visit, visit_line
 from realitygap.world import (
     Arena,
     Body,
@@ -284,21 +284,23 @@ def first_visits(
     shape = (grid.columns, grid.rows)
     along, at_ends = np.zeros((2, grid.n_cells), np.bool_)
     order, order_ends = np.zeros((2, grid.n_cells), np.uint8)
-    robots = [
-        [(to_grid(x, grid.x, grid.cell), to_grid(y, grid.y, grid.cell)) for x, y, _ in robot]
-        for robot in np.reshape(poses, (-1, *poses.shape[-2:])).tolist()
-    ]
+    # as `to_grid`, of all poses in one go: a report counts tens of thousands
+    values = (np.reshape(poses, (-1, *poses.shape[-2:]))[:, :, :2] - [grid.x, grid.y]) / grid.cell
+    borders = np.floor(values + 0.5)
+    placed_at = np.where(np.abs(values - borders) < BORDER_SNAP, borders, values)
+    cells_at = np.floor(placed_at).astype(np.int64).tolist()
+    robots = list(zip(placed_at.tolist(), cells_at, strict=True))
     n, n_ends = [], []
     so_far = so_far_ends = 0
     for step in range(poses.shape[-2]):
-        for at in robots:
-            u, v = at[step]
-            column, row = int(np.floor(u)), int(np.floor(v))
+        for at, cells in robots:
+            (u, v), (column, row) = at[step], cells[step]
             if step == 0:
                 so_far = visit(column, row, *shape, along, order, so_far)
             elif at[step] != at[step - 1]:
                 so_far = visit_line(*at[step - 1], u, v, *shape, along, order, so_far)
-            so_far_ends = visit(column, row, *shape, at_ends, order_ends, so_far_ends)
+            if step == 0 or cells[step] != cells[step - 1]:
+                so_far_ends = visit(column, row, *shape, at_ends, order_ends, so_far_ends)
         n.append(so_far)
         n_ends.append(so_far_ends)
     steps, end_steps = (np.searchsorted(counts, np.arange(1, counts[-1] + 1)) for counts in (n, n_ends))

@@ -298,7 +298,8 @@ def first_visits(
             if step == 0:
                 so_far = visit(column, row, *shape, along, order, so_far)
             elif at[step] != at[step - 1]:
-                so_far = visit_line(*at[step - 1], u, v, *shape, along, order, so_far)
+                before_u, before_v = at[step - 1]
+                so_far = visit_line(before_u, before_v, u, v, *shape, along, order, so_far)
             if step == 0 or cells[step] != cells[step - 1]:
                 so_far_ends = visit(column, row, *shape, at_ends, order_ends, so_far_ends)
         n.append(so_far)

@@ -20,27 +20,30 @@ UNKNOWN = "unknown setting. Did you mean "
     ("make", "text"),
     [
         (lambda: NeatSettings(popultion=3), f"NeatSettings.popultion: {UNKNOWN}'population'?"),
-        (lambda: NeatSettings(population="x"), "NeatSettings.population: expected a whole number, came 'x'."),
-        (lambda: NeatSettings(population=1), "NeatSettings.population: expected at least 2, came 1."),
-        (lambda: NeatSettings(crossover=2), "NeatSettings.crossover: expected at most 1.0, came 2."),
+        (lambda: NeatSettings(population="x"), "NeatSettings.population: expected a whole number, got 'x'."),
+        (lambda: NeatSettings(population=1), "NeatSettings.population: expected at least 2, got 1."),
+        (lambda: NeatSettings(crossover=2), "NeatSettings.crossover: expected at most 1.0, got 2."),
         (
             lambda: NeatSettings(weight_limit=float("nan")),
-            "NeatSettings.weight_limit: expected a finite number, came nan.",
+            "NeatSettings.weight_limit: expected a finite number, got nan.",
         ),
         (
             lambda: NeatSettings(activation="tan"),
-            "NeatSettings.activation: expected 'tanh', 'sigmoid' or 'identity', came 'tan'. Did you mean 'tanh'?",
+            (
+                "NeatSettings.activation: expected 'tanh', 'sigmoid' or 'identity', got 'tan'. Did you mean "
+                "'tanh'?"
+            ),
         ),
         (
             lambda: NeatSettings.named("default", popultion=3),
             f"NeatSettings.popultion: {UNKNOWN}'population'?",
         ),
         (lambda: JyroPlatform(stepz=3), f"JyroPlatform.stepz: {UNKNOWN}'steps'?"),
-        (lambda: JyroPlatform(steps=1.5), "JyroPlatform.steps: expected a whole number, came 1.5."),
+        (lambda: JyroPlatform(steps=1.5), "JyroPlatform.steps: expected a whole number, got 1.5."),
         (lambda: ArenaSettings(stat="left"), f"ArenaSettings.stat: {UNKNOWN}'start'?"),
         (
             lambda: ArenaSettings(start="lef"),
-            "ArenaSettings.start: expected 'corner', 'center' or 'left', or a list, came 'lef'.",
+            "ArenaSettings.start: expected 'corner', 'center' or 'left', or a list, got 'lef'.",
         ),
         (lambda: CoverageTask(cell="line"), f"CoverageTask.cell: {UNKNOWN}'cells'?"),
         (lambda: NoveltySettings(archive=3), f"NoveltySettings.archive: {UNKNOWN}'archive_size'?"),
@@ -49,11 +52,11 @@ UNKNOWN = "unknown setting. Did you mean "
             lambda: Condition(name="a", neat={"popultion": 3}),
             f"Condition.neat.popultion: {UNKNOWN}'population'?",
         ),
-        (lambda: Condition(name="a", neat=3), "Condition.neat: expected a table, came 3."),
+        (lambda: Condition(name="a", neat=3), "Condition.neat: expected a table, got 3."),
         (lambda: StudySection(name="a", sed=3), f"StudySection.sed: {UNKNOWN}'seed'?"),
         (
             lambda: ConditionNotes(published=[0.1, 2.0]),
-            "ConditionNotes.published[2]: expected at most 1.0, came 2.0.",
+            "ConditionNotes.published[2]: expected at most 1.0, got 2.0.",
         ),
         (
             lambda: Study(
@@ -86,8 +89,8 @@ def test_a_mistake_within_a_table_is_told_once_with_its_place():
     with pytest.raises(ValueError, match=":") as caught:
         Condition(name="a", neat={"population": 1}, jyro={"steps": 0})
     assert str(caught.value).splitlines() == [
-        "Condition.neat.population: expected at least 2, came 1.",
-        "Condition.jyro.steps: expected at least 1, came 0.",
+        "Condition.neat.population: expected at least 2, got 1.",
+        "Condition.jyro.steps: expected at least 1, got 0.",
     ]
 
 
@@ -132,16 +135,16 @@ def test_true_and_false_are_no_numbers_in_a_file(load, text, said, tmp_path):
     with pytest.raises(RealityGapError, match="mistake") as caught:
         load(file)
     came = "False" if "false" in text else "True"
-    assert len([line for line in str(caught.value).splitlines() if f"{said}, came {came}" in line]) == 1
+    assert len([line for line in str(caught.value).splitlines() if f"{said}, got {came}" in line]) == 1
 
 
 @pytest.mark.parametrize(
     ("make", "text"),
     [
-        (lambda: JyroPlatform(steps=True), "JyroPlatform.steps: expected a whole number, came True."),
-        (lambda: Distribution(choice=[1, True]), "Distribution.choice[2]: expected a number, came True."),
-        (lambda: ConditionNotes(published=[True, 1]), "ConditionNotes.published[1]: expected a number, came True."),
-        (lambda: Condition(name="a", noise=True), "Condition.noise: expected a number, came True."),
+        (lambda: JyroPlatform(steps=True), "JyroPlatform.steps: expected a whole number, got True."),
+        (lambda: Distribution(choice=[1, True]), "Distribution.choice[2]: expected a number, got True."),
+        (lambda: ConditionNotes(published=[True, 1]), "ConditionNotes.published[1]: expected a number, got True."),
+        (lambda: Condition(name="a", noise=True), "Condition.noise: expected a number, got True."),
     ],
 )  # fmt: skip
 def test_true_and_false_are_no_numbers_in_python(make, text):

@@ -116,8 +116,8 @@ def mistakes(
     lines = []
     for place, texts in found.items():
         if is_setting[place] and len(texts) > 1:  # none of the types that it may have
-            expected = dict.fromkeys(text.split(", came ")[0].removeprefix("expected ") for text in texts)
-            texts = [f"expected {', or '.join(expected)}, came {shown(_value_at(values, place))}."]
+            expected = dict.fromkeys(text.split(", got ")[0].removeprefix("expected ") for text in texts)
+            texts = [f"expected {', or '.join(expected)}, got {shown(_value_at(values, place))}."]
         lines += [(place, text) for text in texts]
     return lines
 
@@ -200,7 +200,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "missing":
         return MISSING
     if kind == "literal_error":
-        return f"expected {context['expected']}, came {came}.{_meant(problem['input'], context['expected'])}"
+        return f"expected {context['expected']}, got {came}.{_meant(problem['input'], context['expected'])}"
     if kind == "value_error":
         # of the model as a whole there is nothing short to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
@@ -208,7 +208,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
         if is_table:
             return said if said.endswith("?") else f"{said}."
         # who names it already has nothing to add
-        return f"{said}." if str(problem["input"]) in said else f"{said}, came {came}."
+        return f"{said}." if str(problem["input"]) in said else f"{said}, got {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
         words, key = _LIMITS[kind]
@@ -218,12 +218,12 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
         field = model.model_fields.get(str(problem["loc"][-1]))
         if field is not None and table_in(field.annotation)[1]:
             bound = "at most" if kind == "too_long" else "at least"
-            return f"expected {bound} {n}, came {len(problem['input'])}."
+            return f"expected {bound} {n}, got {len(problem['input'])}."
         expected = f"{n} values"
     text = f"expected {expected}" if expected else str(problem["msg"])
     if len(problem["loc"]) > 2 and isinstance(problem["loc"][-1], int):
         text += f" as value {problem['loc'][-1] + 1}"
-    return f"{text}, came {came}."
+    return f"{text}, got {came}."
 
 
 def _meant(came: object, expected: str) -> str:

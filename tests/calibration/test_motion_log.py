@@ -120,6 +120,6 @@ def test_wrong_logs_are_refused_with_one_message() -> None:
     )
     refused("All commands are 0", commands=np.zeros((40, 2)))
     refused(r"poses has shape \(39, 2\), expected \(40, 2\) or \(40, 3\)", poses=poses[:39])
-    refused("were seen at 0 times", poses=None)
+    refused("were recorded at 0 times", poses=None)
     refused("hold_out is 1, expected", hold_out=1.0)
     refused("The held-out part of the log has 4 rows", hold_out=0.1)

@@ -98,7 +98,7 @@ def test_repeats_that_read_the_same_are_as_uncertain_as_the_ruler():
 def test_one_path_alone_identifies_nothing():
     _, own = fitted([measured(13.75, 0.0, STRAIGHT)])
     assert not own["drive.gain"].identified
-    assert "three times more" in own["drive.gain"].advice
+    assert "three more times" in own["drive.gain"].advice
 
 
 def test_one_path_and_one_turn_are_as_uncertain_as_before_whatever_a_camera_reads():

@@ -143,7 +143,7 @@ def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person
     out = run(*command)
     assert "Trial 1 of 4: put it with 24 in free ahead" in out
     assert "It turns for 5 full steps" in out
-    assert "the same command goes on where it stopped" in out
+    assert "Run the same command to resume" in out
     assert not (tmp_path / "path.toml").exists()
     assert not first.answers
     kept = read_observations(tmp_path / "path.trials.jsonl").trials
@@ -156,8 +156,8 @@ def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person
     second = person(*("?", "r", *STRAIGHT), "r", *("", "x", "14", "0", "r"), *("", "14", "0", "0"), *TURN)
     out = run(*command)
     assert "Trial 1 of 2: put it with 24 in free ahead" in out
-    assert "There is none before." in out
-    assert "'x' is no number. Expected one such as 13.75, 13 3/4 or -2." in out
+    assert "There is no previous trial." in out
+    assert "'x' is not a number. Expected, for example, 13.75, 13 3/4, or -2." in out
     assert not second.answers
     made = load_calibration(tmp_path / "path.toml")
     assert made.evidence["path"]["straight_m"] == pytest.approx([13.75 * 0.0254, 14 * 0.0254], rel=1e-3)
@@ -260,7 +260,7 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
             ("sensors", "--robot", "sim", "--observe", "all", "-o", "x.toml"),
             "expected cells, encoders or track",
         ),
-        (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "takes at least 2 trials"),
+        (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "needs at least 2 trials"),
         (("path", "--robot", "sim", "--figure", "x.svg", "-o", "x.toml"), "--figure draws the readings"),
         (("sensors", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "has 3 range sensors"),
         (("all", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "name the target sim:e-puck"),
@@ -279,7 +279,7 @@ def test_mistakes_are_one_message_and_lose_nothing(arguments, says, tmp_path, mo
 def test_what_is_no_calibration_is_not_overwritten(tmp_path):
     twin = tmp_path / "worn.toml"
     twin.write_text('format = "realitygap twin 1"\n')
-    assert "is no calibration: it stays as it is" in refused("path", "--robot", "sim", "-o", twin)
+    assert "is not a calibration: it was not changed" in refused("path", "--robot", "sim", "-o", twin)
     assert twin.read_text() == 'format = "realitygap twin 1"\n'
 
 
@@ -299,7 +299,7 @@ def path_trials(file: Path, numbers: dict[str, float], way: float = 1.0) -> Path
 def test_a_robot_that_goes_back_makes_no_robot_and_one_beyond_what_was_thought_possible_is_flagged(tmp_path):
     back = path_trials(tmp_path / "back.jsonl", {}, way=-0.5)
     told = refused("path", "--from", back, "-o", tmp_path / "back.toml")
-    assert "makes no robot: " in told
+    assert "are not a valid robot: " in told
     assert "drive.gain_left: expected more than 0" in told
     assert not (tmp_path / "back.toml").exists()
     wide = path_trials(tmp_path / "wide.jsonl", {"drive.track": 0.25})
@@ -434,7 +434,7 @@ def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, 
         assert ([trial.purpose for trial in trials], observe, seed) == ([kind] * 2, "track", 5)
         assert all(len(trial.poses) for trial in trials)
     said = refused("motion", "--robot", "sim", "-o", tmp_path / "x.toml")
-    assert "Of cells alone nothing is told of motion" in said
+    assert "cells alone does not identify motion" in said
     assert "--observe encoders or track" in said
     said = refused("contact", "--robot", "sim", "--observe", "encoders", "-o", tmp_path / "x.toml")
     assert "--observe track" in said

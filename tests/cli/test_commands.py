@@ -148,7 +148,7 @@ def test_run_prints_a_summary_and_where_things_are(tmp_path):
     assert "results/paper" in done.stdout
     assert len(max(done.stdout.splitlines(), key=len)) <= 100
     again = realitygap("run", "paper", "--replicates", "6", cwd=tmp_path)
-    assert "All 54 runs were there already" in again.stdout
+    assert "All 54 runs existed already" in again.stdout
 
 
 def test_run_as_json(tmp_path):
@@ -177,7 +177,7 @@ def test_run_ends_with_130_on_ctrl_c_and_goes_on(tmp_path):
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode in INTERRUPTED, errors
-    assert "the same command goes on where it stopped" in errors
+    assert "Run the same command to resume" in errors
     assert "Traceback" not in errors
     before = len(list(trials.glob("*.parquet")))
     assert before >= 3
@@ -231,7 +231,7 @@ def test_digest_says_that_runs_are_missing(tmp_path):
     assert part.returncode == 0
     assert re.fullmatch(r"[0-9a-f]{64}\n", part.stdout)
     assert part.stdout != whole.stdout
-    assert part.stderr.startswith("realitygap: note: 17 of 18 runs are there")
+    assert part.stderr.startswith("realitygap: note: 17 of 18 runs exist")
     assert part.stderr.count("\n") == 1
 
 
@@ -291,7 +291,7 @@ def test_what_is_printed_can_be_pasted_into_a_shell(tmp_path):
     assert "realitygap report 'my results'" in done.stdout
     assert "polars.scan_parquet('my results/trials/*.parquet')" in done.stdout
     done = realitygap("new-study", "my study.toml", cwd=tmp_path)
-    assert done.stdout.endswith("Carry it out with: realitygap run 'my study.toml'\n")
+    assert done.stdout.endswith("Run it with: realitygap run 'my study.toml'\n")
 
 
 def test_an_error_of_run_begins_with_its_first_letter():
@@ -308,7 +308,7 @@ def test_new_study_writes_a_file_that_runs(tmp_path):
 
 def test_new_study_never_overwrites(tmp_path):
     (tmp_path / "mine.toml").write_text("precious")
-    one_message(realitygap("new-study", "mine.toml", cwd=tmp_path), "exists already")
+    one_message(realitygap("new-study", "mine.toml", cwd=tmp_path), "exists and was not changed")
     assert (tmp_path / "mine.toml").read_text() == "precious"
 
 
@@ -424,11 +424,11 @@ def test_bench_of_a_task_prints_its_figures_beside_the_published_ones():
         ("bench xor --settings stanley", ["Unknown NEAT settings 'stanley'"]),
         ("bench xor --change crossover", ["expected KEY=VALUE"]),
         ("bench xor --change crossover=0 --change crossover=1", ["--change gives crossover twice: 0 and 1"]),
-        ("bench xor --change crossover=2", ["crossover: expected at most 1.0, came 2"]),
-        ("bench xor --seconds 1", ["--seconds goes with the measurement of speed"]),
-        ("bench realism --seeds 3", ["--seeds goes with a task"]),
-        ("bench --seeds 3", ["--seeds goes with a task"]),
-        ("bench --seed 0", ["--seed goes with a task"]),
+        ("bench xor --change crossover=2", ["crossover: expected at most 1.0, got 2"]),
+        ("bench xor --seconds 1", ["--seconds is only for the measurement of speed"]),
+        ("bench realism --seeds 3", ["--seeds is only for a task"]),
+        ("bench --seeds 3", ["--seeds is only for a task"]),
+        ("bench --seed 0", ["--seed is only for a task"]),
         ("run papr", ["Unknown study 'papr'", "Did you mean 'paper'?"]),
         ("run nowhere.toml", ["no file nowhere.toml", "new-study"]),
         ("digest nowhere", ["nowhere does not exist"]),

@@ -151,7 +151,7 @@ def test_a_missing_extra_is_one_message_and_leaves_no_file(results, tmp_path, mo
         (["DIR", "-o", "a.jsn"], "Did you mean 'json'?"),
         (["DIR", "-o", "a"], "ends in nothing, expected json, onnx, graphml, c or aseba"),
         (["DIR", "-o", "a.json", "--format", "xml"], "Unknown format 'xml'"),
-        (["DIR"], "Name a file with -o"),
+        (["DIR"], "Name one with -o"),
         (["DIR", "--condition", "novelty-5O", "-o", "a.json"], "Did you mean 'novelty-50'?"),
         (["DIR", "--replicate", "9", "-o", "a.json"], "its runs are 0 to 2"),
         (["DIR", "--generation", "9", "-o", "a.json"], "its generations are 0 to 2"),
@@ -181,14 +181,14 @@ def test_species_innovations_and_lineage_are_written_as_parquet(results, tmp_pat
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["lineage", "-o", "a.parquet"], "Of which results? Name a folder: realitygap export lineage"),
+        (["lineage", "-o", "a.parquet"], "No results folder. Name one: realitygap export lineage"),
         (["linage", "DIR", "-o", "a.parquet"], "Expected species, innovations or lineage first"),
         (["lineage", "DIR", "-o", "a.csv"], "ends in .csv, expected .parquet"),
         (
             ["lineage", "DIR", "--generation", "1", "-o", "a.parquet"],
-            "Of no meaning for lineage: --generation",
+            "Not for lineage: --generation",
         ),
-        (["lineage", "DIR", "--format", "json", "-o", "a.parquet"], "Of no meaning for lineage: --format"),
+        (["lineage", "DIR", "--format", "json", "-o", "a.parquet"], "Not for lineage: --format"),
         (["lineage", "DIR", "--replicate", "9", "-o", "a.parquet"], "There is no run 9"),
         (["lineage", "DIR", "--condition", "novelty-5O", "-o", "a.parquet"], "Did you mean 'novelty-50'?"),
         (["lineage", "nowhere", "-o", "a.parquet"], "nowhere does not exist"),

@@ -67,7 +67,7 @@ def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
     code, out, _ = command("plan", "--effect", "0.05", "--from", "trials.jsonl", cwd=folder)
     assert code == 0
     assert "6 controllers, 3 trials each" in out
-    assert "Fewest trials on the target" in out
+    assert "Minimum number of trials on the target" in out
 
 
 def test_the_table_ends_with_the_verdict(command):
@@ -88,7 +88,7 @@ def test_the_table_ends_with_the_verdict(command):
         (("gap", "sim", "jyro", "--controllers", "nobody"), ("Unknown study 'nobody'",)),
         (("gap", "sim:nowhere.toml", "jyro"), ("nowhere.toml",)),
         (("gap", "sim", "jyro", "--arena", "nowhere"), ("nowhere",)),
-        (("plan",), ("expected one of --effect, --margin and --correlation",)),
+        (("plan",), ("expected one of --effect, --margin, and --correlation",)),
         (("plan", "--effect", "0.1", "--margin", "0.1"), ("--effect, --margin",)),
         (("plan", "--effect", "0"), ("effect is 0",)),
         (("plan", "--effect", "0.1", "--from", "nothing.jsonl"), ("no file nothing.jsonl",)),

@@ -121,8 +121,8 @@ def test_wrong_inputs_have_one_message(log, tmp_path):
     assert "go with --from and a log" in refused(
         "calibrate", "path", "--robot", "sim", "-o", fit, "--map", log
     )
-    assert "is no file of observed trials" in refused("calibrate", "contact", "--from", log, "-o", fit)
-    assert "--radius-mm goes with sensors" in refused(*calibrate, "--radius-mm", 20)
+    assert "is not a file of observed trials" in refused("calibrate", "contact", "--from", log, "-o", fit)
+    assert "--radius-mm is only for sensors" in refused(*calibrate, "--radius-mm", 20)
     write(log, rows(-drive(300)[0], drive(300)[1]))
     assert "Both wheels are reversed" in refused(*calibrate)
     write(log, rows(*drive(80))[:, :3], "t,left,right")

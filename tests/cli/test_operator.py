@@ -109,9 +109,9 @@ def test_a_person_is_led_through_a_study(tmp_path, study):
     terminal.answer("Escape: later", " \x1b[C\x1b[C u\x1b[A \r")
     terminal.answer("Escape: later", "dlll\r")
     # the second score is taken back and entered anew
-    terminal.answer("Enter closes it", "2\n")
+    terminal.answer("Enter: close it", "2\n")
     terminal.answer("Escape: later", "dl\r")
-    terminal.answer("Enter closes it", "\n")
+    terminal.answer("Enter: close it", "\n")
     assert terminal.end() == 0
     assert "1 of 1 runs on a robot are complete. 2 trials were driven just now." in terminal.seen
     with Ledger.open(out / LEDGER_NAME) as ledger:
@@ -162,7 +162,7 @@ def test_a_line_that_was_entered_is_kept_when_the_program_is_killed_at_the_next(
         assert len(ledger.record(2).commands) == 3
     again = Terminal(*run)
     again.answer("Escape: later", "dll\r")
-    again.answer("Enter closes it", "\n")
+    again.answer("Enter: close it", "\n")
     assert again.end() == 0
     assert "was cut off" not in again.seen
     assert again.seen.count("Escape: later") == 1, "what was scored is not asked again"
@@ -243,16 +243,16 @@ def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path,
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("score", "1", "--cells", "13,x"), "--cells: expected numbers of cells such as 0,1,13, came '13,x'"),
+        (("score", "1", "--cells", "13,x"), "--cells: expected numbers of cells such as 0,1,13, got '13,x'"),
         (("score", "1", "--cells", "72"), "Cell 72 is outside the grid: expected numbers from 0 to 71"),
         (("score", "9", "--cells", "1"), "has no trial 9: its trials are 1 to 2"),
         (("score", "QQQQ", "--cells", "1"), "has no trial 'QQQQ'"),
-        (("score", "1", "--cells", " "), "No cell was named"),
+        (("score", "1", "--cells", " "), "No cell was entered"),
         (("score",), "There is no terminal in which to pick cells"),
         (("void", "1"), "--text is missing"),
         (("undo",), "a trial is missing"),
         (("undo", "1"), "is driven; that can be done only while it is scored"),
-        (("note", "--text", " "), "A note without a word was not taken"),
+        (("note", "--text", " "), "An empty note was not saved"),
         (("lst",), "Did you mean 'list'?"),
         (("agreement",), "no trial was counted by two people yet"),
         (
@@ -290,7 +290,7 @@ def test_a_second_count_is_another_persons(driven, no_terminal):
         assert done.returncode == 0, done.stderr
     again = no_terminal("trials", "score", str(driven), "1", "--cells", "13", "--who", "anna", "--second")
     assert again.returncode == 1
-    assert "'anna' has counted the cells of trial 1 already" in again.stderr
+    assert "'anna' already counted the cells of trial 1" in again.stderr
 
 
 def test_blind_trials_are_listed_without_their_conditions(tmp_path, study, no_terminal):

@@ -142,7 +142,7 @@ def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
         (("--arena", "papr"), "Did you mean 'paper'?"),
         (("--study", "none"), "There is no ledger at"),
         (("--study", "none", "--second", "--correct"), "exclude each other"),
-        (("--study", "none", "--pens", "red"), "--pens goes without --study"),
+        (("--study", "none", "--pens", "red"), "--pens cannot be combined with --study"),
     ],
 )
 def test_wrong_options_get_one_clear_message(photo, options, said, command):
@@ -181,7 +181,7 @@ def _bytes_of(kind: str, photo) -> bytes:
     ("kind", "said"),
     [
         ("torn", "Is the file whole?"),
-        ("gray", "The picture is gray, and its 2 pens are told apart by color. Take a photo in color."),
+        ("gray", "The picture is gray, and its 2 pens are identified by color. Take a photo in color."),
         ("empty", "is empty"),
         ("text", "no picture that can be read"),
         ("heic", "It looks like HEIC"),

@@ -204,7 +204,7 @@ def test_a_gap_is_measured_to_tracked_trials_and_their_commands_are_replayed(rec
     assert found.replay is not None
     assert found.replay.distance.shape[1] == 26
     assert found.replay.distance[:, 0].max() < 1e-6
-    with pytest.raises(Exception, match="one more is asked for"):
+    with pytest.raises(Exception, match="one more was requested"):
         gap_between(
             "sim", f"recorded:{folder / 'tracked.jsonl'}", controllers="paper", n_controllers=2, trials=2
         )
@@ -232,9 +232,9 @@ def test_tags_are_printed_at_true_scale(command, tmp_path):
         (("--camera", "0", "--overlay", "o.mp4"), "Film first"),
         (("--camera", "x", "--trial", "3"), "--study DIR --trial NUMBER"),
         (("--camera", "x", "--study", "d", "--trials", "f", "--trial", "3"), "exclude each other"),
-        (("--camera", "x", "--into", "f.jsonl"), "Name it: --study"),
+        (("--camera", "x", "--into", "f.jsonl"), "Name the trial: --study"),
         (("--camera", "x", "--lens", "no.toml"), "cannot be read as the file of a lens"),
-        (("--camera", "x", "--sheet", "--corner-size", "0.1"), "--sheet says where"),
+        (("--camera", "x", "--sheet", "--corner-size", "0.1"), "--sheet defines the positions"),
         (("--camera", "x", "--arena", "no"), "no"),
     ],
 )

@@ -23,7 +23,7 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("transfer") / "travels"
     result = run("transfer", "sim-paper", "--to", "jyro", "--strategy", "select", *SMALL, "-o", out)
     assert "sim-paper, coverage-sim: from simulation (SIM) to jyro (SIM)" in result.output
-    assert "--replicates says more of a strategy" in result.output
+    assert "To compare strategies, add --replicates" in result.output
     return out
 
 

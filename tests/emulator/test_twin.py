@@ -196,7 +196,7 @@ def test_a_bad_file_of_a_twin_is_refused(tmp_path):
 
     file = tmp_path / "twin.toml"
     file.write_text('format = "realitygap twin 1"\n[wheels]\ntrack = 9\n', "utf-8")
-    with pytest.raises(RobotError, match=r"wheels\.track: expected at most 0.4, came 9"):
+    with pytest.raises(RobotError, match=r"wheels\.track: expected at most 0.4, got 9"):
         serial.serial_for_url(f"emulator://s2?twin={file}&speed=off")
     with pytest.raises(RobotError, match="There is no twin file"):
         serial.serial_for_url("emulator://s2?twin=none.toml&speed=off")

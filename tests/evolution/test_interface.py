@@ -23,7 +23,7 @@ def genome(n_inputs: int = 3, *, bias: bool = False) -> Genome:
 def test_network_without_names_is_the_papers_if_its_numbers_fit():
     assert genome().interface.inputs == ("obstacle", "stall", "time")
     assert genome(bias=True).interface.inputs == ("obstacle", "stall", "time", "bias")
-    with pytest.raises(ControllerError, match="6 inputs and 2 outputs, and does not say"):
+    with pytest.raises(ControllerError, match="6 inputs and 2 outputs, and does not name"):
         _ = genome(5, bias=True).interface
 
 

@@ -24,8 +24,8 @@ def test_parts_carry_what_they_take_and_add_up():
     assert found.after.estimate == pytest.approx(0.05)
     assert found.change.estimate == pytest.approx(-0.25)
     assert found.order == [0, 1]
-    assert found.advice.startswith("Change this next: motor, which carries most, 0.200 [0.200, 0.200]")
-    assert "lies outside these numbers" in found.advice
+    assert found.advice.startswith("Change this next: motor, which explains most, 0.200 [0.200, 0.200]")
+    assert "is outside these numbers" in found.advice
     assert found.to_dict()["parts"]["motor"]["numbers"] == 3
 
 
@@ -44,26 +44,26 @@ def test_a_part_that_may_be_chance_is_said_to_be_so_and_one_that_harms_is_not_ad
     whole, none = Estimate(0.1, 0.05, 0.2, 9), Estimate(0.0, 0.0, 0.01, 9)
     less = Estimate(-0.1, -0.2, -0.05, 9)
     advice = Why(("motor",), (unsure,), (1,), whole, none, less).advice
-    assert "not shown to be more than chance, some 21 controllers would" in advice  # 9 * (0.03 / 0.02)^2
+    assert "this may be chance (about 21 controllers would" in advice  # 9 * (0.03 / 0.02)^2
     hardly = Estimate(0.001, -0.04, 0.05, 9)
     assert "more than 1,024 controllers" in Why(("motor",), (hardly,), (1,), whole, none, less).advice
     nearly = Estimate(0.02, 0.0, 0.05, 9)
-    assert "some 10 controllers would" in Why(("motor",), (nearly,), (1,), whole, none, less).advice
+    assert "about 10 controllers would" in Why(("motor",), (nearly,), (1,), whole, none, less).advice
     harm = Estimate(-0.02, -0.03, -0.01, 9)
     advice = Why(("motor",), (harm,), (1,), whole, whole, Estimate(0.0, -0.02, 0.02, 9)).advice
-    assert advice.startswith("Change this next: nothing that was fitted")
+    assert advice.startswith("Change this next: none of the fitted parts")
     one = Estimate(0.02, 0.01, 0.05, 9)
     before, after = Estimate(0.01, 0.0, 0.02, 9), Estimate(0.06, 0.03, 0.1, 9)
     worse = Why(("motor",), (one,), (1,), before, after, Estimate(0.05, 0.01, 0.09, 9))
-    assert worse.advice.startswith(
-        "Change this next: what was fitted. All of it together makes the gap larger"
-    )
+    assert worse.advice.startswith("Change this next: the fit. It makes the gap larger")
     perhaps = Why(("motor",), (one,), (1,), before, after, Estimate(0.05, -0.01, 0.09, 9))
     assert perhaps.advice.startswith("Change this next: motor, ")
-    assert perhaps.advice.endswith("All of the fit together is not shown to make it smaller.")
+    assert perhaps.advice.endswith("The whole fit is not shown to reduce the gap.")
 
 
 def test_few_controllers_carry_no_advice_and_it_says_how_many_would():
     found = explained(differences((0.2, 0.05), c=2))
     assert found.after.low is None
-    assert found.advice == "What to change next cannot be said: 2 controllers give no interval; 5 would."
+    assert found.advice == (
+        "No advice on the next change: 2 controllers are too few for an interval; at least 5 are needed."
+    )

@@ -225,7 +225,7 @@ def test_defaults_are_those_of_the_study_of_the_task(kind):
             ValueError,
             r"range\.3 is missing",
         ),
-        ({"kind": "light", "platform": "jyro", "arena": {"preset": "paper"}}, TaskError, "wants a light"),
+        ({"kind": "light", "platform": "jyro", "arena": {"preset": "paper"}}, TaskError, "needs a light"),
         ({"kind": "goal", "arena": {"preset": "avoid"}}, ValueError, "goal"),
         ({"task": {"cell": "ends"}}, ValueError, "cell"),
         ({"dtype": "float16"}, ValueError, "dtype is 'float16', expected 'float32' or 'float64'"),

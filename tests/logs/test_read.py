@@ -204,7 +204,7 @@ WRONG_MAPS = {
     'commands = {time = "t", left = "left", right = "wrong"}': "has no column wrong",
     'poses = {time = "t", x = "x", y = "y"}': "poses alone do not show",
     'commands = {time = "t", left = "left", right = "right", time_unit = "h"}': "commands.time_unit is 'h'",
-    'commands = {time = "t", left = "left", right = "right", left_sign = 2}': "expected 1 or -1, came 2",
+    'commands = {time = "t", left = "left", right = "right", left_sign = 2}': "expected 1 or -1, got 2",
     'comands = {time = "t"}': "Did you mean 'commands'?",
     "commands = [": "it is not TOML",
 }

@@ -147,7 +147,7 @@ def test_times_of_a_real_robot_are_kept(tmp_path):
 
 def test_what_cannot_be_a_bag_has_one_message(tmp_path):
     write_bag(trial(), HEAD, tmp_path / "trial.mcap")
-    with pytest.raises(LogError, match=r"trial\.mcap is there already"):
+    with pytest.raises(LogError, match=r"trial\.mcap exists already"):
         write_bag(trial(), HEAD, tmp_path / "trial.mcap")
     with pytest.raises(LogError, match="Trial 7 has no command"):
         write_bag(trial(commands=np.empty((0, 2))), HEAD, tmp_path / "a.mcap")

@@ -32,7 +32,7 @@ needs_playground = pytest.mark.skipif(bool(why_not(SPEED)), reason=why_not(SPEED
 
 
 def test_a_robot_on_a_port_needs_somebody_who_places_it():
-    with pytest.raises(StudyError, match="Who places the robot of thymio:/dev/no-such"):
+    with pytest.raises(StudyError, match="No operator places the robot of thymio:/dev/no-such"):
         open_target("thymio:/dev/no-such", ARENA)
     assert platform_of("thymio:/dev/ttyACM0").needs_person
     assert not platform_of(EMULATED).needs_person

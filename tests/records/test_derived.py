@@ -150,7 +150,7 @@ def test_what_cannot_be_derived_or_written_is_said(folder, tmp_path):
         folder.derive("linage")
     with pytest.raises(ValueError, match="Did you mean 'novelty'"):
         folder.derive("lineage", "novelti")
-    with pytest.raises(RecordError, match="where a study keeps its trials"):
+    with pytest.raises(RecordError, match="in a folder of a study"):
         folder.write_derived("lineage", folder.path / "trials" / "lineage.parquet")
     with pytest.raises(RecordError, match="Could not write"):
         folder.write_derived("lineage", tmp_path / "no" / "where.parquet")

@@ -63,7 +63,7 @@ def test_create_makes_a_folder_that_open_finds(tmp_path):
 
 def test_create_refuses_a_folder_that_holds_a_study(tmp_path):
     folder = make_folder(tmp_path / "r")
-    with pytest.raises(RecordError, match=r"holds the results of a study already.*--fresh"):
+    with pytest.raises(RecordError, match=r"already has the results of a study.*--fresh"):
         ResultsFolder.create(folder.path, DESCRIPTION)
 
 

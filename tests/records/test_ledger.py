@@ -250,7 +250,7 @@ def test_scores_of_a_sheet_are_entered_together_or_not_at_all(ledger):
 
 def test_nobody_is_their_own_second_counter(ledger):
     drive(ledger, 1)
-    with pytest.raises(LedgerError, match="'witness' has counted the cells of trial 1 already"):
+    with pytest.raises(LedgerError, match="'witness' already counted the cells of trial 1"):
         ledger.score(1, Score([1], "witness"), "second")
     ledger.score(1, Score([1], "ben"), "second")
     ledger.undo(1)
@@ -274,7 +274,7 @@ def test_a_generation_with_an_unscored_trial_is_not_closed(ledger):
 
 def test_a_correction_before_closing_is_refused(ledger):
     drive(ledger, 1)
-    with pytest.raises(LedgerError, match="take its score back"):
+    with pytest.raises(LedgerError, match="withdraw its score"):
         ledger.score(1, Score([1], "ben"), "correction")
 
 
@@ -343,7 +343,7 @@ def test_the_label_is_that_of_the_first_trial(ledger):
 
 
 def test_a_ledger_is_never_replaced(ledger):
-    with pytest.raises(LedgerError, match="is there already"):
+    with pytest.raises(LedgerError, match="exists already"):
         Ledger.create(ledger.path)
 
 
@@ -356,7 +356,7 @@ def test_no_ledger_is_one_clear_error(tmp_path):
 def test_a_foreign_or_torn_file_is_refused_and_left_alone(tmp_path, data):
     path = tmp_path / "ledger.sqlite"
     path.write_bytes(data)
-    with pytest.raises(LedgerError, match=r"was left as it is\. Restore"):
+    with pytest.raises(LedgerError, match=r"was not changed\. Restore"):
         Ledger.open(path)
     assert path.read_bytes() == data
 
@@ -433,7 +433,7 @@ def test_text_that_is_no_json_is_a_torn_ledger(ledger, changed):
     drive(ledger, 1)
     with sqlite3.connect(ledger.path) as other:
         other.execute("UPDATE scores SET cells = CAST(? AS TEXT)", (changed,))
-    with pytest.raises(LedgerError, match=r"is torn .*, and was left as it is\. Restore"):
+    with pytest.raises(LedgerError, match=r"is torn .*, and was not changed\. Restore"):
         Ledger.open(ledger.path)
 
 

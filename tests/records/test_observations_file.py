@@ -104,7 +104,7 @@ def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_taken_up(
         assert [each.number for each in found.trials] == list(range(n_whole))
         assert ("cut off" in found.problem) == (cut not in ends and cut + 1 not in ends)
     else:
-        with pytest.raises(RecordError, match="no file of observed trials"):
+        with pytest.raises(RecordError, match="not a file of observed trials"):
             read_observations(path)
     with ObservationsFile(path, HEAD) as file:
         assert len(file.trials) == n_whole
@@ -164,9 +164,9 @@ def test_where_one_side_is_not_known_the_name_tells_targets_apart(tmp_path: Path
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (b"", "no file of observed trials"),
-        (b'{"a": 1}\n{"b": 2}\n', "no file of observed trials"),
-        (b"\xff\xfe\x00binary", "no file of observed trials"),
+        (b"", "not a file of observed trials"),
+        (b'{"a": 1}\n{"b": 2}\n', "not a file of observed trials"),
+        (b"\xff\xfe\x00binary", "not a file of observed trials"),
         (b'{"format": "realitygap observations 9"}\n', "or of another version"),
         (b'{"format": "realitygap observations 1"}\n', "has no target, label, robot, arena, step_s, observe"),
     ],

@@ -121,7 +121,10 @@ def test_port_that_is_open_in_this_program_is_refused_with_what_to_do(server):
 @pytest.mark.parametrize(
     ("port", "message"),
     [
-        ("/dev/no-such-port", r"cannot be opened: .*No such file.*`realitygap robot list` names the ports"),
+        (
+            "/dev/no-such-port",
+            r"cannot be opened: .*No such file.*`realitygap robot list` lists the existing ports",
+        ),
         ("socket://127.0.0.1:1", r"cannot be opened: .*refused.*Is the address right"),
         ("nonsense://x", r"nonsense://x cannot be opened: .*nonsense"),
         ("", r" cannot be opened"),

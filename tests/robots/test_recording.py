@@ -157,7 +157,7 @@ def test_files_that_are_no_recordings_are_said(tmp_path):
     with pytest.raises(RecordError, match=r"Could not read .*No such file"):
         read_recording(path)
     path.write_bytes(b"")
-    with pytest.raises(RecordError, match="is no recording of a robot"):
+    with pytest.raises(RecordError, match="is not a recording of a robot"):
         read_recording(path)
     path.write_bytes(b"\x00\xff\n")
     with pytest.raises(RecordError, match="line 1 is no JSON"):
@@ -176,7 +176,7 @@ def test_files_that_are_no_recordings_are_said(tmp_path):
 def test_a_recording_never_overwrites_one(tmp_path):
     record(tmp_path / "one.jsonl")
     port = FakePort(FakeScribbler("s2"))
-    with pytest.raises(RecordError, match=r"one.jsonl is there already; .* Name another file"):
+    with pytest.raises(RecordError, match=r"one.jsonl exists already; .* Name another file"):
         Scribbler(port, record=tmp_path / "one.jsonl")
     assert not port.is_open
 
@@ -196,7 +196,7 @@ def test_a_full_disk_is_one_error_and_the_motors_stop(tmp_path):
             robot._recorder._file = FullFile()
             robot.motors(0.5, 0.5)
 
-    with pytest.raises(RecordError, match=r"No space left on device\. What was recorded before is safe"):
+    with pytest.raises(RecordError, match=r"No space left on device\. Earlier records are safe"):
         fill_up()
     assert port.robot.motors == (100, 100)
     assert not port.is_open

@@ -107,10 +107,10 @@ def test_keys_may_end_in_units(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("[wheels]\ntrack = -1\n", "wheels.track: expected at least 0.05, came -1"),
+        ("[wheels]\ntrack = -1\n", "wheels.track: expected at least 0.05, got -1"),
         ("[wheels]\ntrak = 0.15\n", "wheels.trak: unknown setting. Did you mean 'track'"),
-        ("[motors]\nspeed = 'fast'\n", "motors.speed: expected a number, came 'fast'"),
-        ("[motors]\nahead = 2\n", "motors.ahead: expected 1 or -1, came 2"),
+        ("[motors]\nspeed = 'fast'\n", "motors.speed: expected a number, got 'fast'"),
+        ("[motors]\nahead = 2\n", "motors.ahead: expected 1 or -1, got 2"),
         ("[motors]\ntorque = nan\n", "motors.torque: expected a finite number"),
         ("[body]\ncenter = -0.03\n", "body.center is -0.03, expected it between wheels.axle"),
         (
@@ -119,11 +119,11 @@ def test_keys_may_end_in_units(tmp_path):
         ),
         ("[body]\ncorners = [[0.1, 0.1]]\n", "body.corners: expected"),
         ("[body]\ncardboard = [0.2]\n", "body.cardboard"),
-        ("[ir]\nrays = 0\n", "ir.rays: expected at least 1, came 0"),
+        ("[ir]\nrays = 0\n", "ir.rays: expected at least 1, got 0"),
         ("[[ir.mount]]\nz = 1\n", "ir.mount.0.z: unknown setting"),
         ("[oddities.patch]\nx = 0.1\n", "oddities.patch.y: missing"),
-        ("engine = 'jyro'\n", "engine: expected 'mujoco' or 'sim', came 'jyro'"),
-        ("wheels = 3\n", "wheels: expected a table, came 3"),
+        ("engine = 'jyro'\n", "engine: expected 'mujoco' or 'sim', got 'jyro'"),
+        ("wheels = 3\n", "wheels: expected a table, got 3"),
         ("[wheels]\ntrack_mm = 150\ntrack = 0.15\n", "track: given twice"),
         ("[wheels\n", "not TOML"),
     ],

@@ -471,5 +471,5 @@ def test_cells_are_those_along_the_line():
 def test_a_twin_that_comes_apart_says_so():
     robot = TwinRobot(healthy(), FIELD)
     robot._physics.mj_data.qvel[0] = math.nan
-    with pytest.raises(RobotError, match="came apart"):
+    with pytest.raises(RobotError, match="physics diverged"):
         robot.drive(Command(1.0, 0.0))

@@ -142,7 +142,7 @@ def test_closing_stops_the_motors_and_then_says_nothing_more():
     robot.stop()
     port.check_all_said()
     assert not port.is_open
-    with pytest.raises(RobotError, match="is closed: open the robot anew before 'sensors'"):
+    with pytest.raises(RobotError, match=r"is closed\. Reopen the robot before 'sensors'"):
         robot.sensors()
 
 

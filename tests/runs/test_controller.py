@@ -69,7 +69,7 @@ def test_declaration_is_stored_only_if_it_is_set():
         ),
         (
             {"controller": DECLARED, "platform": "sim", "task": {"kind": "avoid", "inputs": ["range.0"]}},
-            r"task\.inputs and controller\.inputs both say what networks see\. Leave task\.inputs out",
+            r"task\.inputs and controller\.inputs both define the inputs of networks\. Leave task\.inputs out",
         ),
     ],
 )

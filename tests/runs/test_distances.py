@@ -71,6 +71,6 @@ def test_a_drawing_tells_which_squares_and_not_their_order(name: str) -> None:
 
 
 def test_cells_at_the_ends_of_steps_have_no_order() -> None:
-    with pytest.raises(ValueError, match=r"expected task\.cells 'line' with it"):
+    with pytest.raises(ValueError, match=r"expected task\.cells 'line'"):
         novel("edit", task={"cells": "ends"})
     assert novel("jaccard", task={"cells": "ends"})

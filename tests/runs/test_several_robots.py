@@ -65,7 +65,7 @@ def test_settings_of_several_robots_are_read_again() -> None:
     ("values", "message"),
     [
         ({"platform": "jyro", "sim": {}}, "sim: of no meaning here"),
-        ({"arena": {"networks": "each"}}, "'each', which goes with several robots. Set"),
+        ({"arena": {"networks": "each"}}, "'each', which is only for several robots. Set"),
         ({"arena": EACH, "selection": "novelty"}, "expected 'one' with selection 'novelty'"),
         ({"arena": EACH, "neat": {"population": 2}}, "population is 2, expected 3 to 1,048,576"),
         ({"arena": {"robots": 3, "other_starts": [[0.5, 0.3, 0.0]]}}, "has 1 starts, expected 2"),

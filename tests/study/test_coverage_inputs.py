@@ -38,7 +38,7 @@ def test_paper_inputs_by_default_keep_the_hash_and_others_change_it() -> None:
         ({"inputs": ["range.3"]}, "scribbler", "range.3 is missing"),
         ({"inputs": ["light.3"]}, "scribbler", "light.3 is missing"),
         ({"inputs": ["range.0", "bias"]}, "sim", "expected none named bias. Set bias_input"),
-        ({"inputs": []}, "sim", "inputs: expected at least 1, came 0"),
+        ({"inputs": []}, "sim", "inputs: expected at least 1, got 0"),
     ],
 )
 def test_inputs_that_a_platform_lacks_are_refused(task: dict, platform: str, message: str) -> None:

@@ -154,19 +154,19 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
     expected = [
         ("sede", "unknown section"),
         ("study.name", "expected letters"),
-        ("study.replicates", "expected a whole number, came 'many'"),
+        ("study.replicates", "expected a whole number, got 'many'"),
         ("study.sede", "Did you mean 'seed'?"),
         ("platform.jyrp", "Did you mean 'jyro'?"),
-        ("arena.start", "came 'middle'"),
+        ("arena.start", "got 'middle'"),
         ("neat.settings", "Did you mean 'stanley-2002'?"),
         ("neat.populaton", "Did you mean 'population'?"),
-        ("neat.add_link", "expected at most 1.0, came 2"),
-        ("condition[1] 'x'.noise", "expected a number, came 'high'"),
+        ("neat.add_link", "expected at most 1.0, got 2"),
+        ("condition[1] 'x'.noise", "expected a number, got 'high'"),
         ("condition[1] 'x'.selection", "Did you mean 'coverage'?"),
-        ("condition[1] 'x'.neat.population", "expected at least 2, came 1"),
+        ("condition[1] 'x'.neat.population", "expected at least 2, got 1"),
         ("condition[2].name", "missing"),
-        ("condition[3] 'x'", "taken by an earlier condition"),
-        ("condition[3] 'x'.arena.preset", "came 'papr'"),
+        ("condition[3] 'x'", "an earlier condition has this name"),
+        ("condition[3] 'x'.arena.preset", "got 'papr'"),
     ]
     for place, text in expected:
         assert any(line.startswith(f"{place}: ") and text in line for line in lines), (place, text, lines)
@@ -180,11 +180,11 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("noise = nan", "condition[1] 'a'.noise", "expected a finite number"),
         ("noise = true", "condition[1] 'a'.noise", "expected a number"),
         ("noise = -0.1", "condition[1] 'a'.noise", "expected at least 0"),
-        ('platform = "tank"', "condition[1] 'a'.platform", "came 'tank'"),
+        ('platform = "tank"', "condition[1] 'a'.platform", "got 'tank'"),
         ('platform = "twin"', "condition[1] 'a'", "expected twin:FILE"),
         ('baseline = "b"', "condition 'a'.baseline", "there is no condition 'b'"),
-        ("published = [0.1, 2]", "condition[1] 'a'.published[2]", "expected at most 1.0, came 2."),
-        ('published = ["x"]', "condition[1] 'a'.published[1]", "expected a number, came 'x'."),
+        ("published = [0.1, 2]", "condition[1] 'a'.published[2]", "expected at most 1.0, got 2."),
+        ('published = ["x"]', "condition[1] 'a'.published[1]", "expected a number, got 'x'."),
         ('arena.start = [0.3, "x", 0.0]', "condition[1] 'a'.arena.start", "a number as value 2"),
         ('change = "a\\u0007b"', "condition[1] 'a'.change", "without control characters"),
         ("wheels = 2", "condition[1] 'a'.wheels", "unknown setting"),
@@ -246,13 +246,13 @@ def test_numbers_of_robot_and_arena_are_wrong_at_once():
 
 def test_what_follows_from_a_mistake_is_no_second_one():
     """`study = 4` was said to lack a name, too."""
-    assert mistakes('study = 4\n[[condition]]\nname = "y"') == ["study: expected a table, came 4."]
-    assert mistakes('condition = [3]\n[study]\nname = "x"') == ["condition[1]: expected a table, came 3."]
+    assert mistakes('study = 4\n[[condition]]\nname = "y"') == ["study: expected a table, got 4."]
+    assert mistakes('condition = [3]\n[study]\nname = "x"') == ["condition[1]: expected a table, got 3."]
 
 
 def test_the_same_mistake_in_a_shared_section_is_said_once():
     text = MINIMAL + '[[condition]]\nname = "b"\n[neat]\nadd_link = 7\n'
-    assert mistakes(text) == ["neat.add_link: expected at most 1.0, came 7."]
+    assert mistakes(text) == ["neat.add_link: expected at most 1.0, got 7."]
 
 
 def test_a_set_of_settings_that_is_no_name_is_one_mistake():
@@ -302,7 +302,7 @@ def test_advice_can_be_pasted_into_a_shell():
 def test_numpy_s_whole_numbers_are_taken():
     study = load_study("paper", seed=np.int64(4), replicates=np.uint8(7))
     assert study == load_study("paper", seed=4, replicates=7)
-    with pytest.raises(StudyError, match="expected a whole number, came True"):
+    with pytest.raises(StudyError, match="expected a whole number, got True"):
         load_study("paper", replicates=True)
 
 
@@ -311,7 +311,7 @@ def test_numpy_s_whole_numbers_are_taken():
 def test_a_line_has_no_control_characters(key, letters):
     """They went to the terminal and into the report as they were."""
     (line,) = mistakes(f'[study]\nname = "x"\n{key} = "a{letters}b"\n[[condition]]\nname = "a"')
-    assert line.startswith(f"study.{key}: expected a text on one line, without control characters, came 'a")
+    assert line.startswith(f"study.{key}: expected a text on one line, without control characters, got 'a")
 
 
 def test_conditions_whose_files_some_disks_take_for_one_are_refused():

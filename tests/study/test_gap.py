@@ -316,7 +316,7 @@ def test_a_trial_that_is_lost_for_good_is_no_trial_that_visited_nothing(some, tm
     path = tmp_path / "trials.jsonl"
     with pytest.raises(RobotError, match="A trial on sim was lost"):
         run_gap(sim(), Skipping(sim()), some, trials=2)
-    with pytest.raises(RobotError, match=r"The others are kept in .*trials.jsonl"):
+    with pytest.raises(RobotError, match=r"The others are saved in .*trials.jsonl"):
         run_gap(sim(), Skipping(sim()), some, trials=2, results=path)
     again = Counted(sim())
     run_gap(sim(), again, some, trials=2, results=path)
@@ -332,7 +332,7 @@ def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
         "_open",
         lambda spec, *more, **named: real if spec == "robot" else there(spec, *more, **named),
     )
-    with pytest.raises(StudyError, match=r"12 trials on robot would be kept nowhere.*-o FILE"):
+    with pytest.raises(StudyError, match=r"12 trials on robot would not be saved.*-o FILE"):
         gap_between("sim", "robot", n_controllers=6, trials=2)
     found = gap_between("sim", "robot", n_controllers=6, trials=2, results=tmp_path / "trials.jsonl")
     assert found.study.target.label == "REAL"

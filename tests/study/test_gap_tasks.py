@@ -65,7 +65,7 @@ def test_another_task_scores_controllers_that_were_selected_for_something_else(r
     found = gap_between(
         "sim", "sim", controllers=results["avoid"], task="wall", n_controllers=3, trials=2
     ).study
-    assert found.result.score == "way along walls [m]"
+    assert found.result.score == "distance along walls [m]"
     assert "selected for another score" in found.result.luck.refused
     assert np.abs(found.source.values).max() > 0
 
@@ -77,7 +77,9 @@ def test_trials_that_were_kept_are_scored_anew_by_another_task(tmp_path):
     ).study
     again = gap_between("sim", f"recorded:{kept}", task="avoid").study
     assert again.target.values.tolist() == first.target.values.tolist()
-    assert gap_between("sim", f"recorded:{kept}", task="wall").study.result.score == "way along walls [m]"
+    assert gap_between("sim", f"recorded:{kept}", task="wall").study.result.score == (
+        "distance along walls [m]"
+    )
     assert gap_between("sim", f"recorded:{kept}").study.result.score == "coverage"
 
 

@@ -106,7 +106,7 @@ class Anybody(Unattended):
 def test_a_witness_does_not_score_what_counts_as_real(tmp_path):
     real = FakeRobot()
     real.label = "REAL"
-    with pytest.raises(RobotError, match="counts as REAL, and a witness sees an emulated one"):
+    with pytest.raises(RobotError, match="counts as REAL, but a witness reports an emulated one"):
         drive(small_study(), tmp_path / "r", robot=real)
     assert not real.is_open
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
@@ -326,7 +326,7 @@ def test_pens_stay_while_a_sheet_is_begun(tmp_path):
 
 
 def test_two_pens_of_a_color_are_refused():
-    with pytest.raises(StudyError, match=r"trials\.pens.*'red' stands there twice"):
+    with pytest.raises(StudyError, match=r"trials\.pens.*'red' is listed twice"):
         small_study(more='[trials]\npens = ["red", "blue", "red"]\n')
 
 

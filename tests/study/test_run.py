@@ -134,7 +134,7 @@ def test_a_new_condition_whose_files_would_be_those_of_another_is_refused(undist
     path = tmp_path / "r"
     run_study(parse_study(SMALL, "small.toml"), path)
     renamed = parse_study(SMALL.replace('name = "novelty"', 'name = "Novelty"'), "small.toml")
-    with pytest.raises(StudyError, match="'Novelty' would share files with condition 'novelty'"):
+    with pytest.raises(StudyError, match="'Novelty' would share files with the existing condition 'novelty'"):
         run_study(renamed, path)
     assert ResultsFolder.open(path).digest() == undisturbed.digest()
     assert not list(path.glob("trials/Novelty*"))

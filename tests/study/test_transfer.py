@@ -157,7 +157,7 @@ def test_what_one_strategy_cannot_do_is_refused_before_another_spends(calibratio
         transfer("sim-paper", target, "all", 3, out=tmp_path, **SMALL)
     with pytest.raises(StudyError, match="took 6 trials, more than a budget of 5"):
         transfer("sim-paper", target, "all", [8, 5], out=tmp_path, calibration=calibration, **SMALL)
-    with pytest.raises(StudyError, match="platform 'jyro', which has none"):
+    with pytest.raises(StudyError, match="platform 'jyro' of condition"):
         transfer("paper", target, "all", 3, out=tmp_path, **SMALL)
     assert target.n == 0
     assert not list(tmp_path.iterdir())
@@ -190,7 +190,7 @@ def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tm
     [
         ("sim-paper", ["plane"], "Did you mean 'plain'"),
         ("wall", "plain", "range.3 to range.7 are missing"),
-        ("paper", "randomized", "platform 'jyro', which has none"),
+        ("paper", "randomized", "platform 'jyro' of condition"),
     ],
 )
 def test_what_cannot_be_transferred_is_refused_in_words(study, strategies, text, tmp_path):

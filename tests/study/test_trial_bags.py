@@ -63,7 +63,7 @@ def test_what_there_is_not_has_one_message(trials, tmp_path):
     (tmp_path / "taken").mkdir()
     with pytest.raises(StudyError, match=r"taken has no trials of a robot\. For those of a simulation"):
         export(tmp_path / "taken", "-o", tmp_path / "a.mcap")
-    with pytest.raises(LogError, match="taken is there already"):
+    with pytest.raises(LogError, match="taken exists already"):
         export(trials, "--trial", 7, "-o", tmp_path / "taken")
     write_observations(tmp_path / "none.jsonl", HEAD, [trial(0)])
     with pytest.raises(StudyError, match="has no trial that was driven"):

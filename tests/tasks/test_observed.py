@@ -68,7 +68,7 @@ def test_what_is_drawn_for_each_trial_is_known_to_nobody_outside():
 
     arena = load_arena("light")
     drawn = replace(arena, vary={"arena.light.0.x": Distribution(uniform=(0.4, 0.6))})
-    with pytest.raises(TaskError, match=r"arena\.light\.0\.x .* is drawn for each trial"):
+    with pytest.raises(TaskError, match=r"arena\.light\.0\.x .* is sampled for each trial"):
         score_observed(LightTask(), observed(arena), drawn)
 
 

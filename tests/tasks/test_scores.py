@@ -279,14 +279,14 @@ def test_a_goal_counts_once_it_was_reached_else_by_what_is_left_of_the_way() -> 
 @pytest.mark.parametrize(
     ("task", "arena", "said"),
     [
-        (LightTask(), replace(ARENA, lights=()), "Task 'light' wants a light, and arena 'test' has none"),
+        (LightTask(), replace(ARENA, lights=()), "Task 'light' needs a light, but arena 'test' has none"),
         (LightTask(), replace(ARENA, lights=(Light(0.3, 0.4),)), "is where trials start"),
-        (GoalTask(), replace(ARENA, goal=None), "Task 'goal' wants a goal, and arena 'test' has none"),
+        (GoalTask(), replace(ARENA, goal=None), "Task 'goal' needs a goal, but arena 'test' has none"),
         (GoalTask(), replace(ARENA, goal=Goal(0.35, 0.4, 0.1)), "start at its goal"),
         (
             WallTask(),
             replace(ARENA, walls=(), obstacles=()),
-            "Task 'wall' wants walls, and arena 'test' has none",
+            "Task 'wall' needs walls, but arena 'test' has none",
         ),
     ],
 )

@@ -210,11 +210,11 @@ def test_a_platform_without_noise_is_the_same_in_every_repeat():
         ({"set": {"drive.track": "wide"}}, "drive.track: expected a number, or how it is drawn"),
         (
             {"set": {"drive.track": float("nan"), "drive.lag": 0.1}},
-            "drive.track: expected a finite number, came nan",
+            "drive.track: expected a finite number, got nan",
         ),
         ({"set": {"drive.track": {"normal": [0.1]}}}, "drive.track.normal"),
         ({"set": {"drive.track": {"uniform": [-1.0, 2.0]}}}, "drive.track: expected numbers more than 0"),
-        ({"contact": "bounce"}, "expected 'robot', 'freeze', 'stop' or 'slide', came 'bounce'"),
+        ({"contact": "bounce"}, "expected 'robot', 'freeze', 'stop' or 'slide', got 'bounce'"),
         (
             {"set": {"contact.model": {"choice": [1.0]}}},
             "contact.model: the same in all trials, and no number",

@@ -271,7 +271,7 @@ def test_ctrl_c_while_an_observer_is_asked_for_cells_tells_the_trial(asks: bool)
 
 
 def test_what_cannot_be_is_said_before_anything_moves() -> None:
-    with pytest.raises(StudyError, match="Who places the robot of scribbler:/dev/rfcomm0"):
+    with pytest.raises(StudyError, match="No operator places the robot of scribbler:/dev/rfcomm0"):
         open_target("scribbler:/dev/rfcomm0", ARENA)
     with pytest.raises(StudyError, match=r"'scribler:x' is no platform. Did you mean 'scribbler:PORT'"):
         open_target("scribler:x", ARENA)

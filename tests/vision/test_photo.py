@@ -170,7 +170,7 @@ def test_a_very_large_photo_is_halved():
 @pytest.mark.slow
 def test_of_a_gray_photo_several_pens_are_refused_and_one_is_read():
     gray = _file(Image.open(io.BytesIO(photo(1, SCAN, n=1).jpeg)).convert("L"), "JPEG", quality=92)
-    with pytest.raises(SheetError, match="The picture is gray, and its 8 pens are told apart by color"):
+    with pytest.raises(SheetError, match="The picture is gray, and its 8 pens are identified by color"):
         score_sheet(read_photo(gray), LAYOUT)
     assert len(score_sheet(read_photo(gray), LAYOUT, [0]).traces[0].cells) > 5
 

@@ -253,7 +253,7 @@ def test_the_video_of_another_trial_or_a_short_one_is_refused():
     times, stalled = np.arange(21) * 0.5, np.zeros(20, np.bool_)
     with pytest.raises(VisionError, match="not clear"):
         find_beginning(_driven(2.0, others), times, commands, stalled)
-    with pytest.raises(VisionError, match="Film it from before it begins"):
+    with pytest.raises(VisionError, match="Film it from before the start"):
         find_beginning(_driven(0.0, commands[:10]), times, commands, stalled)
 
 

@@ -91,7 +91,7 @@ def test_what_is_no_calibration_is_told_from_one(tmp_path):
     assert read_calibration("scribbler-s2") is None
     assert read_calibration(tmp_path / "none.toml") is None
     assert read_calibration(written(tmp_path, made())) == made()
-    with pytest.raises(DescriptionError, match=r"mine.toml is no calibration"):
+    with pytest.raises(DescriptionError, match=r"mine.toml is not a calibration"):
         load_calibration(plain)
     with pytest.raises(DescriptionError, match=r"There is no calibration .*none.toml"):
         load_calibration(tmp_path / "none.toml")
@@ -103,7 +103,7 @@ def test_what_is_no_calibration_is_told_from_one(tmp_path):
         ('"realitygap calibration 1"', '"realitygap calibration 9"', "format"),
         ('kind = "motion"', 'kind = "notion"', "kind: expected 'path'"),
         ("low = 0.14", "low = 0.24", "low is 0.24, expected at most high, 0.16"),
-        ("[0.149, 0.151]", "[0.149]", "expected as many of each number, came 1 to 2"),
+        ("[0.149, 0.151]", "[0.149]", "expected as many of each number, got 1 to 2"),
         ("trials = 3", "trials = -3", "trials: expected at least 0"),
         ('robot = "scribbler-s2-fluke2"', 'robot = "scribbler-s2-fluke3"', "Unknown robot"),
         ('"drive.track" = 0.15', '"drive.trick" = 0.15', "drive.trick: no number of this name"),
@@ -141,7 +141,7 @@ def test_estimate_at_the_end_of_its_prior_is_not_identified():
     decay = {"name": "range.0.decay", "prior_low": 0.03, "prior_high": 0.8, "identified": True, "unit": "m"}
     bound = Fitted(estimate=0.03006, low=0.030003, high=0.0302, **decay)
     assert not bound.identified
-    assert "The prior binds: the estimate is at an end of 0.03 to 0.8 m" in bound.advice
+    assert "The estimate is at an end of its prior, 0.03 to 0.8 m" in bound.advice
     assert not Fitted(estimate=0.79, low=0.77, high=0.7999, **decay).identified
     assert Fitted(estimate=0.0305, low=0.0303, high=0.0307, **decay).identified
     assert Fitted(

@@ -177,23 +177,23 @@ LAYER = ("robots", 1, "controller", "layers")
 DEVICE = ("robots", 0, "devices", 0)
 WRONG = [
     (take("steps"), "steps: missing. Give a whole number of steps, 0 or more."),
-    (put("steps", -1), "steps: expected a whole number of steps, 0 or more, came -1."),
-    (put("steps", 2.5), "steps: expected a whole number of steps, 0 or more, came 2.5."),
-    (put("steps", True), "steps: expected a whole number of steps, 0 or more, came true."),
-    (put("dt", 0), "dt: expected the length of a step in s, more than 0, came 0."),
-    (put("dt", math.nan), "dt: expected the length of a step in s, more than 0, came NaN."),
+    (put("steps", -1), "steps: expected a whole number of steps, 0 or more, got -1."),
+    (put("steps", 2.5), "steps: expected a whole number of steps, 0 or more, got 2.5."),
+    (put("steps", True), "steps: expected a whole number of steps, 0 or more, got true."),
+    (put("dt", 0), "dt: expected the length of a step in s, more than 0, got 0."),
+    (put("dt", math.nan), "dt: expected the length of a step in s, more than 0, got NaN."),
     (take("world"), "world: missing. Give an object"),
     (
         put("world", "boxes", 0, [0, 0, 1]),
-        "world.boxes[0]: expected a box [x1, y1, x2, y2] in m, came [0, 0, 1].",
+        "world.boxes[0]: expected a box [x1, y1, x2, y2] in m, got [0, 0, 1].",
     ),
-    (put("world", "boxes", 0, 2, "1"), 'world.boxes[0][2]: expected a finite number, came "1".'),
-    (put("world", "lights", 0, 2, math.inf), "world.lights[0][2]: expected a finite number, came Infinity."),
-    (put("world", "walls", {}), "world.walls: expected a list of walls [x1, y1, x2, y2] in m, came {}."),
-    (put("robots", []), "robots: expected a list of at least one robot, came []."),
+    (put("world", "boxes", 0, 2, "1"), 'world.boxes[0][2]: expected a finite number, got "1".'),
+    (put("world", "lights", 0, 2, math.inf), "world.lights[0][2]: expected a finite number, got Infinity."),
+    (put("world", "walls", {}), "world.walls: expected a list of walls [x1, y1, x2, y2] in m, got {}."),
+    (put("robots", []), "robots: expected a list of at least one robot, got []."),
     (
         put("robots", 0, 5),
-        "robots[0]: expected a robot: an object with start and commands or controller, came 5.",
+        "robots[0]: expected a robot: an object with start and commands or controller, got 5.",
     ),
     (
         take("robots", 0, "start"),
@@ -202,7 +202,7 @@ WRONG = [
     (take("robots", 0, "start", "heading"), "robots[0].start.heading: missing."),
     (
         put("robots", 0, "start", "x", "left"),
-        'robots[0].start.x: expected a finite number in m, came "left".',
+        'robots[0].start.x: expected a finite number in m, got "left".',
     ),
     (put("robots", 0, "class", "Scribler"), "unknown class of robot \"Scribler\". Did you mean 'Scribbler'?"),
     (
@@ -210,10 +210,10 @@ WRONG = [
         "robots[0].bounding_box: x has 2 numbers and y has 1",
     ),
     (put("robots", 0, "bounding_box", 3), "robots[0].bounding_box: expected an object"),
-    (put("robots", 0, "commands", 1, [1]), "robots[0].commands[1]: expected a command [v, w], came [1]."),
+    (put("robots", 0, "commands", 1, [1]), "robots[0].commands[1]: expected a command [v, w], got [1]."),
     (
         put("robots", 0, "commands", [[0, 0]]),
-        "robots[0].commands: expected 2 commands [v, w], one for each step, came 1.",
+        "robots[0].commands: expected 2 commands [v, w], one for each step, got 1.",
     ),
     (take("robots", 0, "commands"), "robots[0]: nothing drives this robot."),
     (
@@ -229,7 +229,7 @@ WRONG = [
     (take(*DEVICE, "max_range"), "robots[0].devices[0].max_range: missing. Give a range in m, more than 0."),
     (
         put(*DEVICE, "max_range", 0),
-        "robots[0].devices[0].max_range: expected a range in m, more than 0, came 0.",
+        "robots[0].devices[0].max_range: expected a range in m, more than 0, got 0.",
     ),
     (
         put(*DEVICE, "geometry", 0, [1, 2]),
@@ -241,7 +241,7 @@ WRONG = [
     ),
     (
         put(*DEVICE, {"kind": "MyroIR", "type": "bumper"}),
-        'a device of kind MyroIR is of type "ir", came "bumper".',
+        'a device of kind MyroIR is of type "ir", got "bumper".',
     ),
     (
         put(*DEVICE, "type", "light"),
@@ -255,24 +255,24 @@ WRONG = [
     (put("robots", 1, "devices", []), "robots[1].controller.inputs: max_inverted needs a sensor"),
     (
         put("robots", 1, "controller", "output_scale", [1]),
-        "output_scale: expected two numbers: factors for v and w, came [1].",
+        "output_scale: expected two numbers: factors for v and w, got [1].",
     ),
-    (put("robots", 1, "controller", "layers", []), "layers: expected a list of at least one layer, came []."),
+    (put("robots", 1, "controller", "layers", []), "layers: expected a list of at least one layer, got []."),
     (
         put(*LAYER, 0, "weights", 2, [1, 2, 3]),
         "layers[0].weights[2]: expected 4 weights (inputs max_inverted, all_inverted",
     ),
     (
         put(*LAYER, 1, "weights", 0, [1, 2]),
-        "layers[1].weights[0]: expected 3 weights (outputs of layer 0), came 2.",
+        "layers[1].weights[0]: expected 3 weights (outputs of layer 0), got 2.",
     ),
-    (put(*LAYER, 0, "bias", [0]), "layers[0].bias: expected 3 numbers, one for each row of weights, came 1."),
+    (put(*LAYER, 0, "bias", [0]), "layers[0].bias: expected 3 numbers, one for each row of weights, got 1."),
     (
         put(*LAYER, 1, {"weights": [[1, 2, 3]], "bias": [0]}),
-        "expected 2 rows in the last layer, for v and w, came 1.",
+        "expected 2 rows in the last layer, for v and w, got 1.",
     ),
     (take(*LAYER, 0, "bias"), "robots[1].controller.layers[0].bias: missing."),
-    (put(*LAYER, 0, "weights", 0, 0, None), "layers[0].weights[0][0]: expected a finite number, came null."),
+    (put(*LAYER, 0, "weights", 0, 0, None), "layers[0].weights[0][0]: expected a finite number, got null."),
 ]
 
 
@@ -343,7 +343,7 @@ FILES = {
     "empty": (b"", "The file is empty"),
     "not JSON": (b'{"steps": 3 "dt": 1}', "not JSON, at line 1, column 13"),
     "not text": (b"\xff\xfe\x00", "not a text file"),
-    "a list": (b"[1, 2]", "expected a JSON object with steps, world and robots, came [1, 2]"),
+    "a list": (b"[1, 2]", "expected a JSON object with steps, world and robots, got [1, 2]"),
     "a double key": (b'{"steps": 3, "steps": 4}', 'the key "steps" is given twice'),
     "too deep": (b"[" * 100_000, "cannot be read as JSON"),
     "a huge number": (b'{"steps": ' + b"9" * 5000 + b"}", "cannot be read as JSON"),

@@ -79,8 +79,8 @@ def test_a_center_stands_for_it(values, center):
 @pytest.mark.parametrize(
     ("values", "says"),
     [
-        ({}, "came none"),
-        ({"uniform": [1, 2], "normal": [1, 2]}, "came uniform and normal"),
+        ({}, "got none"),
+        ({"uniform": [1, 2], "normal": [1, 2]}, "got uniform and normal"),
         ({"uniform": [2, 1]}, "expected uniform = [lower, upper]"),
         ({"log_uniform": [0, 1]}, "expected log_uniform above 0"),
         ({"normal": [0, -1]}, "standard deviation of at least 0"),

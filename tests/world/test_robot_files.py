@@ -145,7 +145,7 @@ def test_each_is_put_into_every_entry_and_base_below(write):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (SMALL.replace("0.1", '"fast"'), "drive.speed: expected a number, came 'fast'."),
+        (SMALL.replace("0.1", '"fast"'), "drive.speed: expected a number, got 'fast'."),
         (SMALL.replace("0.1", "-1"), "drive.speed: expected more than 0"),
         (SMALL.replace("0.1", "nan"), "drive.speed: expected a finite number"),
         (SMALL.replace("speed", "sped"), "drive.sped: unknown setting. Did you mean 'speed'?"),
@@ -155,11 +155,11 @@ def test_each_is_put_into_every_entry_and_base_below(write):
         (SMALL + "[vary]\n'drive.trak' = { uniform = [1, 2] }\n", "Did you mean 'drive.track'?"),
         (
             "step_s = { uniform = [0.4, 0.6] }\n" + SMALL,
-            "step_s: expected a number, came {'uniform': [0.4, 0.6]}",
+            "step_s: expected a number, got {'uniform': [0.4, 0.6]}",
         ),
         (
             "contact = { model = { choice = [1, 2] } }\n" + SMALL,
-            "contact.model: expected 'freeze', 'stop' or 'slide', came {'choice': [1, 2]}",
+            "contact.model: expected 'freeze', 'stop' or 'slide', got {'choice': [1, 2]}",
         ),
         (
             SMALL + "[vary]\n'step_s' = { uniform = [1, 2] }\n",
@@ -192,13 +192,13 @@ def test_each_is_put_into_every_entry_and_base_below(write):
         (SMALL.replace("radius = 0.03", "radius = 0"), "body.0: expected a radius of more than 0"),
         (SMALL.replace("radius = 0.03", "radius = -1"), "body.0.radius: expected at least 0"),
         ("[[body]]\nradius = 1", "drive: missing"),
-        ("body = []\n" + SMALL.replace("[[body]]\nradius = 0.03", ""), "body: expected at least 1, came 0"),
+        ("body = []\n" + SMALL.replace("[[body]]\nradius = 0.03", ""), "body: expected at least 1, got 0"),
         ('base = "mine.toml"', "`base` leads back to it"),
         ('base = "scribler-s2"', "Did you mean 'scribbler-s2'?"),
         ("turned = true", "base is None"),
         ("[drive", "not TOML"),
         ("a = " + "[" * 5000, "too deep"),
-        ("[each.light]\nx = 1\n" + SMALL, "[each.light] goes with [[light]]"),
+        ("[each.light]\nx = 1\n" + SMALL, "[each.light] is only for [[light]]"),
     ],
 )
 def test_a_mistake_gets_its_place_and_our_words(write, text, says):

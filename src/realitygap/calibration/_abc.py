@@ -43,7 +43,7 @@ CUT = 0.005  # quantile of the posterior that the box leaves out to each side, b
 
 @dataclass(frozen=True)
 class Posterior:
-    """What trials leave of the prior.
+    """The part of the prior that agrees with trials.
 
     Attributes:
         places: (n, p) draws on the scale on which the prior is standard normal.

@@ -35,7 +35,7 @@ class Encounters:
     aligned: Bools
 
     def agreeing(self, friction: float) -> int:
-        """How many did what the rule says at this friction."""
+        """Return the number of robots that the rule predicts correctly at this friction."""
         return int(((self.margin > math.atan(friction)) == self.aligned).sum())
 
 

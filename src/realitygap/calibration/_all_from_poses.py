@@ -160,7 +160,7 @@ WITH_SLIP = {
 def _spread_slip(
     prior: Sequence[Parameter], values: dict[str, Floats], shots: Shots, rng: np.random.Generator
 ) -> None:
-    """Slip, from encoders or from the prior: what it takes, gain gives; and stalls compare with what wheels turn."""
+    """Spread slip, from encoders or from the prior, and compensate for it with `gain`."""
     for parameter in prior:
         if parameter.name == SLIP:
             slips = _slips(parameter, shots, rng)
@@ -187,7 +187,7 @@ def _slips(parameter: Parameter, shots: Shots, rng: np.random.Generator) -> Floa
 def _share(
     shooter: Shooter, parameter: Parameter, values: Mapping[str, Floats], rng: np.random.Generator
 ) -> Floats:
-    """(N_DRAWS,) of the share of its wheels' way below which a robot stalls, by weighing blocks of commands anew."""
+    """Return samples, (N_DRAWS,), of the share of its wheels' distance below which a robot stalls."""
     shots = shooter.shots
     shares = parameter.prior.lowest + np.linspace(0.0, 1.0, SHARES) * (
         parameter.prior.highest - parameter.prior.lowest

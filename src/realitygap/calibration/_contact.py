@@ -1,4 +1,4 @@
-"""How a robot gives way at walls, fitted to observed encounters: friction, and how easily it is pushed and turned."""
+"""The fit of contact to encounters with walls: friction, and the resistance to being pushed and turned."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _off(problem: Problem, places: Floats) -> Floats:
 
 
 def _first_place(problem: Problem) -> Floats:
-    """Of places all over the prior, that from which most windows end where they were seen to."""
+    """Return the point of the prior from which most windows end as observed."""
     places = np.array([*product(PLACES, repeat=len(problem.free)), tuple(problem.own)])
     off = np.abs(_off(problem, places))
     scales = MAD * np.median(off, axis=1) + LEAST
@@ -112,7 +112,7 @@ def _mean_off(noisy: Problem, places: Floats) -> Floats:
 
 
 def _scale(noisy: Problem, place: Floats) -> Floats:
-    """(w, 3) of differences: what noise makes of windows, and by how much more they differ from what was seen."""
+    """Return (w, 3) scales of differences: the effect of noise on windows, and their additional deviation."""
     off = _mean_off(noisy, place[None])[0]
     around = _off(noisy, np.repeat(place[None], N_NOISY, axis=0)) - off
     around[..., 2] = wrapped(around[..., 2])
@@ -157,7 +157,7 @@ def _report(
         {name: tuple(value.tolist()) for name, value in draws.items()},
         METHOD,
         (
-            f"{len(off)} windows near walls, {other} of which went another way than simulated",
+            f"{len(off)} windows near walls, {other} of which took another path than simulated",
             f"{agree} of {len(encounters.aligned)} encounters align or stall as the fitted friction has it",
         ),
         {"windows": len(off), "flips": other, "typical": dict(zip(CHANNELS[:3], typical, strict=True)),

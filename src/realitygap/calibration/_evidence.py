@@ -1,4 +1,4 @@
-"""What trials tell of a robot, as long vectors: of the observed ones, and of the same trials carried out in `sim`.
+"""Trials as long vectors: the observed ones, and the same trials run in `sim`.
 
 Each vector is a fixed function of what is seen, so a simulator that is right makes vectors of the same distribution:
 
@@ -48,7 +48,7 @@ FINEST = {
 
 @dataclass(frozen=True)
 class Evidence:
-    """Trials to be carried out anew, and what counts of them.
+    """Trials to be simulated, and their weights.
 
     Attributes:
         play: The trials.
@@ -120,7 +120,7 @@ def _steps_of(shape: tuple[int, ...], per_step: int) -> NDArray[np.int64]:
 def evidence_of(
     trials: Sequence[TrialRecord], genomes: Sequence[Genome | None], n_cells: int
 ) -> list[Evidence]:
-    """What trials tell, by groups of as many steps.
+    """Return the evidence of trials, grouped by their number of steps.
 
     Args:
         trials: As observed.
@@ -190,7 +190,7 @@ def _evidence(
 
 
 def _as_rehearsal(trials: Sequence[TrialRecord], n_cells: int) -> Rehearsal:
-    """What was observed, as if one robot had rehearsed it; what was not seen has no steps."""
+    """Return the observations as one rehearsal of one robot; a missing observation has no steps."""
     cells = np.zeros((1, len(trials), n_cells), np.bool_)
     for k, trial in enumerate(trials):
         cells[0, k, list(trial.cells)] = True
@@ -209,7 +209,7 @@ def _as_rehearsal(trials: Sequence[TrialRecord], n_cells: int) -> Rehearsal:
 
 
 def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
-    """What each command did to a robot that was put back before it, in its own frame, and what it sensed there."""
+    """Return the effect of each command on a robot moved to its observed pose, in its frame, and its readings."""
     before = anchors[:, :-1].astype(np.float32)
     moved = rehearsal.poses[:, :, 1:] - before
     sine, cosine = np.sin(before[..., 2]), np.cos(before[..., 2])
@@ -236,7 +236,7 @@ def _step_by_step(t: int, rehearsal: Rehearsal) -> _Columns:
 
 
 def _in_blocks(t: int, rehearsal: Rehearsal) -> _Columns:
-    """What controllers saw and did in t steps, in blocks of time, and how it hangs together."""
+    """Return the observations and commands of controllers in t steps, in blocks of time, with their correlation."""
     readings = rehearsal.readings[:, :, :t]
     stalled = rehearsal.stalled[:, :, :t, None].astype(np.float32)
     commands = rehearsal.commands

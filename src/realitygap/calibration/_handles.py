@@ -30,7 +30,7 @@ Known = Mapping[str, Parameter]
 
 
 def parameters_of(robot: RobotModel, prior: Sequence[Parameter] | None = None) -> dict[str, Parameter]:
-    """What is thought possible of each parameter by name; of a Scribbler where no prior is given."""
+    """Return the prior of each parameter by name. Default: that of a Scribbler."""
     return {parameter.name: parameter for parameter in prior or scribbler_prior(robot)}
 
 
@@ -43,7 +43,7 @@ def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floa
 
 
 def place_of(parameter: Parameter, value: float) -> float:
-    """Where a value lies between the ends of the prior, 0..1; the nearest end where it lies beyond."""
+    """Return the position of a value between the ends of the prior, 0..1, limited to the ends."""
     low, high = parameter.prior.lowest, parameter.prior.highest
     inside = min(max(value, low), high)
     return float((parameter.scale(inside) - parameter.scale(low)) / parameter.width)

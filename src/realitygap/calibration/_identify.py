@@ -1,4 +1,4 @@
-"""What observations can tell of parameters, which only together, and what to record to tell them apart."""
+"""Identified parameters, inseparable ones, and the trials to record to identify them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PRIOR_PRECISION = 12.0  # of an even prior over 0..1
 
 @dataclass(frozen=True)
 class Identified:
-    """What was learned of a parameter.
+    """The identification of a parameter.
 
     Attributes:
         ratio: Width of its posterior interval in parts of the prior's.
@@ -64,7 +64,7 @@ def collinear_groups(sensitivities: Floats, names: Sequence[str]) -> list[tuple[
 def identify_from(
     draws: Mapping[str, Floats], known: Known, sensitivities: Floats, free: Sequence[Parameter]
 ) -> dict[str, Identified]:
-    """What was learned of each parameter, from draws of its posterior."""
+    """Return the identification of each parameter, from samples of its posterior."""
     groups = collinear_groups(sensitivities.reshape(-1, len(free)), [parameter.name for parameter in free])
     found = {}
     for name, values in draws.items():
@@ -88,8 +88,8 @@ LONG = "let trials last 100 commands"
 ADVICE: dict[str, tuple[str, str, str]] = {
     "drive.gain": (f"drive straight from one wall to the other, or {WHEELS}", RUNS, RUNS),
     "drive.asymmetry": (WHEELS, RUNS, RUNS),
-    "drive.track": (f"turn in place beside a wall for a whole trial, or {CAMERA}", CAMERA, RUNS),
-    "drive.axle": (CAMERA, CAMERA, "turn in place, both ways"),
+    "drive.track": (f"turn in place next to a wall for a whole trial, or {CAMERA}", CAMERA, RUNS),
+    "drive.axle": (CAMERA, CAMERA, "turn in place, in both directions"),
     "drive.lag": (WHEELS, f"{CHANGES}, with shorter steps", f"{CHANGES}, with shorter steps"),
     "drive.delay": (WHEELS, CHANGES, CHANGES),
     "drive.delay_jitter": (WHEELS, f"{CHANGES}, in more trials", f"{CHANGES}, in more trials"),
@@ -110,7 +110,7 @@ ADVICE: dict[str, tuple[str, str, str]] = {
 
 
 def advice_for(name: str, observe: Observe, partners: Sequence[str] = ()) -> str:
-    """What to record so that a parameter can be told, where this was observed."""
+    """Return the trials to record to identify a parameter, for an observation level."""
     what = ADVICE[name][CALIBRATES.index(observe)] if name in ADVICE else "record more trials"
-    first = f"Known only together with {' and '.join(partners)}" if partners else "Not told from its prior"
+    first = f"Identified only together with {' and '.join(partners)}" if partners else "Not identified"
     return f"{first}: {what}."

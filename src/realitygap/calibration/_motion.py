@@ -112,8 +112,8 @@ def fit_motion(
     )
     if not len(windows.trial):
         raise ValueError(
-            "In no trial a robot was seen to move away from walls, expected poses (observe = track) or the way of the "
-            "wheels (observe = encoders). Record trials of motion_plans that way."
+            "No trial shows motion away from walls, expected poses (observe = track) or distances of the "
+            "wheels (observe = encoders). Record such trials of motion_plans."
         )
     problem = make_problem(simulate, robot, known, windows, MOTION)
     problem, place, dead_band, noise = _solve(problem)

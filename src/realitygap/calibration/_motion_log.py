@@ -85,8 +85,8 @@ class Spread:
 DRIVE = (
     Spread("drive.gain", "ratio", 0.01, "", "Drive straight for longer."),
     Spread("drive.asymmetry", "plus", 0.005, "", "Drive straight, ahead and back."),
-    Spread("drive.track", "ratio", 0.01, "m", "Turn in place, both ways, with poses."),
-    Spread("drive.axle", "plus", 0.002, "m", "Turn in place, both ways, with poses."),
+    Spread("drive.track", "ratio", 0.01, "m", "Turn in place, in both directions, with poses."),
+    Spread("drive.axle", "plus", 0.002, "m", "Turn in place, in both directions, with poses."),
     Spread("drive.drift_per_m", "plus", 0.01, "rad/m", "Drive straight, ahead and back, with poses."),
     Spread("drive.soft_dead_band", "size", 0.02, "", "Drive at slow commands."),
     Spread("drive.lag", "size", 0.02, "s", "Start and stop suddenly, and often."),
@@ -224,7 +224,7 @@ def _checked(
     log = Log(time, asked, seen, wheels)
     if seen_rows(log).sum() < LEAST_ROWS:
         raise ValueError(
-            f"Poses or encoders were seen at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
+            f"Poses or encoders were recorded at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
         )
     return log
 

@@ -78,7 +78,7 @@ def _signed(rng: np.random.Generator, value: float) -> float:
 
 
 def _within(speed: float, step_m: float, reach: float, most: int) -> int:
-    """How many steps of a speed there is room for."""
+    """Return the number of steps of a speed that fit into the free space."""
     return int(np.clip(reach / max(abs(speed) * step_m, 1e-9), 1, most))
 
 
@@ -97,7 +97,7 @@ def _arc(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
 
 
 def _changes(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
-    """Another command at every step, each of which could be carried out to the end within reach."""
+    """Return commands that change at every step and can all be completed within reach."""
     most = min(1.0, reach / step_m)
     return [
         (_signed(rng, float(rng.uniform(0.2, 1.0)) * most), _signed(rng, float(rng.uniform(0.0, 0.6))))
@@ -111,7 +111,7 @@ def _slow(rng: np.random.Generator, step_m: float, reach: float) -> Commands:
 
 
 def roomiest_place(arena: Arena, robot: RobotModel) -> tuple[Pose, tuple[float, float]]:
-    """Where a robot has most room, heading along it, and how far it can go along and across whatever its heading [m].
+    """Return the place with the most free space, its heading, and the free distances along and across [m].
 
     Raises:
         ValueError: There is no room for the robot to turn in place.
@@ -138,7 +138,7 @@ def roomiest_place(arena: Arena, robot: RobotModel) -> tuple[Pose, tuple[float, 
 
 
 def _free_line(at: Floats, heading: float, lines: Floats, room: float) -> float:
-    """How far it goes straight, ahead as well as back, with so much room to each side [m]."""
+    """Return the free distance straight ahead and back, with the given space to each side [m]."""
     far = np.arange(0.0, 2.0, 0.01)
     path = np.array([np.cos(heading), np.sin(heading)])
     free = [_away(at + sign * far[:, None] * path, lines) >= room for sign in (1, -1)]

@@ -64,7 +64,7 @@ def _slopes(places: Floats, goal: Floats) -> Floats:
 
 
 def _unknown(precision: Floats, slopes: Floats | None) -> float:
-    """What remains unknown: variance of what is to be predicted, or twice the entropy up to a constant."""
+    """Return the remaining uncertainty: variance of the predictions, or twice the entropy up to a constant."""
     if slopes is None:
         return -float(np.linalg.slogdet(precision)[1])
     return float(np.einsum("pq,pq->", slopes, np.linalg.solve(precision, slopes)))

@@ -54,7 +54,7 @@ Simulate = Callable[[TrialRecord], Moved]
 
 @dataclass(frozen=True)
 class PathFit:
-    """What was fitted to straight paths and turns.
+    """The fit to straight paths and turns.
 
     Attributes:
         fitted: Parameters with intervals.
@@ -72,7 +72,7 @@ class PathFit:
 
 
 def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
-    """Straight paths and turns on the spot, by turns, n in all, at least 2."""
+    """Return n plans, at least 2, that alternate between straight paths and turns on the spot."""
     xs = [x for wall in arena.walls for x in wall[::2]] or [0.0, 1.0]
     ys = [y for wall in arena.walls for y in wall[1::2]] or [0.0, 1.0]
     middle = (min(ys) + max(ys)) / 2
@@ -122,8 +122,8 @@ def fit_path(
     turning = _Measured.of(trials, TURNING, robot)
     if not straight.moved:
         raise ValueError(
-            "There is no straight path: expected trials of full-speed commands straight ahead, move = 1 and turn = 0, "
-            "whose end was measured."
+            "There is no straight path: expected trials of full-speed commands straight ahead, move = 1 and "
+            "turn = 0, with a measured end."
         )
     if all(abs(moved.way) < STANDS for moved in straight.moved):
         raise ValueError(
@@ -140,8 +140,8 @@ def fit_path(
     if turning.moved and not straight.by_encoders:
         if all(abs(moved.turned) < STANDS / robot.drive.track for moved in turning.moved):
             raise ValueError(
-                "The robot did not turn in any trial that has it turn at full speed: expected one whose wheels turn "
-                "both ways."
+                "The robot did not turn in any trial with a full-speed turn, expected one with wheels that "
+                "turn in opposite directions."
             )
         turns = [moved.turned for moved in turning.moved]
         turn = _mean(turns, turning.angle_step, TRACK_SPREAD * abs(turns[0]), n_draws, rng)
@@ -159,7 +159,7 @@ def fit_path(
     if turn is None:
         rows.append(_unknown_track(robot))
         if turning.moved:
-            notes.append("Encoders tell how far wheels went, and not how far the robot turned.")
+            notes.append("Encoders measure the distance of the wheels, not the turn of the robot.")
     else:
         numbers["drive.track"] = track
         rows += _rows_of_turning(turning, turn, track, robot)
@@ -185,7 +185,7 @@ class _Measured:
 
     @property
     def n_commands(self) -> int:
-        """Of full speed, in each."""
+        """Number of full-speed commands in each trial."""
         return len(_driven(self.trials[0]))
 
     @classmethod
@@ -216,7 +216,7 @@ def _driven(trial: TrialRecord) -> Array:
 
 
 def _by_encoders(trial: TrialRecord, robot: RobotModel) -> Moved | None:
-    """By the ways of the wheels, with the track that the robot's file has; None without encoders."""
+    """Fit the distances of the wheels, with the track of the robot file; None without encoders."""
     if not len(trial.wheels):
         return None
     left, right = trial.wheels[-1] - trial.wheels[0]
@@ -255,7 +255,7 @@ def _of_a_robot(*numbers: Array) -> NDArray[np.intp]:
 
 
 def _rows(straight: _Measured, way: Array, expected: float, gain: Array, uneven: Array) -> list[Fitted]:
-    """What straight paths tell."""
+    """Return the rows for straight paths."""
     repeats, step = len(straight.moved), way / straight.n_commands
     return [
         _row("path.step_length", step, "m", (0.01, 0.2), repeats),
@@ -267,7 +267,7 @@ def _rows(straight: _Measured, way: Array, expected: float, gain: Array, uneven:
 
 
 def _rows_of_turning(turning: _Measured, turn: Array, track: Array, robot: RobotModel) -> list[Fitted]:
-    """What turns on the spot tell."""
+    """Return the rows for turns on the spot."""
     repeats, step = len(turning.moved), turn / turning.n_commands
     return [
         _row("path.step_turn", step, "rad", (0.0, 3.2), repeats),
@@ -299,7 +299,7 @@ def _row(name: str, values: Array, unit: str, prior: tuple[float, float], repeat
         prior_high=prior[1],
         identified=bool(identified),
         unit=unit,
-        advice="" if identified else "Drive the path at least three times more: repeats tell how sure it is.",
+        advice="" if identified else "Drive the path at least three more times: repeats show the precision.",
     )
 
 

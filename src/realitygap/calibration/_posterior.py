@@ -41,7 +41,7 @@ def draw_linear(rng: np.random.Generator, at: Floats, jacobian: Floats, off: Flo
 
 
 def _room(here: Floats, direction: Floats) -> tuple[float, float]:
-    """How far one can go back and forth along a direction until an end comes."""
+    """Return the distances to the ends of the prior, back and forth along a direction."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([-here / direction, (1.0 - here) / direction])
     ends = np.where(np.abs(direction) < 1e-12, [[-np.inf], [np.inf]], ends)
@@ -154,7 +154,7 @@ def _shares(rng: np.random.Generator, n: int, k: int) -> Floats:
 
 
 def _few(k: int) -> float:
-    """By how much k clusters that are weighed anew spread too little: Student's interval over the normal one."""
+    """Return the factor by which k reweighted clusters spread too little: Student's interval over the normal one."""
     return float(special.stdtrit(k - 1, 0.95) / special.ndtri(0.95) * np.sqrt(k / (k - 1)))
 
 

@@ -34,7 +34,7 @@ TOLERATED = {
 
 @dataclass(frozen=True)
 class Misfit:
-    """What a fitted simulator cannot make of one kind of observation.
+    """The part of one kind of observation that a fitted simulator cannot reproduce.
 
     Attributes:
         kind: Of what was observed, such as turn.
@@ -61,7 +61,7 @@ def misfits(
     *,
     key: int,
 ) -> list[Misfit]:
-    """What robots of the posterior cannot make of each kind of observation.
+    """Return the part of each kind of observation that robots of the posterior cannot reproduce.
 
     Args:
         evidence: What was observed.

@@ -1,4 +1,4 @@
-"""What is thought possible of a robot before it is observed: parameters, which may stand for several numbers each."""
+"""The prior of a robot: parameters, each of which may represent several numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Effect:
-    """What a parameter of value v does to a number of the robot: makes it v, or changes what it is.
+    """The effect of a parameter's value on a number of the robot: replace it, or change it.
 
     Attributes:
         number: By dotted name.
@@ -50,7 +50,7 @@ class Parameter:
 
     @property
     def width(self) -> float:
-        """Of the prior, on its own scale: of the logarithm where ratios are as likely."""
+        """Width of the prior on its own scale: logarithmic if ratios are equally likely."""
         return float(self.scale(self.prior.highest) - self.scale(self.prior.lowest))
 
     def scale(self, values: NDArray[np.floating] | float) -> Floats:
@@ -133,7 +133,12 @@ DRIVE: tuple[tuple[str, Distribution, str, str], ...] = (
 RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
     ("amplitude", _ratio(0.4, 10.0), "", "readings very near a wall"),
     ("decay", _ratio(0.05, 0.5), "m", "readings at several distances"),
-    ("drop_most", _even(0.0, 1.0), "", "readings far from a wall, where light still comes back"),
+    (
+        "drop_most",
+        _even(0.0, 1.0),
+        "",
+        "readings far from a wall, at distances from which light still returns",
+    ),
     ("drop_at", _even(0.0, 0.45), "m", "readings at several distances"),
     ("drop_width", _ratio(0.005, 0.1), "m", "readings at several distances"),
     ("incidence", _even(0.0, 4.0), "", "readings near walls that are not faced"),
@@ -142,7 +147,7 @@ RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
 
 
 def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
-    """What is thought possible of a Scribbler, or of another robot that is driven by two wheels.
+    """Return the prior of a Scribbler, or of another robot with two wheels.
 
     Ranges are wide, and chosen: ratios as likely for sizes, even for what may be nothing at all. A parameter of which
     the robot has no number is left out.

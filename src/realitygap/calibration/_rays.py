@@ -1,4 +1,4 @@
-"""What the rays of a range sensor meet in an arena, from many poses at once."""
+"""The obstacles in the rays of a range sensor in an arena, for many poses in one call."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GRAZING = 1e-3  # the least cosine at which something is met
 
 
 def rays_of(sensor: RangeSensor, poses: Floats, arena: Arena) -> tuple[Floats, Floats]:
-    """How far the rays of a sensor reach, and how straight they meet what is there.
+    """Return the lengths of the rays of a sensor, and the cosines at the obstacles that they meet.
 
     Args:
         sensor: Of the robot.
@@ -46,7 +46,7 @@ def rays_of(sensor: RangeSensor, poses: Floats, arena: Arena) -> tuple[Floats, F
 
 
 def _segments(arena: Arena) -> list[tuple[float, float, float, float]]:
-    """All sides of what stands in an arena; round things as short lines."""
+    """Return all sides of the obstacles in an arena; round ones as short lines."""
     sides = list(arena.walls)
     for obstacle in arena.obstacles:
         points = obstacle.outline()

@@ -1,4 +1,4 @@
-"""What a ruler and a protractor tell of where a robot stands at the end of a trial."""
+"""Measurements with ruler and protractor of a robot's pose at the end of a trial."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Moved:
 
 
 def ruled(trial: TrialRecord) -> TrialRecord:
-    """What a person with a ruler has of a trial that a camera saw: the rounded pose of its end, and no other."""
+    """Return the trial of a camera as a ruler would measure it: only the rounded pose of its end."""
     moved = moved_by_camera(trial)
     return replace(
         trial,

@@ -1,4 +1,4 @@
-"""How observed motions scatter around simulated ones: the noise of `sim`, and that of whoever observes."""
+"""The scatter of observed motions around simulated ones: the noise of `sim` and of the observer."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Scatter:
         return np.asarray(own + LEAST[:, None])
 
     def log_likelihood(self, off: Floats, noise: Floats) -> float:
-        """Of differences (w, 5), where those not observed are 0."""
+        """Return the log-likelihood of differences, (w, 5), with 0 for missing ones."""
         return float(self.log_likelihoods(off, noise).sum())
 
     def log_likelihoods(self, off: Floats, noise: Floats) -> Floats:
@@ -89,7 +89,7 @@ class Scatter:
 
 
 def _cholesky(matrices: Floats) -> Floats:
-    """(n, n, w) of small matrices: all of them at once are far faster than one by one."""
+    """Decompose small matrices, (n, n, w), in one call: this is far faster than one by one."""
     root = np.zeros_like(matrices)
     for k in range(len(matrices)):
         root[k, k] = np.sqrt(matrices[k, k] - np.einsum("jw,jw->w", root[k, :k], root[k, :k]))
@@ -110,13 +110,13 @@ def _solved(root: Floats, rows: Floats) -> Floats:
 
 
 def scatter_parameters(known: Known) -> list[Parameter]:
-    """What scatters, in the order of its numbers."""
+    """Return the noise parameters, in the order of their numbers."""
     return [*(known[name] for name in MOTION_NOISE), *OBSERVER]
 
 
 @dataclass(frozen=True)
 class NoisePrior:
-    """What is thought possible of the numbers that scatter.
+    """The prior of the noise parameters.
 
     Attributes:
         low, high: (q,) ends.
@@ -138,7 +138,7 @@ class NoisePrior:
         )
 
     def log_density(self, noise: Floats) -> float:
-        """Of noise within the ends."""
+        """Return the log-density of noise within its limits."""
         return -float(np.log(noise[self.is_ratio]).sum())
 
     def inside(self, noise: Floats) -> Floats:

@@ -26,7 +26,7 @@ COLUMNS = 4096  # of vectors, at once
 
 @dataclass(frozen=True)
 class Compression:
-    """How vectors (m, d) become (m, 2 p) summaries: the score of means, and of variances.
+    """The compression of vectors, (m, d), to summaries, (m, 2 p): the score of means, and of variances.
 
     Attributes:
         center: (d,) expected at the middle of the simulations.
@@ -52,7 +52,7 @@ class Compression:
 
 
 def learn_compression(places: Floats, vectors: Vectors, finest: Vectors) -> Compression:
-    """What vectors tell of the places of parameters that made them.
+    """Learn the compression from vectors and the parameters that produced them.
 
     Args:
         places: (m, p) of the parameters, m well above p.

@@ -107,7 +107,7 @@ def make_problem(
 
 
 def scatter_of(problem: Problem, place: Floats) -> Scatter:
-    """How windows scatter around what is simulated at a place."""
+    """Return the scatter of windows around the simulation at a point."""
     values = values_at(problem.free, place[None])
     values |= {name: np.array([value]) for name, value in problem.fixed.items()}
     windows = problem.windows
@@ -138,7 +138,7 @@ def _lateness(problem: Problem, place: Floats, jitter: float) -> Floats:
 
 
 def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats) -> tuple[Floats, float]:
-    """Where weighed squares are least from here, and half their sum (Levenberg-Marquardt within the ends)."""
+    """Return the minimum of the weighted squares from a point, and half their sum (Levenberg-Marquardt)."""
 
     def off(place: Floats) -> Floats:
         rows = scatter.whitened(np.nan_to_num(problem.off(place[None])[0]), noise).ravel()

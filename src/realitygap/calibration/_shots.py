@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Shots:
-    """What each command of k trials of up to t commands did.
+    """The effect of each command of k trials of up to t commands.
 
     Attributes:
         play: The trials, with poses as anchors.
@@ -43,7 +43,7 @@ class Shots:
     wheels: Floats
 
     def blocks(self, length: int) -> tuple[NDArray[np.int64], int]:
-        """(k, t) to which block of so many commands of a trial each belongs, and how many there are."""
+        """Return the block of each command, (k, t), and the number of blocks."""
         k, t = self.known.shape
         each = -(-t // length)
         return np.arange(k)[:, None] * each + np.arange(t) // length, k * each
@@ -86,7 +86,7 @@ def _in_own_frame(after: NDArray[np.floating], before: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Shooter:
-    """Carries out the commands of shots in `sim`."""
+    """A simulation of the commands of shots in `sim`."""
 
     shots: Shots
     ensemble: SimEnsemble
@@ -104,7 +104,7 @@ class Shooter:
         return self.ensemble.summarize(self.shots.play, numbers, key, of, keep=("poses",))
 
     def off(self, values: Mapping[str, Floats], key: int) -> Floats:
-        """(m, k, t, 3) what was seen less what m robots do."""
+        """Return the observed effects less those of m robots, (m, k, t, 3)."""
         off = np.nan_to_num(self.shots.moved) - self.moved(values, key)
         off[..., 2] = wrapped(off[..., 2])
         off[:, ~self.shots.known] = 0.0

@@ -1,4 +1,4 @@
-"""What a fit asks of a simulator: trials carried out again with given commands and other numbers."""
+"""The interface between a fit and a simulator: trials repeated with given commands and other numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 
 class Rehearsed(Protocol):
-    """k trials carried out with each of m sets of numbers."""
+    """Trials (k), simulated with each of m sets of numbers."""
 
     @property
     def poses(self) -> NDArray[np.floating[Any]]:
@@ -47,7 +47,7 @@ class Rehearsed(Protocol):
 
 
 class Simulate(Protocol):
-    """Carries out trials with given commands: `platforms.SimEnsemble.replay`."""
+    """A simulator of trials with given commands: `platforms.SimEnsemble.replay`."""
 
     def __call__(
         self,
@@ -60,7 +60,7 @@ class Simulate(Protocol):
         keep: Sequence[str] = ("poses", "wheels", "stalled"),
         same_noise: bool = False,
     ) -> Rehearsed:
-        """Carry out k trials with each of m sets of numbers.
+        """Simulate k trials with each of m sets of numbers.
 
         Args:
             starts: (k, 3) x [m], y [m], heading [rad].

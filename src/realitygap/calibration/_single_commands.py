@@ -1,4 +1,4 @@
-"""How a robot moves, fitted to what each command did to it from where it was seen.
+"""The fit of motion to the effect of each command from its observed pose.
 
 The mean is fitted without noise by damped least squares whose weights fall with the size of a difference, as where a
 robot aligns or stalls flips at a border; then the noise, to what is left. Draws weigh blocks of commands anew, so that
@@ -234,7 +234,7 @@ def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floa
 
 
 def place_of(parameter: Parameter, value: float) -> float:
-    """Where a value is in 0..1, within the ends."""
+    """Return the position of a value between the limits, 0..1."""
     low = parameter.scale(parameter.prior.lowest)
     with np.errstate(divide="ignore"):
         return float(np.clip((parameter.scale(value) - low) / parameter.width, 0.002, 0.998))
@@ -251,7 +251,7 @@ def _cost(off: Floats, places: Floats) -> float:
 
 
 def _within(places: Floats, curvature: Floats, pull: Floats) -> Floats:
-    """Where a quadratic cost is least, as far as places stay in 0..1."""
+    """Return the minimum of a quadratic cost for positions in 0..1."""
     free = np.ones(len(places), np.bool_)
     new: Floats = places + np.linalg.solve(curvature, pull)
     for _ in range(len(places)):

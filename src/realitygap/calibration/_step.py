@@ -1,4 +1,4 @@
-"""How long the commands of trials lasted."""
+"""The duration of the commands of trials."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str
 
 
 def step_of(trials: Sequence[TrialRecord]) -> float:
-    """How long one command of these trials lasted, their median [s].
+    """Return the median duration of a command in these trials [s].
 
     Raises:
         ValueError: No trial, or such different lengths that they are no robot's with one step.

@@ -1,4 +1,4 @@
-"""How far wheels drive in each window: what noise of `sim` grows with."""
+"""The distances of wheels in each window, with which the noise of `sim` grows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ N_DELAYS = 9  # between the least and the most that a command may be late
 
 @dataclass(frozen=True)
 class WheelWays:
-    """Of w windows, in the mean over how late commands may be.
+    """Distances of wheels in w windows, averaged over the delay of commands.
 
     Attributes:
         way: (w, 2) of both wheels, there and back added up [m]: the way until a command is heard, and the way after it.

@@ -46,7 +46,7 @@ class Windows:
     step_s: float
 
     def only(self, which: Bools) -> Windows:
-        """Some of the windows; all trials are still carried out."""
+        """Return some of the windows; all trials are still simulated."""
         before, after, wheels = self.seen
         return Windows(
             self.trials, self.trial[which], self.first[which], self.last[which], self.touching[which],
@@ -56,7 +56,7 @@ class Windows:
 
 @dataclass(frozen=True)
 class Simulated:
-    """What m simulated robots did in w windows: (m, w, 3) poses at their ends, (m, w, 2) way of the wheels [m]."""
+    """Simulated robots (m) in windows (w): (m, w, 3) final poses, (m, w, 2) distances of the wheels [m]."""
 
     after: Floats
     wheels: Floats

@@ -82,9 +82,13 @@ def arena(
     is_map, is_to_map = source.lower().endswith(_YAML), out.suffix.lower() in _YAML
     wrong = [name for name, value in (("--start", start), ("--tolerance", tolerance)) if value is not None]
     if wrong and not is_map:
-        raise StudyError(f"{wrong[0]} is only for a map of ROS (.yaml), and {source} is none. Leave it out.")
+        raise StudyError(
+            f"{wrong[0]} is only for a map of ROS (.yaml), but {source} is not one. Leave it out."
+        )
     if resolution is not None and not is_to_map:
-        raise StudyError(f"--resolution is only for a map of ROS (.yaml), and {out} is none. Leave it out.")
+        raise StudyError(
+            f"--resolution is only for a map of ROS (.yaml), but {out} is not one. Leave it out."
+        )
     found = arena_of_map(source, _pose(start), tolerance=tolerance) if is_map else load_arena(source)
     if is_to_map:
         image = save_map(found, out, **({} if resolution is None else {"resolution": resolution}))

@@ -102,12 +102,14 @@ def bench(
         given = {"--settings": settings, "--seeds": seeds, "--seed": seed, "--change": change or None}
         for option, value in given.items():
             if value is not None:
-                raise StudyError(f"{option} goes with a task, as in: realitygap bench xor {option} ...")
+                raise StudyError(f"{option} is only for a task, as in: realitygap bench xor {option} ...")
         measured_speed = _bench_speed if task is None else _bench_realism
         measured_speed(2.0 if seconds is None else seconds, as_json=as_json)
         return
     if seconds is not None:
-        raise StudyError("--seconds goes with the measurement of speed, which has no task, and with realism.")
+        raise StudyError(
+            "--seconds is only for the measurement of speed, which has no task, and with realism."
+        )
     _check_task(task)
     measured = _bench_maze if task.startswith("maze") else _bench_task
     measured(

@@ -244,19 +244,17 @@ def _refuse_other_files(out: Path) -> None:
     """
     from realitygap.world import read_calibration
 
-    stays = "it stays as it is. Name another file."
+    stays = "it was not changed. Name another file."
     try:
         made = read_calibration(out)
     except DescriptionError as error:
-        raise StudyError(
-            f"{out} is there already and cannot be read as a calibration: {stays} {error}"
-        ) from None
+        raise StudyError(f"{out} exists and cannot be read as a calibration: {stays} {error}") from None
     if made is None:
-        raise StudyError(f"{out} is there already, and is no calibration: {stays}")
+        raise StudyError(f"{out} exists and is not a calibration: {stays}")
 
 
 def _is_foreign(data: Path | None) -> bool:
-    """Whether the data was written by another program, or is a recording: it is no file of observed trials."""
+    """Whether the data was written by another program, or is a recording: it is not a file of observed trials."""
     from realitygap.records import is_observations
 
     return data is not None and data.exists() and not is_observations(data)
@@ -278,7 +276,7 @@ def _from_foreign(
     from realitygap.study import calibrate_from_log, calibrate_from_table, hold_out_of
 
     if radius_mm is not None and (what != "sensors" or base is not None):
-        raise StudyError("--radius-mm goes with sensors, in place of --base.")
+        raise StudyError("--radius-mm is only for sensors, instead of --base.")
     if what == "motion":
         share = hold_out_of(hold_out or "0.5")
         return calibrate_from_log(
@@ -295,8 +293,8 @@ def _from_foreign(
             robot_file=out.with_suffix(".robot.toml"),
         )
     raise StudyError(
-        f"{data} is no file of observed trials. Of a log, motion can be fitted; of a table of readings, sensors. "
-        f"To fit {what}, import the log first: realitygap import."
+        f"{data} is not a file of observed trials. You can fit motion to a log, and sensors to a table of "
+        f"readings. To fit {what}, import the log first: realitygap import."
     )
 
 
@@ -331,7 +329,7 @@ def _measured(
     base = base or class_of(robot).base_robot
     where, model = load_arena(arena), load_robot(base)
     is_led = _is_led(robot, witness)
-    again = f"What was recorded is kept in {kept}; the same command goes on where it stopped."
+    again = f"Recorded trials are in {kept}. Run the same command to resume."
     try:
         sheet = sheet_observer(asks_for_start=False) if is_led else None
         operator = CalibrationOperator(where, model) if is_led else None

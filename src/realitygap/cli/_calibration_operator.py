@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from realitygap.trials import Led, TrialPlan
     from realitygap.world import Arena, RobotModel
 
-_KEYS = "Enter goes on, r takes the one before back, q stops for now: "
+_KEYS = "Enter: continue, r: repeat the previous trial, q: stop for now: "
 
 
 class CalibrationOperator(Operator):
@@ -58,7 +58,11 @@ class CalibrationOperator(Operator):
                 return "stop"
             if answer in ("r", "redo") and number:
                 return "redo"
-            self._say("There is none before." if answer in ("r", "redo") else f"{answer!r} is none of these.")
+            self._say(
+                "There is no previous trial."
+                if answer in ("r", "redo")
+                else f"{answer!r} is not one of these keys."
+            )
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Ask where a path ended, unless an observer saw it; None has the trial driven again."""
@@ -70,11 +74,11 @@ class CalibrationOperator(Operator):
         if plan.purpose != "path" or len(trial.poses):
             return trial
         is_straight = plan.commands[0, 0] != 0
-        questions = ["How far ahead of its start does it stand [in]? ", "How far to the left of it [in]? "]
+        questions = ["Distance ahead of its start [in]: ", "Distance to the left of its start [in]: "]
         answers: list[float | None] = [0.0, 0.0]
         if is_straight:
             answers = [self._number(question) for question in questions]
-        answers.append(self._number("How far did it turn to the left, with all full turns [degrees]? "))
+        answers.append(self._number("Total turn to the left, with full turns [degrees]: "))
         if None in answers:
             return None
         ahead, left, turned = (float(answer or 0.0) for answer in answers)
@@ -85,13 +89,13 @@ class CalibrationOperator(Operator):
         from realitygap.study import parse_length
 
         while True:
-            answer = self._ask(f"{question}(r drives it again) ").lower()
+            answer = self._ask(f"{question}(r: drive it again) ").lower()
             if answer in ("r", "redo"):
                 return None
             value = parse_length(answer)
             if value is not None:
                 return value
-            self._say(f"{answer!r} is no number. Expected one such as 13.75, 13 3/4 or -2.")
+            self._say(f"{answer!r} is not a number. Expected, for example, 13.75, 13 3/4, or -2.")
 
 
 def _ask_at_terminal(question: str) -> str:

@@ -41,8 +41,8 @@ def under_camera(
         return
     if observer is None:
         raise StudyError(
-            "--camera goes with a robot that somebody at a terminal puts at its start: simulators, twins and emulators "
-            "tell where they are."
+            "--camera is only for a robot that an operator places at its start. Simulators, twins, and "
+            "emulators report their poses."
         )
     from realitygap.study import CameraObserver
     from realitygap.vision import CameraDevice, LiveTrack

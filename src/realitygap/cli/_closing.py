@@ -146,7 +146,7 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
     try:
         summary = closing_the_gap(folder, plan, processes=processes, tell=tell)
     except KeyboardInterrupt:
-        typer.echo("Interrupted. What is done is safe; the same command goes on where it stopped.", err=True)
+        typer.echo("Interrupted. Finished parts are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     page = write_closing_page(summary, folder / "report.html")
     if as_json:

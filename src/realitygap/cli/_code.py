@@ -81,9 +81,8 @@ def _ask(task: PythonTask) -> None:
     for number, line in enumerate(lines, 1):
         typer.echo(f"{number:5d}  {visible(line)}", err=True)
     typer.echo(
-        f"\n{visible(task.file)}: {len(lines)} lines, SHA-256 {task.sha256}\n"
-        "This code, and the modules that it imports, can do on this machine whatever you can do.\n"
-        "Run it? [y/N] ",
+        f"\n{visible(task.file)}: {len(lines)} lines, SHA-256 {task.sha256}\nThis code, and the modules that "
+        "it imports, can do everything on this machine that you can do.\nRun it? [y/N] ",
         err=True,
         nl=False,
     )

@@ -99,7 +99,7 @@ def drive(
                 resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
             )
     except KeyboardInterrupt:
-        typer.echo("Interrupted. What was scored is safe; the same command resumes.", err=True)
+        typer.echo("Interrupted. Scored trials are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     print_result(result, as_json=as_json)
     if open_page:

@@ -137,7 +137,7 @@ def emulate(
         wrong = [option for option, value in given.items() if value is not None]
         if wrong:
             raise RobotError(
-                f"{wrong[0]} goes with scribbler. Leave it out: a playground has no such setting."
+                f"{wrong[0]} is only for scribbler. Leave it out: a playground does not have this setting."
             )
         _emulate_thymio(arena, speed, tcp, witness, window=window, quiet=quiet)
         return

@@ -76,7 +76,7 @@ def export(
     In Python: realitygap.report.export_frame("results/paper", "lineage", "lineage.parquet")
     """
     if out is None:
-        raise StudyError("Where to? Name a file with -o, such as -o champion.json.")
+        raise StudyError("No output file. Name one with -o, such as -o champion.json.")
     from realitygap.report import export_frame, export_individual
 
     which = {"condition": condition, "replicate": replicate}
@@ -101,9 +101,9 @@ def _folder(what: str, name: str | None, numbers: Mapping[str, object]) -> str:
     """The folder after a word, with which the options of an individual mean nothing."""
     if name is None:
         raise StudyError(
-            f"Of which results? Name a folder: realitygap export {what} results/paper -o {what}.parquet"
+            f"No results folder. Name one: realitygap export {what} results/paper -o {what}.parquet"
         )
     surplus = [f"--{key}" for key, value in numbers.items() if value is not None]
     if surplus:
-        raise StudyError(f"Of no meaning for {what}: {', '.join(surplus)}. Leave that out.")
+        raise StudyError(f"Not for {what}: {', '.join(surplus)}. Leave that out.")
     return name

@@ -200,9 +200,9 @@ def gap(
             )
     except KeyboardInterrupt:
         kept = (
-            f"What was tried is in {out}; the same command goes on there."
+            f"Finished trials are in {out}. Run the same command to resume."
             if out
-            else "Nothing was kept (-o FILE)."
+            else "Nothing was saved. To save trials, add -o FILE."
         )
         typer.echo(f"Interrupted. {kept}", err=True)
         raise typer.Exit(130) from None
@@ -246,12 +246,12 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
         _print_row(measure.row, getattr(result, measure.name))
     if replay is not None:
         _print_row("replays off at their end [m]", replay.at_end)
-    typer.echo("Kept apart from it:")
+    typer.echo("Separate from the transfer gap:")
     _print_row("re-evolved gap", result.reevolved)
     _print_row("luck of selection", result.luck)
     if result.misspecified is not None:
         says = "cannot" if result.misspecified else "can"
-        typer.echo(f"The simulator {says} make what was observed when it was calibrated.")
+        typer.echo(f"The simulator {says} reproduce the observations of its calibration.")
     for note in result.notes:
         typer.echo(note)
     typer.echo(result.verdict)
@@ -268,7 +268,10 @@ def _print_row(title: str, found: Estimate) -> None:
 
 
 def _print_why(why: Why) -> None:
-    typer.echo(f"Why: RMS gap {why.before} with the robot's defaults, {why.after} with the fit. Of the fall,")
+    typer.echo(
+        f"Why: RMS gap {why.before} with the robot's defaults, {why.after} with the fit. Contributions to the "
+        "fall:"
+    )
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
         ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
@@ -377,8 +380,8 @@ def plan(
     given = {name: value for name, value in asked.items() if value is not None}
     if len(given) != 1:
         raise StudyError(
-            f"Came {', '.join('--' + name for name in given) or 'no question'}, expected one of --effect, --margin and "
-            "--correlation. For example: realitygap plan --effect 0.05"
+            f"Got {', '.join('--' + name for name in given) or 'no question'}, expected one of --effect, "
+            "--margin, and --correlation. For example: realitygap plan --effect 0.05"
         )
     ((question, value),) = given.items()
     scored_by = task_named(task, allow_code=allow_code)
@@ -413,8 +416,8 @@ def _plan_json(found: GapPlan) -> dict[str, Any]:
 
 def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
     question = {
-        "effect": f"to find a mean difference of {found.value:g}",
-        "margin": f"to show equivalence within ±{found.value:g} where there is no difference",
+        "effect": f"to detect a mean difference of {found.value:g}",
+        "margin": f"to show equivalence within ±{found.value:g} if there is no difference",
         "correlation": f"to show that a correlation of {found.value:g} is above {least:g}",
     }[found.question]
     typer.echo(f"Controllers {question} in {100 * power:g} of 100 studies, in {score}")
@@ -424,9 +427,7 @@ def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
     )
     if found.question != "correlation":
         typer.echo(f"Assumed: true differences of controllers vary by {found.spread:.3f} (--spread)")
-    typer.echo(
-        f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'found in simulated studies':>30}"
-    )
+    typer.echo(f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'detected in simulations':>30}")
     for row in found.needed:
         if row.controllers is None or row.power is None:
             typer.echo(f"{row.trials:>12}{'over 100,000':>13}")
@@ -435,18 +436,20 @@ def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
         typer.echo(f"{row.trials:>12}{row.controllers:>13,}{row.on_target:>15,}{share:>30}")
     if found.best is not None:
         typer.echo(
-            f"Fewest trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} controllers with "
-            f"{found.best.trials} each."
+            f"Minimum number of trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} "
+            f"controllers with {found.best.trials} each."
         )
     else:
         from realitygap.study import MOST_CONTROLLERS
 
         typer.echo(
-            f"`realitygap gap` takes at most {MOST_CONTROLLERS:,} controllers, with which none of these is."
+            f"`realitygap gap` takes at most {MOST_CONTROLLERS:,} controllers, fewer than each of these plans "
+            "needs."
         )
     if found.question == "effect":
         typer.echo(
-            "The RMS gap and the noise ceiling need at least 2 trials each: one does not tell noise from a gap."
+            "The RMS gap and the noise ceiling need at least 2 trials each: noise and gap are not separable "
+            "with one."
         )
     if found.question == "correlation":
         typer.echo(

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 Outcome = Literal["done", "later"]
 
 HELP = (
-    "arrows move, space marks or clears a cell, d draws while moving, u takes back, c clears all, Enter is done, "
+    "Arrows: move, space: mark or clear a cell, d: draw while moving, u: undo, c: clear all, Enter: done, "
     "Escape: later"
 )
 

@@ -224,7 +224,9 @@ class PersonOperator(Operator):
         numbers = {str(card.trial.trial): card.trial.trial for card in cards}
         while True:
             answer = self._ask(
-                "Enter closes it, then scores stay; a trial's number takes its score back; n TEXT adds a note: ",
+                (
+                    "Enter: close it and freeze the scores, TRIAL NUMBER: withdraw its score, n TEXT: add a note: "
+                ),
                 "",
             )
             if answer.startswith("n "):

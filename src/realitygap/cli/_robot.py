@@ -81,7 +81,7 @@ def list_ports(as_json: Json = False) -> None:
     elif found:
         _print_table(("port", "seems to be", "the system says"), found)
     else:
-        typer.echo("No serial port is there. Pair the robot, or plug it in; docs/how-to/robot.md says how.")
+        typer.echo("No serial port found. Pair the robot or plug it in, see docs/how-to/robot.md.")
 
 
 @robot.command("info")

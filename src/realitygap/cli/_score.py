@@ -134,7 +134,9 @@ def score(
         _only_show(photo, arena, pens, overlay, as_json=as_json)
         return
     if pens is not None:
-        raise StudyError("--pens goes without --study, whose file names its pens. Leave it out.")
+        raise StudyError(
+            "--pens cannot be combined with --study, because the study names its pens. Leave it out."
+        )
     from realitygap.records import LEDGER_NAME, Ledger
     from realitygap.vision import trials_on_sheet
 
@@ -254,8 +256,8 @@ def _say_what_is_spoiled(on_sheet: SheetTrials) -> None:
         if trial.pen in on_sheet.spoiled:
             void = on_sheet.spoiled[trial.pen].trial
             typer.echo(
-                f"Trial {trial.trial}: the pen also drew trial {void}, which is void; where that line is still on the "
-                "sheet the two cannot be told apart, and --yes leaves this trial out.",
+                f"Trial {trial.trial}: the pen also drew trial {void}, which is void. If that line is still on "
+                "the sheet, the two cannot be distinguished, and --yes skips this trial.",
                 err=True,
             )
 
@@ -292,7 +294,9 @@ def _confirmed(
 
 def _answer(trial: Trial, trace: TraceScore) -> str:
     while True:
-        prompt = f"Trial {trial.trial}, {trace.name}, {len(trace.cells)} cells: Enter takes them, e edits them, s skips"
+        prompt = (
+            f"Trial {trial.trial}, {trace.name}, {len(trace.cells)} cells. Enter: accept, e: edit, s: skip"
+        )
         answer = typer.prompt(prompt, default="", show_default=False).strip().lower()
         if answer in ("", "e", "s"):
             return str(answer)

@@ -132,7 +132,7 @@ def show(
     In Python: realitygap.report.save_robot("robot.svg", "scribbler-s2-fluke2")
     """
     if out is None:
-        raise StudyError("Where to? Name a file with -o, such as -o run.svg.")
+        raise StudyError("No output file. Name one with -o, such as -o run.svg.")
     from realitygap.report import save_arena, save_robot, save_view
 
     numbers: dict[str, Any] = {
@@ -175,7 +175,7 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
     if what in subjects:
         if name is None:
             raise StudyError(
-                f"Of which results? Name a folder: realitygap show {what} results/paper -o {shlex.quote(str(out))}"
+                f"No results folder. Name one: realitygap show {what} results/paper -o {shlex.quote(str(out))}"
             )
         return subjects[what], name
     if name is not None:
@@ -197,7 +197,7 @@ def _movie(
 
     if not names:
         raise StudyError(
-            f"Of which results? Name a folder: realitygap show movie results/paper -o {shlex.quote(str(out))}"
+            f"No results folder. Name one: realitygap show movie results/paper -o {shlex.quote(str(out))}"
         )
     chosen = cast("Each | None", each)
     return write_movie(names, out, each=chosen, speed=1.0 if speed is None else speed, **numbers)
@@ -214,8 +214,8 @@ def _divergence(
 
     if name is None or against is None:
         raise StudyError(
-            "Of which results, and tried on what beside its own condition? realitygap show divergence results/paper "
-            f"--against novelty-10 -o {shlex.quote(str(out))}"
+            "No results folder, or no second condition or platform. For example: realitygap show divergence "
+            f"results/paper --against novelty-10 -o {shlex.quote(str(out))}"
         )
     return save_divergence(name, out, against=against, repeats=30 if repeats is None else repeats, **numbers)
 
@@ -223,7 +223,8 @@ def _divergence(
 def _one_name(what: str, names: list[str] | None) -> str | None:
     if names and len(names) > 1:
         raise StudyError(
-            f"Cannot show {what!r} of {len(names)} at once, expected one name after it. Only a movie shows several."
+            f"Cannot show {what!r} of {len(names)} together, expected one name after it. Only a movie shows "
+            "several."
         )
     return names[0] if names else None
 
@@ -231,4 +232,4 @@ def _one_name(what: str, names: list[str] | None) -> str | None:
 def _refuse(what: str, options: Sequence[str], *given: object) -> None:
     surplus = [name for name, value in zip(options, given, strict=True) if value is not None]
     if surplus:
-        raise StudyError(f"Of no meaning for {what}: {', '.join(surplus)}. Leave that out.")
+        raise StudyError(f"Not for {what}: {', '.join(surplus)}. Leave that out.")

@@ -102,8 +102,8 @@ def run(
 
     if threads is not None and cluster is not None:
         raise StudyError(
-            "--threads and --cluster exclude each other. How many threads a worker of a cluster has is said where it "
-            "is started: `dask worker --nthreads`, or `cores` in the settings of its jobs."
+            "--threads and --cluster exclude each other. Set the number of threads of a worker when you start "
+            "it: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
     resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     if resolved.n_physical == len(resolved.conditions):
@@ -124,9 +124,7 @@ def run(
                 allow_code=code_permission(allow_code),
             )
     except KeyboardInterrupt:
-        typer.echo(
-            "Interrupted. What was published is safe; the same command goes on where it stopped.", err=True
-        )
+        typer.echo("Interrupted. Published runs are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     print_result(result, as_json=as_json)
     if open_page:
@@ -154,10 +152,10 @@ def new_study(
         with path.open("x", encoding="utf-8") as file:
             file.write(study_template(_as_name(path.stem)))
     except FileExistsError:
-        raise StudyError(f"{path} exists already and was left as it is. Choose another name.") from None
+        raise StudyError(f"{path} exists and was not changed. Choose another name.") from None
     except OSError as error:
         raise StudyError(f"{path} cannot be written: {error.strerror}.") from error
-    typer.echo(f"Written: {path}. Carry it out with: realitygap run {shlex.quote(str(path))}")
+    typer.echo(f"Written: {path}. Run it with: realitygap run {shlex.quote(str(path))}")
 
 
 def _as_name(stem: str) -> str:
@@ -277,7 +275,7 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
             f"({result.n_computed / result.seconds:,.0f} runs/s)."
         )
     elif result.n_runs:
-        typer.echo(f"All {result.n_runs} runs were there already.")
+        typer.echo(f"All {result.n_runs} runs existed already.")
     _print_physical(result)
     typer.echo(f"Results: {path}   in Python: {_reading(result.folder)}")
     typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")

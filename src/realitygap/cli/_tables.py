@@ -49,8 +49,8 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
     tasks = ", ".join(dict.fromkeys(summary["task"].to_list()))
     table = table_of(
         f"{title}\nFitness by the task {tasks} ({labels})",
-        "first, last: median of the best in the first and in the last generation; run: of the best of a whole run, "
-        "median [its interval, at least 95 %] and quartiles",
+        "first, last: median of the best in the first and in the last generation; run: median of the "
+        "best of a whole run [its interval, at least 95 %] and quartiles",
     )
     table.add_column("condition", overflow="fold")
     for name in ("runs", "first", "last"):

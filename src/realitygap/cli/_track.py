@@ -158,7 +158,7 @@ def track(
     wanted = _wanted(study, trials, trial, into)
     if sheet and (corner_size is not None or corner_inset is not None):
         raise StudyError(
-            "--sheet says where the corner tags are. Leave --corner-size and --corner-inset out."
+            "--sheet defines the positions of the corner tags. Leave --corner-size and --corner-inset out."
         )
     marks = _marks(arena, wanted, tag_of(tag, tag_size, tag_height, tag_at), lens, corner_size, corner_inset)
     _refuse_outputs(out, save_lens, overlay, into, camera)
@@ -273,12 +273,12 @@ def _wanted(
         )
     if trial is None:
         if into is not None:
-            raise StudyError("--into keeps a trial with its commands. Name it: --study DIR --trial NUMBER")
+            raise StudyError(
+                "--into saves a trial with its commands. Name the trial: --study DIR --trial NUMBER"
+            )
         return None
     if trials is not None and into is None:
-        raise StudyError(
-            "Where does the trial with its poses go? Name a file with --into, such as tracked.jsonl."
-        )
+        raise StudyError("No file for the trial with its poses. Name one with --into, such as tracked.jsonl.")
     from realitygap.study import trial_of_file, trial_of_ledger
 
     if study is not None:
@@ -446,10 +446,12 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
         f"Tag {found.tag.family}:{found.tag.number} seen in {n_seen} of {n} pictures; longest gap "
         f"{track.longest_gap_s:.2f} s, filled in."
     )
-    typer.echo(f"The camera stands {above:.2f} m above the floor.")
+    typer.echo(f"The camera is {above:.2f} m above the floor.")
     if placed is not None:
         begun = placed.beginning
-        how = "as said" if math.isnan(begun.agreement) else f"commands and way agree to {begun.agreement:.2f}"
+        how = (
+            "as said" if math.isnan(begun.agreement) else f"commands and path agree to {begun.agreement:.2f}"
+        )
         typer.echo(
             f"The trial begins at {begun.time:.2f} s ({how}) and crosses {len(placed.score.cells)} cells."
         )

@@ -138,7 +138,7 @@ def transfer(
                 tell=lambda text: typer.echo(text, err=True),
             )
     except KeyboardInterrupt:
-        typer.echo("Interrupted. Every trial is kept; the same command goes on where it stopped.", err=True)
+        typer.echo("Interrupted. All trials are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     if as_json:
         typer.echo(json.dumps(result.to_dict(), indent=2))
@@ -164,4 +164,6 @@ def _print(result: TransferResult) -> None:
         simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
         typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
     if result.replicates == 1:
-        typer.echo("Intervals are of the fresh trials of one champion; --replicates says more of a strategy.")
+        typer.echo(
+            "Intervals are over the fresh trials of one champion. To compare strategies, add --replicates."
+        )

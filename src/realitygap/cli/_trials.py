@@ -122,7 +122,7 @@ def trials(
             number = _number(ledger, _needed(trial, "a trial"))
             if what == "undo":
                 ledger.undo(number)
-                typer.echo(f"The score of trial {number} is taken back; enter it anew.")
+                typer.echo(f"The score of trial {number} is withdrawn. Enter a new one.")
             else:
                 ledger.void(number, _needed(text, "--text"))
                 typer.echo(f"Trial {number} is void; it will be driven again.")
@@ -181,7 +181,7 @@ def _cells(text: str, where: str) -> list[int]:
     try:
         return [int(word) for word in text.replace(",", " ").split()]
     except ValueError:
-        raise StudyError(f"{where}: expected numbers of cells such as 0,1,13, came {text!r}.") from None
+        raise StudyError(f"{where}: expected numbers of cells such as 0,1,13, got {text!r}.") from None
 
 
 def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
@@ -197,11 +197,11 @@ def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
         trial, colon, text = line.partition(":")
         if not colon:
             raise StudyError(
-                f"{path}, line {number}: expected 'TRIAL: 0 1 13', came {line!r}. Nothing was entered."
+                f"{path}, line {number}: expected 'TRIAL: 0 1 13', got {line!r}. Nothing was entered."
             )
         which = _number(ledger, trial.strip())
         if which in found:
-            raise StudyError(f"{path}, line {number}: trial {which} stands there twice. Nothing was entered.")
+            raise StudyError(f"{path}, line {number}: trial {which} is listed twice. Nothing was entered.")
         found[which] = _cells(text, f"{path}, line {number}")
     return found
 

@@ -202,8 +202,9 @@ class Genome:
         paper, (n_inputs, n_outputs) = self._paper, self._sizes
         if (n_inputs, n_outputs) != (len(paper.inputs), len(paper.outputs)):
             raise ControllerError(
-                f"The controller has {n_inputs} inputs and {n_outputs} outputs, and does not say what they are. "
-                f"Expected {', '.join(paper.inputs)} and {', '.join(paper.outputs)}, or names for them (--inputs)."
+                f"The controller has {n_inputs} inputs and {n_outputs} outputs, and does not name them. "
+                f"Expected {', '.join(paper.inputs)} and {', '.join(paper.outputs)}, or names for them "
+                "(--inputs)."
             )
         return paper
 

@@ -100,8 +100,8 @@ class ControllerInterface:
             has = listed(name for name in there if name != CONSTANT)
             raise ControllerError(
                 f"{who} sees {listed(self.sensed)}, and {where} has {has}: {listed(missing)} "
-                f"{'is' if len(missing) == 1 else 'are'} missing. Choose inputs that are there, or a platform, robot "
-                "and arena that have these."
+                f"{'is' if len(missing) == 1 else 'are'} missing. Choose existing inputs, or a platform, "
+                "robot, and arena that have these."
             )
 
     def bind(self, steps: int) -> Sense:

@@ -1,4 +1,4 @@
-"""How far two platforms are apart: arrays of trials in, measures with intervals out.
+"""The gap between two platforms: arrays of trials in, measures with intervals out.
 
 `measure_gap` gives all measures; each has a file of its own, and can be had alone. No platform is run here.
 """

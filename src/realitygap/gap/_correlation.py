@@ -44,7 +44,7 @@ def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
 
 
 def lengthened(correlation: Values, times: float) -> Values:
-    """Reliability of a test so many times as long.
+    """Return the reliability of a test that is longer by a factor.
 
     Source: Spearman (1910) and Brown (1910), British Journal of Psychology 3. Differs: 0 for a correlation below 0,
     for which the formula means nothing.

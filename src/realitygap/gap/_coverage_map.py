@@ -1,4 +1,4 @@
-"""Where trials go on both sides: the share of trials that cross each cell."""
+"""Coverage maps of both sides: the share of trials that cross each cell."""
 
 from __future__ import annotations
 

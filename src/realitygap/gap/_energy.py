@@ -38,7 +38,7 @@ def energy_distances(source: Values, target: Values) -> Values:
 def energy_test(
     source: Values, target: Values, rng: np.random.Generator, permutations: int = PERMUTATIONS
 ) -> float:
-    """How often the mean energy distance is as large when trials of each controller change sides at random: p.
+    """Return p: the frequency of an equal or larger mean distance if trials of each controller change sides at random.
 
     Args:
         source: (c, r, d) and

@@ -19,7 +19,7 @@ MOST_CONTROLLERS = 100_000
 
 @dataclass(frozen=True)
 class Equivalence:
-    """What two one-sided tests say.
+    """The result of two one-sided tests.
 
     Attributes:
         difference: Mean difference.
@@ -56,7 +56,7 @@ def prove_equivalence(differences: Values, margin: float | None) -> Equivalence:
     """
     n = len(differences)
     if n < 2:
-        raise ValueError(f"Equivalence needs at least 2 controllers, this is {n}.")
+        raise ValueError(f"Equivalence needs at least 2 controllers, got {n}.")
     if margin is not None and not (math.isfinite(margin) and margin > 0):
         raise ValueError(f"margin is {margin}, expected a number above 0, such as 0.05.")
     mean, spread = float(differences.mean()), float(differences.std(ddof=1))
@@ -77,7 +77,7 @@ def _p(mean: float, error: float, margin: float, n: int) -> float:
 
 
 def equivalence_power(margin: float, spread: float, n: int, difference: float = 0.0) -> float:
-    """How often n controllers show equivalence.
+    """Return the probability that n controllers show equivalence.
 
     Args:
         margin: Above 0.

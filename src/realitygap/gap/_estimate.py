@@ -44,7 +44,7 @@ class Estimate:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Estimate:
-        """Of what `to_dict` gave."""
+        """Return the estimate from the output of `to_dict`."""
         own = {name: values[name] for name in ("estimate", "low", "high", "n")}
         more = {name: value for name, value in values.items() if name not in (*own, "refused")}
         return cls(**own, refused=values.get("refused", ""), more=more)

@@ -1,4 +1,4 @@
-"""How large the difference in quality is: mean, root mean square without noise, and A12."""
+"""The size of the difference in quality: mean, root mean square without noise, and A12."""
 
 from __future__ import annotations
 

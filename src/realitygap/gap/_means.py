@@ -16,7 +16,9 @@ def mean_of(values: Values) -> Estimate:
     n = len(values)
     mean = float(values.mean())
     if n < SMALLEST_N:
-        return Estimate(mean, None, None, n, f"{n} values give no interval; {SMALLEST_N} would.")
+        return Estimate(
+            mean, None, None, n, f"{n} values are too few for an interval; at least {SMALLEST_N} are needed."
+        )
     reach = _t(n - 1) * float(values.std(ddof=1)) / math.sqrt(n)
     return Estimate(mean, mean - reach, mean + reach, n)
 
@@ -29,7 +31,13 @@ def difference_of_groups(one: Values, other: Values) -> Estimate:
     n = min(len(one), len(other))
     difference = float(other.mean() - one.mean())
     if n < SMALLEST_N:
-        return Estimate(difference, None, None, n, f"{n} champions give no interval; {SMALLEST_N} would.")
+        return Estimate(
+            difference,
+            None,
+            None,
+            n,
+            f"{n} champions are too few for an interval; at least {SMALLEST_N} are needed.",
+        )
     parts = [float(each.var(ddof=1)) / len(each) for each in (one, other)]
     total = sum(parts)
     if total == 0:

@@ -140,7 +140,10 @@ class _Work:
         if self.fewest < 2:
             return Estimate.refusal(
                 self.n,
-                "One trial of each controller does not tell noise from a gap; 2 of each on both sides would.",
+                (
+                    "With one trial of each controller, noise and gap cannot be separated. Drive at least 2 of "
+                    "each on both sides."
+                ),
             )
         squares = square_differences(*self.pair)[0]
         value = float(rms_of(squares.mean()))
@@ -166,14 +169,14 @@ class _Work:
         if self.n < SMALLEST_N:
             return Estimate.refusal(
                 self.n,
-                f"An order of {self.n} controllers comes about by chance too easily (a perfect one in 1 of "
-                f"{math.factorial(self.n)}); {SMALLEST_N} would carry it.",
+                f"With {self.n} controllers, an order is too likely by chance (a perfect one in 1 of "
+                f"{math.factorial(self.n)}). At least {SMALLEST_N} are needed.",
             )
         if self.alike:
             return Estimate.refusal(
                 self.n,
-                f"On {' and '.join(self.alike)} all controllers do equally well, so there is no order; controllers "
-                "that differ would carry it.",
+                f"On {' and '.join(self.alike)} all controllers do equally well, so there is no order. Try "
+                "controllers that differ.",
             )
         return None
 
@@ -192,7 +195,7 @@ class _Work:
     def _no_halves(self) -> Estimate | None:
         if self.fewest < 2:
             return Estimate.refusal(
-                self.n, "One trial of each controller has no halves; 2 on both sides would."
+                self.n, "One trial of each controller has no halves; at least 2 on both sides are needed."
             )
         return self._no_order()
 
@@ -217,14 +220,14 @@ class _Work:
             if found < LEAST_RELIABILITY:
                 trials = trials_for_reliability(found, side.trials, WANTED_RELIABILITY)
                 would = (
-                    f"{trials} trials of each controller would"
+                    f"{trials} trials of each controller are needed"
                     if trials is not None
-                    else "more trials would have to show first that controllers differ at all"
+                    else "more trials must first show that controllers differ"
                 )
                 return Estimate.refusal(
                     self.n,
-                    f"{side.name} does not repeat its own order (reliability {found:.2f} with {side.trials} trials of "
-                    f"each controller), so nothing can be set against it; {would}.",
+                    f"{side.name} does not repeat its own order (reliability {found:.2f} with {side.trials} "
+                    f"trials of each controller), so the correlation cannot be corrected for noise; {would}.",
                 )
         return None
 
@@ -237,7 +240,7 @@ class _Work:
 
     def energy(self, one: Values, other: Values, what: str) -> Estimate:
         if not (len(one) and len(other)):
-            return Estimate.refusal(self.n, f"Nobody saw {what} on both sides.")
+            return Estimate.refusal(self.n, f"No data on {what} on both sides.")
         if self.fewest < 2:
             return Estimate.refusal(
                 self.n, "An energy distance needs 2 trials of each controller on both sides."
@@ -247,7 +250,11 @@ class _Work:
         smallest = smallest_energy_p(self.n, self.source.trials, self.target.trials)
         p = energy_test(one, other, self.rng) if smallest < ALPHA else None
         more = {"p": p}
-        why = "" if p is not None else f"So few trials give no p below {smallest:.2f}; twice as many would. "
+        why = (
+            ""
+            if p is not None
+            else f"The number of trials allows no p below {smallest:.2f}; twice as many do. "
+        )
         return Estimate(found.estimate, found.low, found.high, self.n, (why + found.refused).strip(), more)
 
     # equivalence
@@ -255,13 +262,15 @@ class _Work:
     def equivalence(self, margin: float | None) -> Estimate:
         if self.n < 2:
             return Estimate.refusal(
-                self.n, "One controller does not tell how differences vary; 5 would.", margin=margin
+                self.n,
+                "With one controller, the spread of differences is unknown. At least 5 are needed.",
+                margin=margin,
             )
         found = prove_equivalence(self.target.means - self.source.means, margin)
         more = {"margin": margin, "equivalent": found.equivalent}
         why = ""
         if margin is None:
-            why = "No margin was named (--margin), so equivalence is not tested."
+            why = "No margin was given (--margin), so equivalence is not tested."
         else:
             more["p"] = found.p
             if not found.equivalent and found.power < POWER:
@@ -271,17 +280,20 @@ class _Work:
 
 
 def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
-    would = f"{needed:,} would in 80 of 100" if needed is not None else "no number of controllers would"
+    would = f"{needed:,} do so in 80 of 100" if needed is not None else "no number of controllers is enough"
     return (
-        f"{n} controllers show equivalence at ±{margin:g} in {100 * power:.0f} of 100 studies even where there is no "
-        f"difference; {would}."
+        f"{n} controllers show equivalence at ±{margin:g} in {100 * power:.0f} of 100 studies, even if there "
+        f"is no difference; {would}."
     )
 
 
 def _no_interval(n: int) -> str:
     if n >= SMALLEST_N:
-        return "Noise leaves no order in most resamples, so there is no interval; more trials of each controller would."
-    return f"{n} controllers give no interval; {SMALLEST_N} would."
+        return (
+            "Noise leaves no order in most resamples, so there is no interval. Drive more trials of each "
+            "controller."
+        )
+    return f"{n} controllers are too few for an interval; at least {SMALLEST_N} are needed."
 
 
 def _within_one(value: float) -> float:

@@ -1,4 +1,4 @@
-"""How many controllers and trials it takes to see an effect, to show equivalence, or to tell a correlation."""
+"""The numbers of controllers and trials needed for an effect, for equivalence, or for a correlation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MOST_PAIRS = 2_000_000
 
 @dataclass(frozen=True)
 class Needed:
-    """Controllers that it takes, with so many trials of each on each platform.
+    """The number of controllers needed, for a number of trials of each on each platform.
 
     Attributes:
         trials: Of each controller on each platform.
@@ -47,7 +47,7 @@ class Needed:
 
     @property
     def on_target(self) -> int | None:
-        """Trials on the target in all."""
+        """Total number of trials on the target."""
         return None if self.controllers is None else self.controllers * self.trials
 
 
@@ -160,7 +160,7 @@ def check_plan(
 
 
 def trial_reliability(controllers_spread: float, noise: float, trials: int) -> float:
-    """Reliability of the mean of so many trials [0..1], of controllers that spread so much."""
+    """Return the reliability of the mean of n trials [0..1], for a given spread of controllers."""
     between = controllers_spread**2
     total = between + noise**2 / trials
     return between / total if total > 0 else 0.0

@@ -1,4 +1,4 @@
-"""How far an open-loop replay in simulation comes away from what the target did, over time."""
+"""The divergence over time between an open-loop replay in simulation and the target."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ReplayError:
         return values
 
     def _mean(self, values: Values) -> Estimate:
-        """Of (m,) values that cannot be below 0: trials of one controller count as one."""
+        """Return the mean of (m,) values of at least 0; trials of one controller count as one."""
         _, which, n = np.unique(self.controllers, return_inverse=True, return_counts=True)
         found = mean_of(np.bincount(which, values) / n)
         return found if found.low is None else replace(found, low=max(found.low, 0.0))
@@ -61,7 +61,7 @@ class ReplayError:
 def replay_error(
     observed: Values, replayed: Values, controllers: NDArray[np.int64] | None = None
 ) -> ReplayError:
-    """Set poses of the target beside those of its commands replayed in simulation.
+    """Compare poses of the target with those of its commands replayed in simulation.
 
     Args:
         observed: (m, t + 1, 3) x [m], y [m], heading [rad] on the target.
@@ -80,7 +80,7 @@ def replay_error(
             "(k, m, t + 1, 3)."
         )
     if len(replayed) < 2:
-        raise ValueError("There is one replay, expected at least 2: noise shows between them.")
+        raise ValueError("There is one replay, expected at least 2 to measure their noise.")
     distance, heading = _apart(observed[None], replayed)
     noise_distance, noise_heading = _apart(replayed, np.roll(replayed, 1, axis=0))
     return ReplayError(

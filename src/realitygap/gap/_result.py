@@ -33,9 +33,9 @@ class Measure(NamedTuple):
 SHOWN: tuple[Measure, ...] = (
     Measure(
         "rms",
-        "RMS gap, noise taken out",
+        "RMS gap without noise",
         "RMS gap",
-        "root mean square over controllers of the difference in {score}, noise taken out",
+        "root mean square over controllers of the difference in {score}, with noise subtracted",
     ),
     Measure(
         "level", "level: target less simulator", "Level", "mean difference in {score}, target less simulator"
@@ -100,7 +100,7 @@ MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
 
 @dataclass(frozen=True)
 class GapResult:
-    """How far two platforms are apart: the transfer gap, of the same controllers on both.
+    """The gap between two platforms: the transfer gap, of the same controllers on both.
 
     Differences are target less simulator: below 0 where the target does worse than the simulator says.
 
@@ -194,7 +194,7 @@ def _verdict_of(result: GapResult) -> str:
     """Return the result in one sentence, without what n controllers cannot support."""
     parts = [_size(result), _order(result), _equivalence(result.equivalence)]
     if result.misspecified:
-        parts.append("the simulator cannot make what was observed, whatever its numbers")
+        parts.append("the simulator cannot reproduce the observations with any numbers")
     where = f"Between {result.labels[0]} {result.source} and {result.labels[1]} {result.target}"
     return f"{where}, " + "; ".join(part for part in parts if part) + "."
 
@@ -202,9 +202,9 @@ def _verdict_of(result: GapResult) -> str:
 def _size(result: GapResult) -> str:
     rms, level = result.rms, result.level
     if rms.estimate is None:
-        return "the size of the gap cannot be told" + _side_if_any(level)
+        return "the size of the gap is unknown" + _side_if_any(level)
     if rms.high is None:
-        return f"the transfer gap is {rms.estimate:.3f} RMS, of too few controllers to say how sure that is"
+        return f"the transfer gap is {rms.estimate:.3f} RMS, from too few controllers for an interval"
     if not result.excludes_no_gap:
         return f"no gap is shown (RMS at most {rms.high:.3f})"
     side = _side(level)

@@ -1,4 +1,4 @@
-"""What one platform shows of controllers that were tried on it again and again."""
+"""Repeated trials of controllers on one platform."""
 
 from __future__ import annotations
 

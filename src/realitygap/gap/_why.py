@@ -1,4 +1,4 @@
-"""How much of a gap each part of the model carries."""
+"""The share of a gap that each part of the model explains."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST = 1_024  # controllers that `realitygap gap` takes
 
 @dataclass(frozen=True)
 class Why:
-    """What each part of the model carries of the fall of the RMS gap when the fit takes the default's place.
+    """The share of each part of the model in the fall of the RMS gap from the defaults to the fit.
 
     Attributes:
         parts: Names of the parts.
@@ -46,28 +46,28 @@ class Why:
 
     @property
     def advice(self) -> str:
-        """What to change next, in a sentence or two."""
+        """Advice on the next change, in a sentence or two."""
         if self.after.low is None:
-            return f"What to change next cannot be said: {self.after.refused}"
+            return f"No advice on the next change: {self.after.refused}"
         left = (
-            f" What is left with the whole fit, {self.after} RMS, lies outside these numbers."
+            f" The rest with the whole fit, {self.after} RMS, is outside these numbers."
             if self.after.low > 0
             else " With the whole fit no gap is shown."
         )
         first = self.order[0]
         fall = self.falls[first]
         if (fall.estimate or 0.0) <= 0:
-            return f"Change this next: nothing that was fitted, which makes the gap no smaller.{left}"
+            return f"Change this next: none of the fitted parts, because none reduces the gap.{left}"
         if (self.change.low or 0.0) > 0:
             return (
-                "Change this next: what was fitted. All of it together makes the gap larger, "
-                f"{self.after} RMS in place of {self.before}: try what it was fitted to again, before any part of it."
+                f"Change this next: the fit. It makes the gap larger, {self.after} RMS instead of "
+                f"{self.before}. Check the trials that it was fitted to before any part of it."
             )
         if (self.change.high or 0.0) >= 0:
-            left = " All of the fit together is not shown to make it smaller."
-        sure = "" if (fall.low or 0.0) > 0 else f"; that is not shown to be more than chance, {_would(fall)}"
+            left = " The whole fit is not shown to reduce the gap."
+        sure = "" if (fall.low or 0.0) > 0 else f"; this may be chance ({_would(fall)})"
         return (
-            f"Change this next: {self.parts[first]}, which carries most, {fall} of the RMS gap of "
+            f"Change this next: {self.parts[first]}, which explains most, {fall} of the RMS gap of "
             f"{self.before.estimate:.3f}{sure}.{left}"
         )
 
@@ -84,16 +84,16 @@ class Why:
 
 
 def _would(fall: Estimate) -> str:
-    """How many controllers would show a fall of this size: intervals shrink with the root of their number.
+    """Return the number of controllers that would show a fall of this size: intervals shrink with its root.
 
     As far as the fit is sure: what its draws differ by does not shrink with controllers.
     """
     if not fall.estimate or fall.low is None:
-        return "more controllers would"
+        return "more controllers are needed"
     n = max(int(np.ceil(fall.n * ((fall.estimate - fall.low) / fall.estimate) ** 2)), fall.n + 1)
     if n > MOST:
-        return f"and it would take more than {MOST:,} controllers"
-    return f"some {n} controllers would, where the fit is sure enough"
+        return f"more than {MOST:,} controllers are needed to show it"
+    return f"about {n} controllers would show it, if the fit is precise enough"
 
 
 def explain_gap(
@@ -159,5 +159,11 @@ def _estimate(value: float, drawn: Values, n: int) -> Estimate:
 def _with_ends(value: float, ends: tuple[float, float] | tuple[None, None], n: int) -> Estimate:
     low, high = ends
     if low is None or high is None:
-        return Estimate(float(value), None, None, n, f"{n} controllers give no interval; 5 would.")
+        return Estimate(
+            float(value),
+            None,
+            None,
+            n,
+            f"{n} controllers are too few for an interval; at least 5 are needed.",
+        )
     return Estimate(float(value), min(low, float(value)), max(high, float(value)), n)

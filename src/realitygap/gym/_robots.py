@@ -215,9 +215,7 @@ def task_robots(
         raise ValueError(f"arena.robots is {place.n_robots}, expected 1: an environment has one robot.")
     declared = _made("controller", ControllerSettings, controller)
     if declared.inputs and "inputs" in settings:
-        raise ValueError(
-            "task.inputs and controller.inputs both say what is observed. Leave task.inputs out."
-        )
+        raise ValueError("task.inputs and controller.inputs both define the inputs. Leave task.inputs out.")
     names: tuple[str, ...] = PAPER_INPUTS
     if declared.inputs:
         names = declared.inputs

@@ -139,7 +139,7 @@ def entered(field: Field, text: str) -> Any:
         expected = {"whole": "a whole number", "number": "a number", "yes-no": "true or false"}.get(
             field.kind, 'a value as study files have it, such as [1, 2] or "text"'
         )
-        raise ValueError(f"{field.place}: expected {expected}, came {text!r}.") from None
+        raise ValueError(f"{field.place}: expected {expected}, got {text!r}.") from None
 
 
 def written_form(data: Mapping[str, Any]) -> str:

@@ -108,7 +108,7 @@ def _check(trial: TrialRecord, robot: RobotModel, out: Path, wheel_diameter_mm: 
         raise ValueError(f"wheel_diameter_mm is {wheel_diameter_mm!r}, expected a length above 0.")
     refuse_results(out)
     if out.exists() or out.is_symlink():
-        raise LogError(f"{out} is there already. Name a bag that is not.")
+        raise LogError(f"{out} exists already. Name a bag that is not.")
     if not len(trial.commands):
         raise LogError(f"Trial {trial.number} has no command, expected one that was driven.")
     n = trial.readings.shape[1]

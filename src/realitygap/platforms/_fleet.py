@@ -1,4 +1,4 @@
-"""What the environments ask of a platform's robots, all at the same step of their trials."""
+"""The interface between environments and a platform's robots, all at the same step of their trials."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class Platform(PlatformSettings):
             robot.close()
             raise StudyError(
                 f"A robot of platform {self.name!r} does not know its pose: expected an attribute `pose`, or "
-                "is_physical = True, so that somebody places it and reports the cells that it crossed."
+                "is_physical = True, so that an operator places it and reports the crossed cells."
             )
         return robot if hasattr(robot, "visited_cells") else FollowedRobot(robot, arena)
 
@@ -141,8 +141,8 @@ class Platform(PlatformSettings):
             remote.hold()  # before its robot is spoken to: somebody may have left it driving, faster than it answers
             return WitnessObserver(remote)
         raise StudyError(
-            f"Who places the robot of {how.name} and says what it drew? Name the witness of an emulator (HOST:PORT, "
-            "from realitygap emulate --witness PORT), or give an observer."
+            f"No operator places the robot of {how.name} and reports its cells. Name the witness of an "
+            "emulator (HOST:PORT, from realitygap emulate --witness PORT), or give an observer."
         )
 
     def prepare(

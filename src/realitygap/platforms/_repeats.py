@@ -1,4 +1,4 @@
-"""Networks tried again and again, each on noise of its own."""
+"""Repeated trials of networks, each with its own noise."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def retry_genomes(
     inputs: Sequence[str] | None = None,
     partners: Sequence[Sequence[Genome]] = (),
 ) -> TrialBatch:
-    """Try each of n genomes once for each number in `repeats`, r in all.
+    """Try each of n genomes once for each number in `repeats`, with a total of r trials each.
 
     Args:
         platform: The robot as simulated.

@@ -217,7 +217,7 @@ class SimTarget(RepeatableTarget):
         return made
 
     def _wheels(self, plan: TrialPlan, commands: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What encoders say of a trial: it is driven again by the commands that it had."""
+        """Return the encoders of a trial, from a simulation of its commands."""
         if RobotObserver(self._robot).wheels() is None:
             return np.empty((0, 2))
         return self._command(replace(plan, genome=None, commands=commands), "encoders").wheels

@@ -96,7 +96,7 @@ def save_movie(
             f"{len(listed)} trials to show together, expected at most {MOST_TRIALS}, one a pen. Choose some of them."
         )
     if not (math.isfinite(speed) and 0.01 <= speed <= 100):
-        raise ValueError(f"speed is {speed:g}, expected a number from 0.01 to 100; 1 is as fast as it was.")
+        raise ValueError(f"speed is {speed:g}, expected a number from 0.01 to 100; 1 is the original speed.")
     if not 240 <= width <= 1920:
         raise ValueError(f"width is {width}, expected 240 to 1920 pixels.")
     if path.suffix.lower() not in ENDINGS:

@@ -59,7 +59,7 @@ def write_checkpoint(
 
 
 def read_checkpoint(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
-    """What `write_checkpoint` wrote: the values and the arrays.
+    """Read the values and the arrays that `write_checkpoint` wrote.
 
     Raises:
         RecordError: there is no such file, it is cut off or damaged, or it is none of this kind.
@@ -114,7 +114,7 @@ def _arrays(data: bytes) -> dict[str, npt.NDArray[Any]]:
             }[version]
             shape, _, dtype = read_header(stream)
             if math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
-                raise ValueError(f"{member.filename[:60]!r} in it is not of the size that it says")
+                raise ValueError(f"{member.filename[:60]!r} in it does not have its stated size")
             stream.seek(0)
             name = member.filename.removesuffix(".npy")
             arrays[name] = np.lib.format.read_array(stream, allow_pickle=False)
@@ -128,6 +128,6 @@ def _check(path: Path, kind: str, about: Any) -> None:
         if about.get(name) != expected:
             raise RecordVersionError(
                 f"{path} was written by realitygap {about.get('software')} with {name.replace('_', ' ')} "
-                f"{about.get(name)}, expected {expected}: it would go on with other numbers. Use the version that "
-                "wrote it."
+                f"{about.get(name)}, expected {expected}: it would continue with other numbers. Use the "
+                "version that wrote it."
             )

@@ -31,13 +31,13 @@ _NAME = re.compile(
 )
 
 _AGAIN = (
-    "Move it elsewhere or delete it, then run the same command again: only its replicates are computed anew."
+    "Move it elsewhere or delete it, then run the same command again: only its replicates are recomputed."
 )
 
 
 @dataclass(frozen=True)
 class ChunkName:
-    """What a chunk's file name says."""
+    """The content of a chunk's file name."""
 
     condition: str
     first: int
@@ -176,8 +176,8 @@ def _open(path: Path) -> tuple[Chunk, bytes]:
     name = ChunkName.parse(path.name)
     if name is None or name != ChunkName(chunk.condition, chunk.first, chunk.last):
         raise RecordError(
-            f"{path} holds replicates {chunk.first} to {chunk.last} of condition {chunk.condition!r}, "
-            f"which is not what its name says. Was it renamed? {_AGAIN}"
+            f"{path} holds replicates {chunk.first} to {chunk.last} of condition {chunk.condition!r}, but its "
+            f"name differs. Was it renamed? {_AGAIN}"
         )
     return chunk, sealed
 
@@ -208,7 +208,7 @@ def _decode(chunk: Chunk, sealed: bytes, columns: Sequence[str] | None) -> pl.Da
 
 @contextlib.contextmanager
 def _decoding(path: Path) -> Iterator[None]:
-    """What the decoder says against an intact file: it can only be about versions."""
+    """Raise the decoder's errors about an intact file as errors about versions."""
     try:
         yield
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
@@ -236,7 +236,7 @@ def _read_checked(chunk: Chunk, sealed: bytes) -> tuple[pl.DataFrame, list[Strea
 
 @contextlib.contextmanager
 def _checking(path: Path) -> Iterator[None]:
-    """Refuse rows that realitygap never publishes: whoever made them sealed them, too."""
+    """Refuse rows that realitygap never publishes, even with a valid seal."""
     try:
         yield
     except ValueError as error:

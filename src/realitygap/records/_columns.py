@@ -1,4 +1,4 @@
-"""What a row of a simulated study holds: the columns of every frame, with their types, units and meaning."""
+"""The columns of a simulated study, with their types, units, and meaning."""
 
 from __future__ import annotations
 

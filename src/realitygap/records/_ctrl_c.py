@@ -1,4 +1,4 @@
-"""Ctrl-C wakes whoever waits."""
+"""Wake waiting threads at Ctrl-C."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _lineage(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def parent_rows(rows: pl.DataFrame) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n,) and (n,): for each row the rows of its first and second parent; -1 where there is none.
+    """Return for each row the rows of its first and second parent, (n,) and (n,), -1 without parent.
 
     Args:
         rows: of whole runs in key order, with individual, generation and parents.

@@ -67,8 +67,7 @@ class Description:
         version: Any = document.get("results_version")
         if document.get("sha256") != _sha256(study, version):
             raise RecordError(
-                f"{path} is not as it was written: it was edited or damaged. "
-                "Restore it from a copy, or move the whole folder elsewhere."
+                f"{path} was edited or damaged. Restore it from a copy, or move the whole folder elsewhere."
             )
         return cls(study, version)
 

@@ -1,4 +1,4 @@
-"""Writing files so that a crash leaves the old file or the new one, and at worst a temporary file beside."""
+"""Write files so that a crash leaves the old file or the new one, and at worst an extra temporary file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_FOLDER_SYNC = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EBADF}
 
 
 def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
-    """Write `data` beside `path`, sync it, rename it into place and sync the folder.
+    """Write `data` to a temporary file, sync it, rename it to `path`, and sync the folder.
 
     Args:
         path: the file to make; its folder must exist.
@@ -88,8 +88,8 @@ def writing(path: Path) -> Iterator[None]:
         else:
             advice = "When that is put right,"
         raise RecordError(
-            f"Could not write {path}: {error.strerror or error}. Everything published before is safe. "
-            f"{advice} run the same command again: it goes on with what is missing."
+            f"Could not write {path}: {error.strerror or error}. Everything published before is safe. {advice} "
+            "run the same command again to resume."
         ) from error
 
 

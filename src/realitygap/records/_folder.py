@@ -93,7 +93,7 @@ class ResultsFolder(PublishedResults):
             if lost:
                 raise RecordError(
                     f"{self._path} holds trials of {listed(lost)}, which the new description does not list. "
-                    "List them, or start anew (--fresh, or another folder)."
+                    "List them, or restart (--fresh, or another folder)."
                 )
             new.write(self._path / DESCRIPTION_NAME)
             self._description = new
@@ -248,9 +248,7 @@ class ResultsFolder(PublishedResults):
             with reading(path):
                 check_ends(path)
         except BrokenSeal as error:
-            raise RecordError(
-                f"{path} {error}. Run the same command again: it goes on with what is missing."
-            ) from None
+            raise RecordError(f"{path} {error}. Run the same command again to resume.") from None
         with writing(self._trials / str(name)):
             path.rename(self._trials / str(name))
         self._names_published().add(name)
@@ -282,8 +280,8 @@ class ResultsFolder(PublishedResults):
     def _refuse_unless_empty(self) -> None:
         if (self._path / DESCRIPTION_NAME).exists():
             raise RecordError(
-                f"{self._path} holds the results of a study already. Go on with it, start anew (--fresh), "
-                "or name another folder."
+                f"{self._path} already has the results of a study. Resume it, restart (--fresh), or name "
+                "another folder."
             )
         with reading(self._path):
             found = sorted(entry.name for entry in self._path.iterdir() if not is_trace(entry))
@@ -295,8 +293,8 @@ class ResultsFolder(PublishedResults):
     def _refuse_other_version(self) -> None:
         if self.version_note is not None:
             raise RecordVersionError(
-                f"{self.version_note} They are not extended, so that versions do not mix. "
-                "Start anew with --fresh, or name another folder."
+                f"{self.version_note} They are not extended, because versions must not mix. Restart with "
+                "--fresh, or name another folder."
             )
 
     def _refuse_overlap(self, name: ChunkName, condition_hash: str) -> None:
@@ -310,12 +308,12 @@ class ResultsFolder(PublishedResults):
         first = published.first(name.condition)
         if first is not None and self._load(first).condition_hash != condition_hash:
             raise RecordError(
-                f"{self._path} holds trials of condition {name.condition!r} with other settings. "
-                "Start anew (--fresh), name another folder, or give the condition another name."
+                f"{self._path} holds trials of condition {name.condition!r} with other settings. Restart "
+                "(--fresh), name another folder, or give the condition another name."
             )
 
     def _names_published(self) -> PublishedNames:
-        """What is published, listed once after the lock was taken: nobody else publishes while it is held."""
+        """Return the published names, listed once after locking: no other process publishes meanwhile."""
         if self._published is None:
             self._published = PublishedNames(self._names())
         return self._published

@@ -41,7 +41,7 @@ class Delivery:
 
     @property
     def name(self) -> ChunkName:
-        """What its file is named after."""
+        """The stem of its file name."""
         return ChunkName(self.condition, self.first, self.first + self.n_runs - 1)
 
 

@@ -157,8 +157,8 @@ class Ledger(LedgerReader):
             ]
             if others:
                 raise LedgerError(
-                    f"Other cells of trials {others} were entered while the generation was being closed; it stays "
-                    "open, and all that was entered is kept. Run the same command again."
+                    f"Other cells of trials {others} were entered while the generation was being closed; it "
+                    "stays open, and all entries are saved. Run the same command again."
                 )
             changed = self._count(
                 "UPDATE generations SET closed = ? WHERE condition = ? AND replicate = ? AND generation = ? AND "
@@ -231,7 +231,7 @@ class Ledger(LedgerReader):
                 self._score(number, score, role)
 
     def undo(self, number: int) -> None:
-        """Take back the score of a trial whose generation is not closed, so that it can be entered anew."""
+        """Withdraw the score of a trial whose generation is not closed, so that a new one can be entered."""
         with self._writing():
             self._refuse_closed(self._require(number, "scored"))
             self._run(
@@ -255,7 +255,7 @@ class Ledger(LedgerReader):
     def note(self, text: str, who: str, number: int | None = None) -> None:
         """A remark, of a trial or of the whole."""
         if not text.strip():
-            raise LedgerError("A note without a word was not taken. Say something.")
+            raise LedgerError("An empty note was not saved. Enter a text.")
         with self._writing():
             if number is not None:
                 self.trial(number)
@@ -283,7 +283,7 @@ class Ledger(LedgerReader):
         self._connection.execute("COMMIT")
 
     def _run(self, command: str, *values: Any) -> int:
-        """Carry out a command; the number of the row that it inserted."""
+        """Run a command. Return the number of the inserted row."""
         return int(self._connection.execute(command, values).lastrowid or 0)
 
     def _insert_trial(self, turn: Turn, attempt: int, place: int | None = None) -> int:
@@ -334,12 +334,13 @@ class Ledger(LedgerReader):
             trial = self._require(number, "driven", "scored")
             if role == "correction" and not trial.is_closed:
                 raise LedgerError(
-                    f"The generation of trial {number} is not closed yet: take its score back (undo) and enter it anew."
+                    f"The generation of trial {number} is not closed yet: withdraw its score (undo) and enter "
+                    "a new one."
                 )
             if role == "second" and score.who in self._counters(number):
                 raise LedgerError(
-                    f"{score.who!r} has counted the cells of trial {number} already, and a second count is another "
-                    "person's. Say who that is (--who NAME). Nothing was entered."
+                    f"{score.who!r} already counted the cells of trial {number}. A second count must be by "
+                    "another person: name them (--who NAME). Nothing was entered."
                 )
         self._run(
             "INSERT INTO scores (trial, cells, n_ends, path, role, who, time) VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -384,7 +385,7 @@ class Ledger(LedgerReader):
             )
         if not unique:
             raise LedgerError(
-                "No cell was named: the line crosses at least the one it starts in. Nothing was entered."
+                "No cell was entered: the line crosses at least the cell of the start. Nothing was saved."
             )
         return unique
 

@@ -165,13 +165,13 @@ BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
 
 
 def ledger_tables() -> dict[str, str]:
-    """What SQLite is told of each table, with a remark on each column that needs one."""
+    """Return the SQL of each table, with remarks on columns that need one."""
     parts = [part.strip() + ";" for part in TABLES.split(";\n") if part.strip()]
     return {part.split()[2]: part for part in parts}
 
 
 def create_file(path: Path) -> None:
-    """Make an empty ledger; beside its place first, so that the place never holds half of one.
+    """Make an empty ledger in a temporary file first, so that its path never has an incomplete one.
 
     Raises:
         LedgerError: something is there, or it cannot be written.
@@ -182,7 +182,7 @@ def create_file(path: Path) -> None:
     try:
         with speaking(path):
             if path.exists():
-                raise LedgerError(f"{path} is there already; a ledger is never replaced.")
+                raise LedgerError(f"{path} exists already; a ledger is never replaced.")
             connection = sqlite3.connect(temporary, isolation_level=None)
             try:
                 connection.executescript(
@@ -232,7 +232,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
 
 
 def _address(path: Path, *, writable: bool) -> str:
-    """How SQLite is to open it; a finished ledger on a medium that cannot be written has no files beside it."""
+    """Return the address for SQLite; a complete ledger on a read-only medium has no extra files."""
     if writable:
         return path.resolve().as_uri() + "?mode=rw"
     is_alone = not path.with_name(path.name + "-wal").exists()
@@ -246,8 +246,8 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application != _APPLICATION:
         raise LedgerError(
-            f"{path} is {'empty' if not path.stat().st_size else 'not a ledger of realitygap'}, and was left as it "
-            "is. Restore the ledger from a copy, or move the file elsewhere."
+            f"{path} is {'empty' if not path.stat().st_size else 'not a ledger of realitygap'}, and was not "
+            "changed. Restore the ledger from a copy, or move the file elsewhere."
         )
     if version != LEDGER_FORMAT:
         raise RecordVersionError(
@@ -299,8 +299,8 @@ def _types() -> dict[str, dict[str, str]]:
 
 def _torn(path: Path, said: str) -> str:
     return (
-        f"{path} is torn ({said.strip()}), and was left as it is. Restore it, with the files {path.name}-wal and "
-        f"{path.name}-shm beside it, from a copy; `sqlite3 {path} .recover` saves what can still be read."
+        f"{path} is torn ({said.strip()}), and was not changed. Restore it, with the files {path.name}-wal and "
+        f"{path.name}-shm next to it, from a copy; `sqlite3 {path} .recover` saves the readable part."
     )
 
 
@@ -325,7 +325,7 @@ def speaking(path: Path) -> Iterator[None]:
         ) from error
     except OSError as error:
         raise LedgerError(
-            f"Could not write {path}: {error.strerror or error}. What was written before is safe."
+            f"Could not write {path}: {error.strerror or error}. Earlier data are safe."
         ) from error
 
 
@@ -339,8 +339,8 @@ def _explain(path: Path, error: sqlite3.OperationalError) -> str:
         )
     if name.startswith(("SQLITE_FULL", "SQLITE_IOERR")):
         return (
-            f"Could not write {path}: {error}. {safe}. Make room there (the disk, a quota or a limit on file sizes is "
-            "full), then run the same command again: it goes on where it stopped."
+            f"Could not write {path}: {error}. {safe}. Make room there (the disk, a quota or a limit on file "
+            "sizes is full), then run the same command again to resume."
         )
     if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
         return f"Could not write {path}: {error}. {safe}. Make the folder writable for this account."

@@ -1,4 +1,4 @@
-"""What a ledger of physical trials is told and tells: individuals, turns, trials, steps and scores."""
+"""The records of a ledger of physical trials: individuals, turns, trials, steps, and scores."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class PhotoCount:
-    """The photograph that cells were read from, for somebody to confirm.
+    """The photograph from which cells were read, for an operator to confirm.
 
     Attributes:
         file: its name.
@@ -129,7 +129,7 @@ ROBOT = "robot"
 
 @dataclass(frozen=True)
 class Score:
-    """Cells as somebody entered them, or as an emulator's witness saw them.
+    """Cells as an operator entered them, or as an emulator's witness recorded them.
 
     Attributes:
         cells: crossed by the line, columns * row + column; none if `who` is `ROBOT`.

@@ -32,7 +32,7 @@ FROM trials JOIN generations USING (condition, replicate, generation)
 
 
 class LedgerReader(ClosedOnExit):
-    """What a ledger of physical trials says.
+    """A reader of a ledger of physical trials.
 
     Raises:
         LedgerError: from any method: the file is torn, foreign, locked, or has no such trial.
@@ -81,7 +81,7 @@ class LedgerReader(ClosedOnExit):
         return [self._decoded(row, "robot", "preflight") for row in rows]
 
     def robots(self) -> list[dict[str, str]]:
-        """What each robot that drove a trial was told by, every one once, oldest first."""
+        """The identity of each robot that drove a trial, without repeats, oldest first."""
         rows = self._all(
             "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
         )
@@ -215,7 +215,7 @@ class LedgerReader(ClosedOnExit):
     # inside
 
     def _count(self, command: str, *values: Any) -> int:
-        """Carry out a command; how many rows it changed."""
+        """Run a command. Return the number of changed rows."""
         return self._connection.execute(command, values).rowcount
 
     def _one(self, query: str, *values: Any) -> sqlite3.Row | None:

@@ -1,4 +1,4 @@
-"""The log beside the results: times, hosts and speeds, one JSON object a line, outside the digest.
+"""The log of a study: times, hosts, and speeds, one JSON object per line, outside the digest.
 
 A log that cannot be written never stops a run, since no number depends on it, and never goes unmentioned: the
 caller gets a `RecordWarning`, and the next line that can be written follows as if nothing had happened.

@@ -34,7 +34,7 @@ _WIDTHS = {"commands": 2, "wheels": 2, "poses": 3}
 
 @dataclass(frozen=True)
 class ObservationsHead:
-    """What all trials of a file have in common.
+    """The common head of all trials of a file.
 
     Attributes:
         target: On which platform, as the user named it.
@@ -204,7 +204,7 @@ class ObservationsFile(ClosedOnExit):
             raise self._cannot(error) from error
 
     def _take_up(self) -> int:
-        """How many bytes of what is there are kept."""
+        """Return the number of existing bytes to keep."""
         if not self.path.exists():
             return 0
         with reading(self.path):
@@ -220,7 +220,7 @@ class ObservationsFile(ClosedOnExit):
         if other:
             what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
             raise RecordError(
-                f"{self.path} has trials of something else: {what}. They are not put together. Name another file."
+                f"{self.path} has trials of another kind: {what}. They cannot be combined. Name another file."
             )
         self.trials, self.problem = found.trials, found.problem
         for trial in found.under_way:
@@ -247,8 +247,8 @@ class ObservationsFile(ClosedOnExit):
 
     def _cannot(self, error: OSError) -> RecordError:
         return RecordError(
-            f"Could not write {self.path}: {error.strerror or error}. What was kept before is safe. Make room, or name "
-            "a file that can be written."
+            f"Could not write {self.path}: {error.strerror or error}. Earlier trials are safe. Make room, or "
+            "name a file that can be written."
         )
 
     def close(self) -> None:
@@ -257,7 +257,7 @@ class ObservationsFile(ClosedOnExit):
 
 
 def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[TrialRecord]) -> None:
-    """Write trials into a file of their own, whole; one that is there is replaced.
+    """Write trials into a new file; an existing one is replaced.
 
     Raises:
         RecordError: It cannot be written.
@@ -289,7 +289,7 @@ def read_observations(path: Path | str) -> Observations:
 
 
 def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
-    """What a file holds, and how many of its bytes."""
+    """Return the content of a file, and the number of its bytes that are complete."""
     first, newline, rest = data.partition(b"\n")
     head = _head(path, first)
     trials: list[TrialRecord] = []
@@ -344,7 +344,7 @@ def _head(path: Path, line: bytes) -> ObservationsHead:
         values = {}
     if values.get("format") != OBSERVATIONS_FORMAT:
         raise RecordError(
-            f"{path} is no file of observed trials, or of another version: its first line does not say "
+            f"{path} is not a file of observed trials, or of another version: its first line does not say "
             f"{OBSERVATIONS_FORMAT!r}. Name one that this realitygap ({__version__}) wrote."
         )
     values.setdefault("identity", "")

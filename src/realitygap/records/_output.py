@@ -1,4 +1,4 @@
-"""Files beside the results, such as a report or a track: written whole, and never over the results themselves."""
+"""Files outside the results, such as a report or a track: written whole, and never over results."""
 
 from __future__ import annotations
 
@@ -25,13 +25,11 @@ def refuse_results(path: Path) -> None:
     """
     place = path.resolve()
     if place.parent.name.casefold() == TRIALS_NAME and _holds_results(place.parent.parent):
-        raise RecordError(
-            f"{path} is where a study keeps its trials; nothing was written. Name a file elsewhere."
-        )
+        raise RecordError(f"{path} is in a folder of a study; nothing was written. Name a file elsewhere.")
     name = place.name.casefold()
     if (name in _OWN_NAMES or name.startswith(LEDGER_NAME)) and _holds_results(place.parent):
         raise RecordError(
-            f"{path} is part of a study's results, and stays as it is; nothing was written. Name another file."
+            f"{path} is part of a study's results and was not changed; nothing was written. Name another file."
         )
 
 
@@ -41,7 +39,7 @@ def is_special(path: Path) -> bool:
 
 
 def write_whole(path: Path, data: bytes | Iterable[bytes], *, within: Path | None = None) -> None:
-    """Write a file beside its place and rename it, so that the place holds the old file or the new one.
+    """Write a temporary file and rename it, so that the path has the old file or the new one.
 
     Args:
         path: The file. If the user named it, a link stays and what it leads to is written, and a terminal, a device or

@@ -1,4 +1,4 @@
-"""What is published in a folder, kept in memory while its lock is held."""
+"""The published chunks of a folder, listed in memory while it is locked."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class PublishedNames:
             self.add(name)
 
     def first(self, condition: str) -> ChunkName | None:
-        """The first chunk of a condition; None where there is none."""
+        """Return the first chunk of a condition, or None."""
         names = self._of.get(condition)
         return names[0] if names else None
 
     def overlapping(self, name: ChunkName) -> ChunkName | None:
-        """A published chunk that has a replicate of `name`'s; None where there is none."""
+        """Return a published chunk that shares a replicate with `name`, or None."""
         names = self._of.get(name.condition, [])
         place = bisect.bisect_right(names, name.last, key=_first)
         return names[place - 1] if place and names[place - 1].last >= name.first else None

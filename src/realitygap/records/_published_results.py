@@ -1,4 +1,4 @@
-"""The results of one study, read: what was published in a folder, whole, whoever writes there."""
+"""The published results of one study, readable while another process writes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 
 class PublishedResults:
-    """What was published in a folder of results: `study.json`, `trials/*.parquet`, `log.jsonl`, `ledger.sqlite`.
+    """Published results of a folder: `study.json`, `trials/*.parquet`, `log.jsonl`, `ledger.sqlite`.
 
     The rows of conditions that a robot drove come out of the ledger, those of complete runs, beside the others'.
     """
@@ -142,8 +142,8 @@ class PublishedResults:
         if n_runs is None or n_there >= n_runs:
             return None
         return (
-            f"{n_there:,} of {n_runs:,} runs are there, and the digest is theirs alone. The command that ran the study "
-            "goes on with what is missing."
+            f"{n_there:,} of {n_runs:,} runs exist, and the digest is of these only. To run the others, repeat "
+            "the command that ran the study."
         )
 
     def count_runs(self) -> tuple[int, int | None]:
@@ -372,7 +372,7 @@ class PublishedResults:
     # inside
 
     def _names(self, condition: str | None = None) -> list[ChunkName]:
-        """What is published, by name and in key order, after all that names can tell was checked."""
+        """Return the published chunks, by name and in key order, after all checks of names."""
         names = list_chunks(self._trials)
         if not {name.condition for name in names} <= set(self.conditions):
             # another process may have extended the study since it was read here
@@ -487,15 +487,14 @@ class PublishedResults:
         for chunk in chunks:
             if chunk.results_version != self.results_version:
                 raise RecordVersionError(
-                    f"{chunk.path} was computed by results version {chunk.results_version}, "
-                    f"{DESCRIPTION_NAME} says {self.results_version}. "
-                    "Move it elsewhere or delete it, or start anew (--fresh)."
+                    f"{chunk.path} was computed by results version {chunk.results_version}, {DESCRIPTION_NAME} "
+                    f"says {self.results_version}. Move it elsewhere or delete it, or restart (--fresh)."
                 )
             first = first_of.setdefault(chunk.condition, chunk)
             if chunk.condition_hash != first.condition_hash:
                 raise RecordError(
                     f"{chunk.path} and {first.path.name} come from two different settings of condition "
-                    f"{chunk.condition!r}. Move one of them elsewhere, or start anew (--fresh)."
+                    f"{chunk.condition!r}. Move one of them elsewhere, or restart (--fresh)."
                 )
 
     def _check_known(self, condition: str) -> None:

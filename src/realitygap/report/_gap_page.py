@@ -125,7 +125,7 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
     ]
     if result.misspecified is not None:
         says = "cannot" if result.misspecified else "can"
-        facts.append(("Model", f"The simulator {says} make what was observed when it was calibrated."))
+        facts.append(("Model", f"The simulator {says} reproduce the observations of its calibration."))
     return facts + [("Note", note) for note in result.notes]
 
 

@@ -140,7 +140,7 @@ def _several(
     given = {"condition": condition, "generation": generation, "individual": individual}
     named = [name for name in _SURPLUS[each] if given[name] is not None]
     if named:
-        raise ValueError(f"Of no meaning with each {each!r}: {', '.join(named)}. Leave that out.")
+        raise ValueError(f"Not for each {each!r}: {', '.join(named)}. Leave that out.")
     if each == "condition":
         names = list(dict.fromkeys(tally.runs["condition"].to_list()))[:_MOST]
         trials = [choose_trial(tally, name, replicate) for name in names]

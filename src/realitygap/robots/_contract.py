@@ -110,5 +110,5 @@ def check_command(command: Command) -> Command:
     """
     for part, value in zip(("move", "turn"), command, strict=True):
         if not -1.0 <= value <= 1.0:
-            raise ValueError(f"{part} is {value!r}, expected a number from -1 to 1. The robot was not told.")
+            raise ValueError(f"{part} is {value!r}, expected a number from -1 to 1. No command was sent.")
     return Command(float(command[0]), float(command[1]))

@@ -43,7 +43,7 @@ class RecordedRobot(ProgramRobot):
         self.step_s = float(header["step_s"])
         self.n_sensors = int(header["n_sensors"])
         self.clock = VirtualClock()
-        self._closed = f"{recording.path} is closed: open the recording anew."
+        self._closed = f"{recording.path} is closed. Reopen the recording."
         self._lines = [line for line in recording.lines if line["kind"] != "wire" and line["name"] != "stop"]
         values = [line.get("values", {}) for line in self._lines if line["name"] == "observe"]
         self.channels = tuple(values[0].get("channels", {})) if values else ()

@@ -30,7 +30,7 @@ UNITS = {
     "t": "s since the recording began, by the robot's clock",
     "took_s": "s from sending a command until its answer was complete",
     "move, turn": "-1 to 1",
-    "readings": "0 (nothing seen) to 1 (as near as can be told)",
+    "readings": "0 (nothing detected) to 1 (as near as measurable)",
     "raw": "as the robot sends it",
     "sent, answered": "bytes in hexadecimal, answers with their echo",
 }
@@ -74,7 +74,7 @@ class Recorder:
             self._file = self.path.open("xb", buffering=0)
         except FileExistsError as error:
             raise RecordError(
-                f"{path} is there already; a recording never overwrites one. Name another file."
+                f"{path} exists already; a recording never overwrites one. Name another file."
             ) from error
         except OSError as error:
             raise RecordError(
@@ -134,11 +134,11 @@ class Recorder:
         except OSError as error:
             self._is_broken = True
             raise RecordError(
-                f"Could not write {self.path}: {error.strerror or error}. What was recorded before is safe."
+                f"Could not write {self.path}: {error.strerror or error}. Earlier records are safe."
             ) from error
         if n_written != len(data):
             self._is_broken = True
-            raise RecordError(f"Could not write {self.path}: it is full. What was recorded before is safe.")
+            raise RecordError(f"Could not write {self.path}: it is full. Earlier records are safe.")
 
     def close(self) -> None:
         """Nothing more will be said."""
@@ -190,7 +190,7 @@ def read_recording(path: Path | str) -> Recording:
         [_line(path, number, text) for number, text in enumerate(whole.split(b"\n"), 1)] if newline else []
     )
     if not lines or lines[0].get("format") != FORMAT:
-        raise RecordError(f"{path} is no recording of a robot: its first line does not say '{FORMAT}'.")
+        raise RecordError(f"{path} is not a recording of a robot: its first line is not '{FORMAT}'.")
     if lines[0].get("version") != FORMAT_VERSION:
         raise RecordVersionError(
             f"{path} has version {lines[0].get('version')} of the format, expected {FORMAT_VERSION}. Read it with the "

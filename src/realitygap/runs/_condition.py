@@ -176,8 +176,8 @@ class Condition(Settings):
             )
         if self.is_physical and self.selection == "novelty":
             raise ValueError(
-                f"selection is 'novelty' with task {self.task_of_trials.name!r}, expected 'fitness' with platform "
-                f"{self.platform!r}: nobody counts the cells of its trials."
+                f"selection is 'novelty' with task {self.task_of_trials.name!r}, expected 'fitness' with "
+                f"platform {self.platform!r}: no observer counts the cells of its trials."
             )
         return self
 
@@ -190,8 +190,8 @@ class Condition(Settings):
     def _an_operator_can_score_it(self) -> Self:
         if self.is_physical and self.counted_cells != "line":
             raise ValueError(
-                f"task.cells is 'ends', expected 'line' with platform {self.platform!r}: on paper stands the line "
-                "that was driven, and not where steps end."
+                f"task.cells is 'ends', expected 'line' with platform {self.platform!r}: the paper shows the "
+                "driven line, not the ends of steps."
             )
         return self
 
@@ -208,8 +208,8 @@ class Condition(Settings):
             )
         if distance.needs_order and self.counted_cells != "line":
             raise ValueError(
-                f"novelty.distance is {distance.name!r}, which looks at the order of visits, expected task.cells "
-                f"'line' with it: of the cells at the ends of steps no order is kept."
+                f"novelty.distance is {distance.name!r}, which needs the order of visits, expected task.cells "
+                "'line': the order of the cells at the ends of steps is not recorded."
             )
         return self
 
@@ -220,8 +220,8 @@ class Condition(Settings):
         twice = [name for name in names if getattr(self.task, name) != fields[name].default]
         if self.controller.inputs and twice:
             raise ValueError(
-                f"task.{twice[0]} and controller.inputs both say what networks see. Leave task.{twice[0]} out: "
-                "controller.inputs names every input, bias included"
+                f"task.{twice[0]} and controller.inputs both define the inputs of networks. Leave "
+                f"task.{twice[0]} out: controller.inputs names every input, bias included"
             )
         return self
 
@@ -235,7 +235,9 @@ class Condition(Settings):
             )
         if robots == 1:
             if each:
-                raise ValueError("arena.networks is 'each', which goes with several robots. Set arena.robots")
+                raise ValueError(
+                    "arena.networks is 'each', which is only for several robots. Set arena.robots"
+                )
             return self
         if self.records_behavior:
             raise ValueError(
@@ -265,7 +267,7 @@ class Condition(Settings):
         if n_trials > MOST_TRIALS:
             raise ValueError(
                 f"population {self.neat.population:,} x generations {self.neat.generations:,} are {n_trials:,} "
-                f"trials a run, expected at most {MOST_TRIALS:,}: a run is held in memory until it is written"
+                f"trials a run, expected at most {MOST_TRIALS:,}: a run stays in memory until it is written"
             )
         return self
 
@@ -411,15 +413,13 @@ def _with_platform_of(values: dict[str, Any]) -> dict[str, Any]:
     """Return the values of a condition that is made with a platform, `on`, instead of a name."""
     on = values["on"]
     if not isinstance(on, Platform):
-        raise ValueError(
-            f"on: expected a platform with its settings, such as SimPlatform(), came {shown(on)}"
-        )
+        raise ValueError(f"on: expected a platform with its settings, such as SimPlatform(), got {shown(on)}")
     name = getattr(type(on), "name", None)
     if values.get("platform", name) != name:
         raise ValueError(f"platform is {values['platform']!r}, expected {name!r}, which `on` is")
     if name in platform_names() and type(on) is not platform_class(str(name)):
         raise ValueError(
-            f"on: expected {platform_class(str(name)).__name__} for {name!r}, came {type(on).__name__}"
+            f"on: expected {platform_class(str(name)).__name__} for {name!r}, got {type(on).__name__}"
         )
     return {"platform": name, "noise": on.default_noise, **values}
 

@@ -121,9 +121,10 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
             return rows
         if room == MOST_GENES and hidden_room == MOST_HIDDEN:
             raise OutgrownError(
-                f"Condition {condition.name!r}, replicates {first_replicate} to {first_replicate + n_runs - 1}: a "
-                f"genome grew beyond {MOST_GENES:,} connection genes or {MOST_HIDDEN:,} hidden nodes, the most there "
-                "is room for. Nothing of these runs is kept. Lower add_node and add_link, or run fewer generations."
+                f"Condition {condition.name!r}, replicates {first_replicate} to "
+                f"{first_replicate + n_runs - 1}: a genome grew beyond {MOST_GENES:,} connection genes or "
+                f"{MOST_HIDDEN:,} hidden nodes, the maximum. Nothing of these runs is saved. Lower add_node "
+                "and add_link, or run fewer generations."
             )
         room, hidden_room = min(2 * room, MOST_GENES), min(2 * hidden_room, MOST_HIDDEN)
 

@@ -1,4 +1,4 @@
-"""Studies: conditions x replicates, read from a file, carried out, taken up again."""
+"""Studies: conditions x replicates, read from a file, run, and resumed."""
 
 from realitygap.platforms import open_target
 

@@ -1,4 +1,4 @@
-"""How fast studies are on this machine."""
+"""The speed of studies on this machine."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
 
 
 def _share_without_trials(condition: Condition, rate: float, seconds: float) -> float:
-    """Of a run's time; from runs whose trials last one step."""
+    """Return the share of a run's time without its trials, from runs whose trials last one step."""
     steps = condition.on.steps
     short = condition.model_copy(update={"on": condition.on.model_copy(update={"steps": 1})})
     work = _run_work(short)
@@ -96,7 +96,7 @@ def _share_without_trials(condition: Condition, rate: float, seconds: float) -> 
 
 
 def _rates(work: Callable[[int], int], seconds: float) -> dict[str, float]:
-    """How much work is done a second, on one thread and on all; `work` gets the number of its call."""
+    """Return the work per second, on one thread and on all; `work` gets the number of its call."""
     work(0)
     threads = usable_processors()
     return {"per_core": _rate(work, 1, seconds), "all_cores": _rate(work, threads, seconds)}

@@ -74,7 +74,7 @@ def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
 def marks_of(
     arena: Arena, tag: RobotTag, lens: Path | None, corner_size: float | None, corner_inset: float | None
 ) -> Marks:
-    """What is known before a camera looks, by options.
+    """Return the marks that are known before a camera records, by options.
 
     Raises:
         VisionError: The lens cannot be read.

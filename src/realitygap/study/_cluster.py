@@ -48,7 +48,7 @@ class _UnderWay:
 
     @property
     def delivery(self) -> Delivery:
-        """What its worker leaves in the inbox."""
+        """The file that its worker writes to the inbox."""
         condition = self.task.condition
         return Delivery(condition.name, self.task.first, self.task.n_runs, condition.hash())
 
@@ -130,7 +130,7 @@ class Cluster:
         self._disconnect()
         if self.jobs is not None:
             raise ClusterError(f"The scheduler of the {self.name} jobs ended. {_GO_ON}")
-        listener.wait_for(f"the scheduler at {self.name}, which is gone")
+        listener.wait_for(f"the scheduler at {self.name}, which does not respond")
         until = time.monotonic() + GONE_S
         while True:
             try:
@@ -139,12 +139,12 @@ class Cluster:
             except ClusterError as error:
                 if time.monotonic() > until:
                     raise ClusterError(
-                        f"The scheduler at {self.name} has been gone for {GONE_S:.0f} s. {_GO_ON}"
+                        f"The scheduler at {self.name} has not responded for {GONE_S:.0f} s. {_GO_ON}"
                     ) from error
                 time.sleep(0.2)
 
 
-_GO_ON = "Everything published is safe; the same command goes on where it stopped."
+_GO_ON = "Published runs are saved. Run the same command to resume."
 
 
 class _Sitting:
@@ -221,7 +221,7 @@ class _Sitting:
         each.future.add_done_callback(lambda _: self._ended.put(key))
 
     def _some_ended(self) -> list[_UnderWay]:
-        """What has ended, with or without a result; waits for it a moment."""
+        """Return the tasks that ended, with or without a result, after a short wait."""
         ended: list[_UnderWay] = []
         with contextlib.suppress(queue.Empty):
             key = self._ended.get(timeout=0.2)
@@ -261,9 +261,9 @@ class _Sitting:
             )
         if isinstance(error, (ImportError, AttributeError)):
             raise ClusterError(
-                f"A worker of {self._cluster.name} cannot load this realitygap ({error}). Install the same one for "
-                "all workers (simplest: one environment in a shared folder), start them anew, and run the same "
-                "command again."
+                f"A worker of {self._cluster.name} cannot load this realitygap ({error}). Install the same one "
+                "for all workers (simplest: one environment in a shared folder), restart them, and run the "
+                "same command again."
             )
         raise error
 
@@ -300,7 +300,7 @@ def _connect(address: str, seconds: float) -> Any:
         get_address_host_port(address, strict=True)
     except ValueError as error:
         raise StudyError(
-            f"{address!r} is not the address of a scheduler ({error}). Expected such as tcp://HOST:8786."
+            f"{address!r} is not the address of a scheduler ({error}). Expected, for example, tcp://HOST:8786."
         ) from None
     try:
         return Client(address, timeout=seconds, set_as_default=False)

@@ -77,8 +77,8 @@ def sample_controllers(
         found = _of_folder(ResultsFolder.open(kind), kind, allow_code)
         if len(found) < n:
             raise StudyError(
-                f"{kind} has champions of {len(found)} runs, and {n} controllers are asked for. Run more replicates, "
-                "or ask for fewer."
+                f"{kind} has champions of {len(found)} runs, but {n} controllers were requested. Run more "
+                "replicates, or request fewer."
             )
         chosen = sorted(np.random.default_rng(seed).permutation(len(found))[:n])
         return _with_fresh_scores([found[k] for k in chosen])

@@ -1,4 +1,4 @@
-"""What computes the chunks of a study: threads of this process; `_cluster.py` has another machine's."""
+"""Executors that compute the chunks of a study on threads; `_cluster.py` has those on other machines."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class ChunkTask:
 
 
 class Listener(Protocol):
-    """Who is told how far the work is."""
+    """A receiver of progress."""
 
     def add(self, n_runs: int) -> None:
-        """So many more runs are published."""
+        """Report n more published runs."""
 
     def wait_for(self, what: str) -> None:
-        """Nothing goes on until `what` is there; nothing is waited for any longer when it is empty."""
+        """Report that work waits for `what`; empty: that it continues."""
 
 
 class Executor(Protocol):
     """Computes chunks and publishes them in a folder whose lock the caller holds."""
 
     def facts(self) -> dict[str, Any]:
-        """What the log says of it: names and numbers, as JSON knows them."""
+        """Facts for the log: names and numbers, as JSON values."""
 
     def prepare(self, conditions: Sequence[Condition]) -> None:
         """Do what is done once for these conditions and not counted as computing."""
@@ -53,7 +53,7 @@ class Executor(Protocol):
 
 
 class Threads:
-    """Kernels on threads of this process; few chunks are under way at once, so that memory stays flat."""
+    """Kernels on threads of this process, with few chunks under way, so that memory use stays constant."""
 
     def __init__(self, n: int) -> None:
         self._n = n

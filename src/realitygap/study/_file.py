@@ -199,7 +199,7 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
         name = values.get("name")
         place = f"condition[{index + 1}]" + (f" {name!r}" if isinstance(name, str) else "")
         if name in names:
-            problems.add(place, "this name is taken by an earlier condition; each needs its own.")
+            problems.add(place, "an earlier condition has this name. Give each condition its own.")
         elif isinstance(name, str) and (alike := same_file(name, names)) is not None:
             problems.add(
                 place, f"differs from {alike!r} in capitals only, and some disks take their files for one."
@@ -221,7 +221,7 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
 
 
 def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:
-    """Note the mistakes of one section alone, so that each is said where it was made."""
+    """Record the mistakes of one section, with their positions."""
     if section == "neat":
         name = values.get("settings", DEFAULT_NEAT)
         if not isinstance(name, str) or name not in NAMED_SETTINGS:

@@ -12,7 +12,7 @@ from realitygap._interrupts import on_interrupt
 
 @contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Hold Ctrl-C back until the end of a block; a second one comes through at once.
+    """Hold Ctrl-C back until the end of a block; a second one is immediate.
 
     In the middle of another library's code it may be lost, as in a finalizer, or come out as that library's own error.
     Where somebody else handles it, and in other threads than the main one, nothing changes.

@@ -1,4 +1,4 @@
-"""Workers as jobs of a batch system, through dask-jobqueue; their settings stand in the user's Dask configuration."""
+"""Workers as jobs of a batch system, through dask-jobqueue, with settings from the user's Dask configuration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Novelty and objective in Lehman & Stanley's mazes, from many seeds, beside the published results."""
+"""Novelty and objective in Lehman & Stanley's mazes, from many seeds, with the published results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def measure_maze(
     threads: int | None = None,
     tell: Callable[[Progress], None] | None = None,
 ) -> dict[str, Any]:
-    """How many evaluations NEAT needs for a maze, rewarded for novelty and for nearness to the exit.
+    """Count the evaluations that NEAT needs for a maze, rewarded for novelty and for nearness to the exit.
 
     An evaluation is one network tried once; a run counts them up to and with the first network that reaches the
     exit. A run in which none does counts as the limit, generations times population. Replicate k has the same

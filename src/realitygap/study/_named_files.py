@@ -1,4 +1,4 @@
-"""Files that a study names: looked for beside the study's own file first, Python files only there."""
+"""Files that a study names: searched next to the study file first, Python files only there."""
 
 from __future__ import annotations
 

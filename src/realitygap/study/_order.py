@@ -23,7 +23,7 @@ from ._executors import ChunkTask
 
 @functools.cache
 def software() -> dict[str, str | int]:
-    """What decides the numbers here: version, results version, and a hash of our sources."""
+    """Return the software that decides the numbers: version, results version, and a hash of our sources."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[1]
     for path in sorted(root.rglob("*.py")):
@@ -58,7 +58,7 @@ def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
 
 
 def carry_out_order(order: dict[str, Any]) -> None:
-    """Compute a chunk and deliver it; called by a worker. What it says is the error, or nothing.
+    """Compute a chunk and deliver it; called by a worker. Return the error, or nothing.
 
     Raises:
         ClusterError: this is another version, or the folder is not seen here or cannot be written.
@@ -92,13 +92,13 @@ def _other_software(wanted: dict[str, str | int], found: dict[str, str | int]) -
     ]
     return (
         f"{', '.join(differences)}. Its numbers may differ, so none were computed. Install the same realitygap "
-        "for the workers (simplest: one environment in a shared folder), start them anew, and run the same "
+        "for the workers (simplest: one environment in a shared folder), restart them, and run the same "
         "command again."
     )
 
 
 def _no_shared_folder(inbox: Path) -> str:
     return (
-        f"it does not see {inbox.parent}. Workers write their chunks there themselves: name a folder that all "
-        "machines share under one path (--out DIR), such as one in your home on a university cluster."
+        f"it cannot access {inbox.parent}. Workers write their chunks there. Name a folder that all machines "
+        "share under one path (--out DIR), such as one in your home on a university cluster."
     )

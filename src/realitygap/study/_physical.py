@@ -1,4 +1,4 @@
-"""Carrying out the physical conditions of a study: planned, driven, scored, closed, generation by generation."""
+"""Physical conditions of a study: planned, driven, scored, and closed, generation by generation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OpenRobot = Callable[[Platform], Robot]
 
 @dataclass(frozen=True)
 class PhysicalResult:
-    """How far the physical conditions are.
+    """The progress of the physical conditions.
 
     Attributes:
         n_runs: Runs of physical conditions in the study.
@@ -113,8 +113,8 @@ class PhysicalStudy:
         task = condition.task_of_trials
         if not sees(self._operator.observes, task.observe):
             raise StudyError(
-                f"Condition {condition.name!r}: task {task.name!r} is scored by {SEEN_AS[task.observe]}, and nobody "
-                f"beside the robot sees them. {WOULD_SEE[task.observe]}"
+                f"Condition {condition.name!r}: task {task.name!r} is scored by {SEEN_AS[task.observe]}, but "
+                f"no observer records them. {WOULD_SEE[task.observe]}"
             )
 
     # blocks
@@ -188,7 +188,7 @@ class PhysicalStudy:
         return evolution
 
     def _check_planned(self, condition: Condition, replicate: int, generation: int) -> None:
-        """Refuse to go on with individuals that this program would not have bred."""
+        """Raise an error if the planned individuals are not those that this program breeds."""
         evolution = self._evolutions.setdefault((condition.name, replicate), Evolution(condition, replicate))
         if evolution.generation != generation:
             evolution = self._evolution(condition, replicate)
@@ -219,8 +219,8 @@ class PhysicalStudy:
         cells = [each.cells or () for each in trials]
         if len(cells) != condition.neat.population:
             raise LedgerError(
-                f"{self._ledger.path}: a score was taken back while its generation was being closed. Run the same "
-                "command again."
+                f"{self._ledger.path}: a score was withdrawn while its generation was being closed. Run the "
+                "same command again."
             )
         told = evolution.tell(self._scores(condition, [each.trial for each in trials], cells), cells)
         self._ledger.close_generation(
@@ -253,7 +253,7 @@ class PhysicalStudy:
         return sorted(found, key=lambda trial: trial.place)
 
     def _drive_and_enter(self, generations: Sequence[tuple[Condition, int, int]]) -> str:
-        """Drive and score all trials of these generations; what it waits for, if it cannot go on."""
+        """Drive and score all trials of these generations. Return the reason if they cannot be completed."""
         while True:
             trials = self._trials(generations)
             running = [trial for trial in trials if trial.state == "running"]
@@ -271,8 +271,9 @@ class PhysicalStudy:
         if not left:
             return ""
         return (
-            f"{len(left)} driven trials wait for their scores. `realitygap trials list` shows them and `realitygap "
-            "trials score` takes what was drawn, or `void` has a trial driven again; then run the same command again."
+            f"{len(left)} driven trials wait for their scores. Run `realitygap trials list` to see them. Enter "
+            "their cells with `realitygap trials score`, or repeat a trial with `realitygap trials void`. "
+            "Then run the same command again."
         )
 
     def _enter(
@@ -321,13 +322,13 @@ class PhysicalStudy:
             try:
                 score = self._operator.drawn(card, driven)
             except BaseException:
-                problem = "it was driven, and nobody said what it drew"
+                problem = "it was driven, but its cells are not recorded"
                 self._ledger.interrupt(trial.trial, replace(driven, problem=problem))
                 raise
             if score is None and not sees(task.observe, "cells"):
                 score = Score((), ROBOT)
             if sees(task.observe, "track") and (score is None or score.path is None):
-                problem = "it was driven, and nobody saw where"
+                problem = "it was driven, but its path is not recorded"
                 self._ledger.interrupt(trial.trial, replace(driven, problem=problem))
                 return
             self._ledger.finish(trial.trial, driven, score)
@@ -366,7 +367,7 @@ class PhysicalStudy:
     # the robot
 
     def _ready(self, platform: Platform) -> Robot:
-        """The robot, opened and looked at; opened anew where a condition wants other settings."""
+        """Return the robot, opened and checked; reopen it if a condition has other settings."""
         wanted = platform.model_copy(update={"steps": 1})
         if self._robot is not None and self._opened_with == wanted:
             return self._robot
@@ -407,5 +408,5 @@ def _bred_otherwise(ledger: Ledger, condition: Condition, replicate: int, genera
 
 
 def n_complete(ledger: Ledger, conditions: Sequence[Condition], replicates: int) -> int:
-    """How many runs of these conditions are complete, of those that the study asks for."""
+    """Return the number of complete runs of these conditions, of those that the study requests."""
     return sum(run < replicates for each in conditions for run in complete_runs(ledger, each.name))

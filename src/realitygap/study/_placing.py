@@ -1,4 +1,4 @@
-"""What somebody is told who puts a robot where a calibration wants it, and how what they measure is read."""
+"""Instructions for placing a robot for a calibration, and the parsing of measured lengths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUMBER = re.compile(r"^(-?)(?:(\d+(?:\.\d*)?|\.\d+)(?:[ -](\d+)/(\d+))?|(\d+)/(
 
 
 def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
-    """Where the robot has to stand for a trial of a calibration, and what it will do."""
+    """Return the instructions for placing the robot for a trial of a calibration, and its next motion."""
     if plan.purpose == "sensors":
         inches = distance_of(plan, arena, robot) / INCH
         return (
@@ -53,6 +53,6 @@ def parse_length(text: str) -> float | None:
 
 
 def with_ruled_end(trial: TrialRecord, ahead_in: float, left_in: float, turned_deg: float) -> TrialRecord:
-    """A path whose end somebody has measured from its start: inches ahead and to the left, degrees to the left."""
+    """Return a path with its measured end: inches ahead and to the left of its start, degrees to the left."""
     end = end_pose_of(trial, ahead_in * INCH, left_in * INCH, math.radians(turned_deg))
     return replace(trial, end_pose=end)

@@ -1,4 +1,4 @@
-"""Mistakes in a study file, all at once: where, what was expected, what came, what may have been meant."""
+"""All mistakes in a study file: their positions, expected and given values, and suggestions."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Problems:
         """The value as a table; a mistake and an empty table when it is none."""
         if isinstance(value, Mapping):
             return dict(value)
-        self.add(place, f"expected a table, came {shown(value)}.")
+        self.add(place, f"expected a table, got {shown(value)}.")
         return {}
 
     def check(

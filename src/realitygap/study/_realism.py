@@ -1,4 +1,4 @@
-"""How fast trials of `sim` are with all their realism."""
+"""The speed of trials of `sim` with full realism."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class RealisticTrials:
         self.trace = make_sim_trace(self.shape, 4, -1, 1, np.float32)
 
     def run(self) -> None:
-        """Carry out all trials."""
+        """Run all trials."""
         run_sim_trials(
             self.shape,
             self.table,
@@ -169,7 +169,7 @@ class RealisticTrials:
         )
 
     def rate(self, seconds: float) -> float:
-        """Robot-steps a second of the fastest of the calls that fit into so many seconds."""
+        """Return the robot-steps per second of the fastest call within the given seconds."""
         self.run()
         until = time.perf_counter() + seconds
         fastest = np.inf

@@ -38,6 +38,6 @@ def default_operator(port: str) -> Operator:
     if is_in_this_program(port):
         return Operator(WitnessObserver())
     raise StudyError(
-        f"Who places the robot at {port} and says what it drew? Give an operator: `realitygap drive` leads a person "
-        "through it, and realitygap.trials.Operator(WitnessObserver(witness)) serves an emulator elsewhere."
+        f"No operator places the robot at {port} and reports its cells. Run `realitygap drive` to be the "
+        "operator; realitygap.trials.Operator(WitnessObserver(witness)) serves an emulator elsewhere."
     )

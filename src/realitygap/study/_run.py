@@ -33,7 +33,7 @@ CHUNKS_PER_CONDITION = 4
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is: told after each chunk.
+    """The progress of a study, reported after each chunk.
 
     Attributes:
         n_done: Runs published, those of earlier sittings counted.
@@ -52,7 +52,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """A study carried out.
+    """The result of a study.
 
     Attributes:
         folder: Its results.
@@ -220,14 +220,14 @@ def _physical_result(study: Study, folder: ResultsFolder, n_driven: int, waiting
 
 @contextlib.contextmanager
 def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
-    """What computes; a cluster is reached before anything in the folder is touched."""
+    """Return the executor; a cluster is connected before anything in the folder changes."""
     if cluster is None:
         yield Threads(threads or usable_processors())
         return
     if threads is not None:
         raise ValueError(
-            "threads and cluster exclude each other: how many threads a worker of a cluster has is said where it is "
-            "started (`dask worker --nthreads`, or `cores` in the settings of its jobs)."
+            "threads and cluster exclude each other. Set the number of threads of a worker when you start it "
+            "(`dask worker --nthreads`, or `cores` in the settings of its jobs)."
         )
     if not isinstance(cluster, str):
         raise TypeError(f"cluster is {cluster!r}, expected a text, such as 'tcp://HOST:8786' or 'slurm:20'.")
@@ -270,7 +270,7 @@ def _carry_out(
 
 
 def machine_facts() -> dict[str, Any]:
-    """What a measured time depends on."""
+    """Return the facts about the machine that measured times depend on."""
     return {
         "host": platform.node(),
         "system": platform.platform(),
@@ -331,7 +331,7 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
     for condition in new["conditions"]:
         if (alike := same_file(condition["name"], there)) is not None:
             differences.append(
-                f"condition {condition['name']!r} would share files with condition {alike!r} that is there; "
+                f"condition {condition['name']!r} would share files with the existing condition {alike!r}; "
                 "give it another name"
             )
     if there:
@@ -359,7 +359,7 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
 def _ways_out(folder: ResultsFolder) -> str:
     if (folder.path / LEDGER_NAME).exists():
         return "Use another folder (--out DIR); this one holds trials of a robot, which are never deleted."
-    return "Use another folder (--out DIR), or --fresh to delete what is there and start anew."
+    return "Use another folder (--out DIR), or --fresh to delete the existing results and restart."
 
 
 def _differences(old: Any, new: Any, place: str = "") -> list[str]:

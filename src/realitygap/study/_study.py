@@ -24,20 +24,21 @@ Line = Annotated[str, AfterValidator(_printable)]
 
 
 class StudySection(Settings):
-    """What the whole study shares."""
+    """The settings of the whole study."""
 
     name: str = Field(
         pattern=NAME_PATTERN,
         max_length=80,
         description="Letters, digits, dot, dash, underscore; names the folder.",
     )
-    title: Line = Field(
-        "", max_length=200, description="What the report is headed with; the name when empty."
-    )
-    note: Line = Field("", max_length=500, description="A remark for whoever reads the summary.")
+    title: Line = Field("", max_length=200, description="Title of the report. Default: the name.")
+    note: Line = Field("", max_length=500, description="Remark, shown in the summary.")
     seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
     replicates: int = Field(
-        100, ge=1, le=1_000_000_000, description="Runs of each condition. More extend what is there."
+        100,
+        ge=1,
+        le=1_000_000_000,
+        description="Runs per condition. Increase it to extend an existing study.",
     )
     pair: bool = Field(
         True,
@@ -47,32 +48,33 @@ class StudySection(Settings):
 
 
 class ReportSection(Settings):
-    """How the report shows it; changes no result."""
+    """The settings of the report; they change no result."""
 
     points: Literal["best-of-generation", "best-so-far"] = Field(
-        "best-of-generation", description="What Figure 4 shows at each generation. The paper does not say."
+        "best-of-generation",
+        description="Quantity that Figure 4 shows for each generation. The paper does not state it.",
     )
 
 
 def _told_apart(pens: list[str]) -> list[str]:
     twice = [pen for k, pen in enumerate(pens) if pen in pens[:k]]
     if twice:
-        raise ValueError(f"{twice[0]!r} stands there twice; lines on a sheet are told apart by their pens")
+        raise ValueError(f"{twice[0]!r} is listed twice; each line on a sheet needs its own pen")
     return pens
 
 
 class TrialsSection(Settings):
-    """How trials on a robot are led through; changes no simulated result."""
+    """The settings for guiding trials on a robot; they change no simulated result."""
 
     order: Literal["in-order", "shuffled"] = Field(
         "in-order",
         description="in-order: generation by generation, run by run, condition by condition. shuffled: the same "
-        "generation of all conditions together, their individuals mixed, so that a battery that drains or a floor that "
-        "wears meets all conditions alike.",
+        "generation of all conditions together, with mixed individuals. A falling battery or a worn floor "
+        "then affects all conditions equally.",
     )
     blind: bool = Field(
         False,
-        description="Show trials under codes, so that nobody who counts cells knows of which condition they are.",
+        description="Show trials under codes, so that people who count cells don't know the condition.",
     )
     pens: Annotated[
         list[Annotated[Line, Field(min_length=1, max_length=20)]], AfterValidator(_told_apart)
@@ -85,14 +87,16 @@ class TrialsSection(Settings):
 
 
 class ConditionNotes(Settings):
-    """What is said of a condition beside its settings; changes no result."""
+    """Notes on a condition, in addition to its settings; they change no result."""
 
     published: list[Annotated[float, Field(ge=0, le=1)]] | None = Field(
-        None, description="Published values of the best coverage of a run, shown beside ours."
+        None, description="Published values of the best coverage of a run, shown next to ours."
     )
-    published_source: Line | None = Field(None, max_length=200, description="Where they were published.")
+    published_source: Line | None = Field(None, max_length=200, description="Source of these values.")
     baseline: str | None = Field(None, description="The condition that this one is compared with.")
-    change: Line | None = Field(None, max_length=200, description="How it differs from that, in a few words.")
+    change: Line | None = Field(
+        None, max_length=200, description="Difference from the baseline, in a few words."
+    )
 
 
 def same_file(name: str, others: Iterable[str]) -> str | None:
@@ -149,7 +153,7 @@ class Study(Settings):
 
     @property
     def n_runs(self) -> int:
-        """Runs in all."""
+        """Total number of runs."""
         return len(self.conditions) * self.about.replicates
 
     @property

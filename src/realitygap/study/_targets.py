@@ -16,7 +16,7 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def observations_head(target: Target, observe: Observe, robot: str | None = None) -> ObservationsHead:
-    """What a file of trials of a target begins with; the robot is that of its platform when not given."""
+    """Return the head of a file of trials on a target. Default robot: that of its platform."""
     name, _ = split_spec(target.name)
     if robot is None:
         robot = platform_class(name).base_robot if name in platform_names() else DEFAULT_ROBOT
@@ -84,10 +84,10 @@ SEEN_AS: dict[Observe, str] = {
     "track": "its poses",
 }
 WOULD_SEE: dict[Observe, str] = {
-    "readings": "Record the trials anew.",
-    "cells": "A person who counts them, a camera (--camera) or a witness (--witness) would see them.",
-    "encoders": "A Scribbler 2 has encoders, and so have a real Thymio and a simulated robot.",
-    "track": "A camera (--camera) or the witness of an emulated robot (--witness) would see them.",
+    "readings": "Record new trials.",
+    "cells": "Use an operator who counts them, a camera (--camera), or a witness (--witness).",
+    "encoders": "A Scribbler 2, a real Thymio, and a simulated robot have encoders.",
+    "track": "Use a camera (--camera), or the witness of an emulated robot (--witness).",
 }
 
 
@@ -99,7 +99,7 @@ def refuse_lost(n: int, name: str, kept: str = "") -> None:
     """
     if n:
         lost = f"{n} trials on {name} were" if n > 1 else f"A trial on {name} was"
-        raise RobotError(f"{lost} lost, and cannot be done without.{kept} Carry out what is missing.")
+        raise RobotError(f"{lost} lost, but all are needed.{kept} Run the missing trials.")
 
 
 def carry_out_missing(
@@ -145,6 +145,6 @@ def carry_out_missing(
     missing = [k for k, key in enumerate(keys) if key not in kept]
     if missing:
         target.carry_out([plans[k] for k in missing], observe, lambda i, trial: keep(missing[i], trial))
-    where = "" if file is None else f" The others are kept in {file.path}."
+    where = "" if file is None else f" The others are saved in {file.path}."
     refuse_lost(sum(key not in kept for key in keys), target.name, where)
     return [kept[key] for key in keys]

@@ -1,4 +1,4 @@
-"""NEAT on a classical task, from many seeds, beside the published results."""
+"""NEAT on a classical task, from many seeds, with the published results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def measure_task(
     threads: int | None = None,
     tell: Callable[[Progress], None] | None = None,
 ) -> dict[str, Any]:
-    """How many evaluations NEAT needs for a classical task, from many seeds, beside what was published.
+    """Count the evaluations that NEAT needs for a classical task, from many seeds, with the published results.
 
     An evaluation is one network tried once; a run counts them up to and with the first network that solves the
     task. The results do not depend on the threads.

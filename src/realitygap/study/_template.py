@@ -42,8 +42,8 @@ def study_template(name: str) -> str:
         )
     parts = [
         _comment(
-            "A study for `realitygap run`. A line that begins with '# key = value' shows the default: take the "
-            "'# ' away to change it. Lengths are in meters, angles in radians, times in seconds."
+            "A study for `realitygap run`. A line that begins with '# key = value' shows the default: remove "
+            "the '# ' to change it. Lengths are in meters, angles in radians, times in seconds."
         ),
         _section("study", StudySection, {"name": name, "seed": 1, "replicates": 100}),
     ]
@@ -91,7 +91,7 @@ def study_template(name: str) -> str:
 
 
 def _example(key: str) -> list[str]:
-    """What may be said of a condition beside its settings, to be switched on."""
+    """Return the optional notes of a condition, commented out."""
     return [
         _comment(ConditionNotes.model_fields[key].description or ""),
         f"# {key} = {_toml(_EXAMPLES[key])}",

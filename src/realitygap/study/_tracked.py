@@ -1,4 +1,4 @@
-"""What a camera saw of trials: into the ledger of a study, and beside what was observed otherwise."""
+"""Camera tracks of trials: into the ledger of a study, and next to other observations."""
 
 from __future__ import annotations
 
@@ -153,9 +153,9 @@ def place_trial(
     first, last = begun.time, begun.time + wanted.times[-1]
     if not (track.times[0] <= first and last <= track.times[-1]):
         raise StudyError(
-            f"The trial goes from {first:.2f} to {last:.2f} s of the video, and the robot is seen from "
-            f"{track.times[0]:.2f} to {track.times[-1]:.2f} s. Film it from before it begins until it stands, or "
-            "correct --begins."
+            f"The trial is from {first:.2f} to {last:.2f} s of the video, and the robot is seen from "
+            f"{track.times[0]:.2f} to {track.times[-1]:.2f} s. Film it from before the start until it stops, "
+            "or correct --begins."
         )
     times = first + wanted.times
     score = score_along(track, times, wanted.arena.grid, who)
@@ -164,7 +164,7 @@ def place_trial(
 
 
 def score_along(track: Track, times: Floats, grid: Grid, who: str) -> Score:
-    """What a trial scores by its track.
+    """Return the score of a trial along its track.
 
     Args:
         track: With all of the trial in it.

@@ -23,7 +23,7 @@ PATH = "path"
 
 
 class StoppedByPerson(Exception):  # noqa: N818 - nothing is wrong
-    """Somebody wants to go on another time; what was recorded is kept."""
+    """The operator stopped; recorded trials are saved."""
 
 
 class WrappedTarget(ClosedOnExit):
@@ -122,7 +122,7 @@ class OperatedTarget(WrappedTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`; a trial that is taken back is told of as such, and again when it was driven anew.
+        """Run trials as `Target.carry_out`. A withdrawn trial is reported, and again after its repetition.
 
         Raises:
             StoppedByPerson: What was told of is all that was recorded.
@@ -169,7 +169,7 @@ def _tell_driven(tell: Tell | None, k: int, _: int, trial: TrialRecord) -> None:
 
 
 class ResumableTarget(WrappedTarget):
-    """Trials are kept as they end, and those that a file has already are not carried out again.
+    """A target that saves each trial and does not repeat those in its file.
 
     Of trials of one plan the last one counts.
     """
@@ -197,7 +197,7 @@ class ResumableTarget(WrappedTarget):
 
 
 def _what(trial: TrialRecord) -> tuple[object, ...]:
-    """What makes a trial the one of a plan."""
+    """Return the identity of a plan's trial."""
     start = tuple(round(value, 6) for value in trial.start)
     driven = trial.genome or trial.commands.tobytes()
     return trial.purpose, trial.number, start, driven

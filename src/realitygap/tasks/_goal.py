@@ -39,7 +39,7 @@ class GoalTask(StepTask):
         "bias",
     )
 
-    score_name: ClassVar[str] = "share of the way to the goal"
+    score_name: ClassVar[str] = "share of the distance to the goal"
     score_range: ClassVar[tuple[float, float]] = (-math.inf, 1.0)
 
     def check_arena(self, arena: Arena) -> Goal:
@@ -50,8 +50,8 @@ class GoalTask(StepTask):
         """
         if arena.goal is None:
             raise TaskError(
-                f"Task 'goal' wants a goal, and arena {arena.name!r} has none. Choose another arena, such as 'goal', "
-                "or put a [goal] into its file."
+                f"Task 'goal' needs a goal, but arena {arena.name!r} has none. Choose another arena, such as "
+                "'goal', or put a [goal] into its file."
             )
         if np.hypot(arena.goal.x - arena.start.x, arena.goal.y - arena.start.y) <= arena.goal.radius:
             raise TaskError(

@@ -47,11 +47,11 @@ class ControllerSettings(Settings):
     def _can_be_declared(self) -> Self:
         if self.outputs not in (("move", "turn"), ("left", "right")):
             raise ValueError(
-                f'outputs: expected ["move", "turn"] or ["left", "right"], came {list(self.outputs)}'
+                f'outputs: expected ["move", "turn"] or ["left", "right"], got {list(self.outputs)}'
             )
         if not all(self.inputs) or "bias" in self.inputs[:-1]:
             raise ValueError(
-                f"inputs: expected a name for each, and bias as the last, came {list(self.inputs)}"
+                f"inputs: expected a name for each, and bias as the last, got {list(self.inputs)}"
             )
         return self
 

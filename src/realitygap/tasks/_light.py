@@ -40,7 +40,7 @@ class LightTask(StepTask):
         """
         if not arena.lights:
             raise TaskError(
-                f"Task 'light' wants a light, and arena {arena.name!r} has none. Choose another arena, such as "
+                f"Task 'light' needs a light, but arena {arena.name!r} has none. Choose another arena, such as "
                 "'light', or put a [[light]] into its file."
             )
         if any((light.x, light.y) == (arena.start.x, arena.start.y) for light in arena.lights):

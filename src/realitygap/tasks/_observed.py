@@ -38,8 +38,8 @@ def score_observed(task: Task, trials: Sequence[TrialRecord], arena: Arena) -> N
         hidden = [name for name in arena.vary if not name.startswith("arena.start.")]
         if task.needs_trace and hidden:
             raise TaskError(
-                f"{hidden[0]} of arena {arena.name!r} is drawn for each trial, and an observer does not know what was "
-                f"drawn: a trial cannot be scored for task {task.name!r}. Set it to a number."
+                f"{hidden[0]} of arena {arena.name!r} is sampled for each trial, and an observer does not get "
+                f"the value: a trial cannot be scored for task {task.name!r}. Set it to a number."
             )
     if task.needs_trace:
         _refuse(trials, task, "a look at its end", [len(trial.last_readings) == 0 for trial in trials])

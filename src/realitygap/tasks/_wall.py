@@ -38,7 +38,7 @@ class WallTask(StepTask):
         0.15, gt=0, le=100, description="Nearer than this to the robot's origin is near [m]."
     )
 
-    score_name: ClassVar[str] = "way along walls [m]"
+    score_name: ClassVar[str] = "distance along walls [m]"
     score_range: ClassVar[tuple[float, float]] = (-math.inf, math.inf)
 
     def check_arena(self, arena: Arena, drawn: Iterable[str] = ()) -> None:
@@ -59,7 +59,8 @@ class WallTask(StepTask):
             )
         if not arena.walls and not arena.obstacles:
             raise TaskError(
-                f"Task 'wall' wants walls, and arena {arena.name!r} has none. Choose another arena, such as 'wall'."
+                f"Task 'wall' needs walls, but arena {arena.name!r} has none. Choose another arena, such as "
+                "'wall'."
             )
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:

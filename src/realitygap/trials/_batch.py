@@ -1,4 +1,4 @@
-"""What trials are asked and what they answer, on any platform."""
+"""The input and output of trials, on any platform."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REAL: dict[str, Any] = {"single": np.float32, "double": np.float64}
 
 
 def paper_inputs(rules: NeatRules) -> tuple[str, ...]:
-    """What the paper's networks see, with the constant input where they have one."""
+    """Return the inputs of the paper's networks, with the constant input if they have one."""
     return paper_interface(constant=rules.bias_input >= 0).inputs
 
 
@@ -36,7 +36,7 @@ def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class TrialBatch:
-    """What came of n trials in an arena of c reachable cells.
+    """The results of n trials in an arena of c reachable cells.
 
     Attributes:
         cells: (n, c) uint8; the first `n_line` of a row are the cells along the line in order of first
@@ -209,7 +209,7 @@ def counters_of_robot(counters: NDArray[np.uint32], robot: int) -> NDArray[np.ui
 
 
 class Tried(NamedTuple):
-    """What a platform makes of n trials.
+    """The output of a platform for n trials.
 
     Attributes:
         batch: Of all of them.
@@ -304,7 +304,7 @@ def check_genomes(genomes: Sequence[Genome], inputs: Sequence[str] | None) -> No
 
 
 def kind_of(genome: Genome) -> dict[str, float]:
-    """What all genomes of a call share: the kernels read it once."""
+    """Return the common properties of all genomes of a call, which the kernels read once."""
     names = (
         "n_inputs",
         "bias_input",

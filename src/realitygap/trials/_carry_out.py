@@ -1,4 +1,4 @@
-"""One trial on anything that meets the contract of a robot, observed as far as somebody looks."""
+"""One trial on anything with the interface of a robot, observed at the level requested."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ._target import TrialPlan
 
 @dataclass
 class _Looks:
-    """What an observer sees of a trial while it runs."""
+    """The observations of a trial while it runs."""
 
     observer: Observer
     observe: Observe
@@ -49,7 +49,7 @@ def carry_out_on_robot(
     start: Pose,
     keep: Callable[[TrialRecord], None] | None = None,
 ) -> TrialRecord:
-    """Carry out one trial on a robot, and keep what is to be observed and nothing more.
+    """Run one trial on a robot, and record only the requested observations.
 
     A controller sees and answers what its interface names. The motors are stopped on every way out.
 

@@ -1,4 +1,4 @@
-"""What is drawn for a trial: numbers of the robot and the arena, as a pure function of the key and the trial."""
+"""The numbers sampled for a trial of the robot and the arena, as a pure function of the key and the trial."""
 
 from __future__ import annotations
 

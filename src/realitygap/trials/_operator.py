@@ -24,7 +24,7 @@ Led = Literal["go", "redo", "stop"]
 
 @dataclass(frozen=True)
 class Card:
-    """What an operator is told of a trial.
+    """The information on a trial for an operator.
 
     Attributes:
         trial: Which one.
@@ -49,7 +49,7 @@ class Card:
 
 
 class Operator:
-    """Stands beside a robot: places it, watches it, and says what was drawn and what counts.
+    """A person next to a robot, who places and watches it, and reports the cells and the valid trials.
 
     This one is nobody: its answers were given in advance, and an observer sees what there is to see. Persons at a
     terminal or at a page are subclasses.
@@ -87,7 +87,7 @@ class Operator:
             self.observer.ready()
 
     def accept(self, preflight: Preflight) -> bool:
-        """Whether to go on after the pre-flight."""
+        """Return whether to continue after the pre-flight check."""
         return self._despite_preflight or not preflight.problems
 
     def settle(self, card: Card, problem: str) -> Verdict:
@@ -95,7 +95,7 @@ class Operator:
         return self._in_flight
 
     def place(self, card: Card) -> None:
-        """Put the robot at its start, with the pen; returns when it stands there.
+        """Put the robot at its start, with the pen; return when it is in place.
 
         Raises:
             RobotError: The observer sees another arena than the study's.
@@ -129,7 +129,7 @@ class Operator:
         return ()
 
     def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
-        """Put the robot at the start of plan `number` of n: go on, take the trial before back, or stop for today."""
+        """Put the robot at the start of plan `number` of n. Return whether to drive, repeat, or stop."""
         return "go"
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
@@ -149,7 +149,7 @@ _INCH = 0.0254
 
 
 def start_words(arena: Arena) -> str:
-    """Where a trial begins, for somebody with a ruler: from the left wall and the lower one, and facing where."""
+    """Describe the start of a trial: distances from the left and the lower wall, and heading."""
     start = arena.start
     left, bottom = min(wall[0] for wall in arena.walls), min(wall[1] for wall in arena.walls)
     way = round(start.heading / (math.pi / 4)) % 8

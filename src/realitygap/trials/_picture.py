@@ -1,4 +1,4 @@
-"""What a trial looks like: the path that was driven, as plain shapes."""
+"""The picture of a trial: the driven path, as plain shapes."""
 
 from __future__ import annotations
 

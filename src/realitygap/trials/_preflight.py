@@ -21,7 +21,7 @@ _LOAD = Command(0.0, 0.5)
 
 @dataclass(frozen=True)
 class Preflight:
-    """What a pre-flight found.
+    """The result of a pre-flight check.
 
     Attributes:
         facts: Name and value of each thing looked at, as a person reads them.
@@ -77,7 +77,7 @@ def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Prefligh
 
 
 def identity_of(robot: Robot) -> dict[str, str]:
-    """What tells a robot from another, as far as it says so itself."""
+    """Return the identity of a robot, as far as it reports one."""
     info = getattr(robot, "info", None)
     found = {name: getattr(info, name, None) for name in ("model", "fluke")}
     with contextlib.suppress(RobotError):
@@ -95,7 +95,7 @@ def _other_robot(identity: Mapping[str, str], before: Mapping[str, str]) -> list
 
 
 def _insane(raws: list[tuple[float, ...]], robot: Robot) -> list[str]:
-    """What cannot be right about the readings of several moments."""
+    """Return the problems with the readings of several moments."""
     n_sensors, reading_max = robot.n_sensors, getattr(robot, "reading_max", None)
     if any(len(raw) != n_sensors for raw in raws):
         return [f"{len(raws[-1])} sensors answer, expected {n_sensors}"]

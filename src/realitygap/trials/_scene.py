@@ -31,7 +31,7 @@ _COLUMNS = ["step", "robot", "time", "x", "y", "heading", "stall", "cmd_v", "cmd
 
 @dataclass(frozen=True)
 class SceneTrack:
-    """What happened in a scene; row 0 is the start. Letters: t steps, r robots, s sensors of one robot.
+    """The tracks of a scene; row 0 is the start. Letters: t steps, r robots, s sensors of one robot.
 
     Attributes:
         times: (t + 1,) [s].
@@ -79,7 +79,7 @@ class SceneTrack:
 
 
 def simulate_case(case: Case) -> SceneTrack:
-    """What the robots of a case do, as in Jyro 0.3.2.
+    """Simulate the robots of a case as Jyro 0.3.2 does.
 
     Args:
         case: A case, from `Case.read` or `Case.from_dict`.

@@ -1,4 +1,4 @@
-"""What can be asked to carry out trials one by one and shows what an observer sees: a simulator, a twin, a robot."""
+"""The interface to run trials one by one with an observer: on a simulator, a twin, or a robot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from realitygap.world import Arena, Pose
 
 @dataclass(frozen=True)
 class TrialPlan:
-    """A trial to carry out: by a controller, or command after command.
+    """The plan of a trial: with a controller, or command by command.
 
     Attributes:
         start: Where the robot is put; the arena's start when None.
@@ -46,7 +46,7 @@ TellTrial = Callable[[int, TrialRecord], None]
 
 
 class Target(Protocol):
-    """A platform on which trials are carried out and observed.
+    """A platform on which trials are run and observed.
 
     Attributes:
         name: As the user named it, such as `twin:worn-1.toml`.
@@ -82,7 +82,7 @@ class Target(Protocol):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """Carry out trials; what is seen of plan k is entry k.
+        """Run trials; entry k of the result is the observation of plan k.
 
         Args:
             plans: In this order, where the order can matter.
@@ -130,7 +130,7 @@ def check_plans(
     target: Target,
     most_number: int = 2**32 - 1,
 ) -> None:
-    """Refuse plans that a target cannot carry out.
+    """Raise an error if a target cannot run these plans.
 
     Args:
         plans: To be carried out.

@@ -1,4 +1,4 @@
-"""A robot on a port as a target: an emulated one by itself, a physical one with somebody beside it."""
+"""A robot on a port as a target: an emulated one alone, a physical one with an operator."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class PacedRobot(ClosedOnExit):
 
     @property
     def lasted_s(self) -> float:
-        """How long most commands of the trial lasted, their median [s]; `step_s` where that was kept."""
+        """Median duration of the commands of the trial [s]; `step_s` if durations were recorded."""
         median = float(np.median(self._lasted)) if self._lasted else self.step_s
         return median if median > self.step_s * (1 + LATE) else self.step_s
 
@@ -185,8 +185,8 @@ class RobotTarget(ClosedOnExit):
             return trial
         again = "twice " if attempts > 1 else ""
         raise RobotError(
-            f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: {trial.problem} "
-            "Trials that were kept in a file are safe. Put the robot right, then go on with the rest."
+            f"Trial {plan.number} on {self.name} was lost {again}after {len(trial.commands)} commands: "
+            f"{trial.problem} Trials saved in a file are safe. Fix the robot, then run the rest."
         )
 
     def _try(

@@ -49,8 +49,9 @@ class WitnessObserver(OwnSenses):
         """Witness of the robot that was met; a `RobotError` if it has none."""
         if self._witness is None:
             raise RobotError(
-                "This robot has no witness that would say what it drew: it is no emulator in this program. Name the "
-                "address of one's witness, HOST:PORT (realitygap emulate --witness PORT), or count its cells by hand."
+                "This robot has no witness: it is not an emulator in this program. Name the address of an "
+                "emulator's witness, HOST:PORT (realitygap emulate --witness PORT), or count its cells by "
+                "hand."
             )
         return self._witness
 
@@ -62,8 +63,9 @@ class WitnessObserver(OwnSenses):
         """
         if robot.label != "EMULATED":
             raise RobotError(
-                f"A robot on this port counts as {robot.label}, and a witness sees an emulated one: its cells would "
-                "be taken for a robot's. Use a pseudo-terminal or a port of this machine, or leave the witness out."
+                f"A robot on this port counts as {robot.label}, but a witness reports an emulated one. Its "
+                "cells would be recorded as a robot's. Use a pseudo-terminal or a port of this machine, or "
+                "leave the witness out."
             )
         self._met(robot)
         own = own_witness(robot)

@@ -102,16 +102,16 @@ def read_map(path: str | Path) -> OccupancyMap:
     resolution = _number(path, "resolution", values["resolution"], 1e-4, 1e3)
     origin = values["origin"]
     if not (isinstance(origin, list) and len(origin) in (2, 3)):
-        raise DescriptionError(f"{path}: origin: expected [x, y, yaw], came {shown(origin)}.")
+        raise DescriptionError(f"{path}: origin: expected [x, y, yaw], got {shown(origin)}.")
     x, y, yaw = (_number(path, "origin", value, -1e4, 1e4) for value in [*origin, 0.0][:3])
     mode = values.get("mode", "trinary")
     if mode not in _MODES:
-        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, came {shown(mode)}.")
+        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, got {shown(mode)}.")
     free_thresh = _number(path, "free_thresh", values.get("free_thresh", FREE_THRESH), 0.0, 1.0)
     occupied = _number(path, "occupied_thresh", values.get("occupied_thresh", OCCUPIED_THRESH), 0.0, 1.0)
     if not free_thresh < occupied:
         raise DescriptionError(
-            f"{path}: free_thresh: expected less than occupied_thresh, {occupied:g}, came {free_thresh:g}."
+            f"{path}: free_thresh: expected less than occupied_thresh, {occupied:g}, got {free_thresh:g}."
         )
     negate = _number(path, "negate", values.get("negate", 0), 0, 1)
     gray = _gray(path, values["image"])
@@ -328,7 +328,7 @@ def _number(path: Path, key: str, value: Any, least: float, most: float) -> floa
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not (is_number and least <= value <= most):
         raise DescriptionError(
-            f"{path}: {key}: expected a number from {least:g} to {most:g}, came {shown(value)}."
+            f"{path}: {key}: expected a number from {least:g} to {most:g}, got {shown(value)}."
         )
     return float(value)
 
@@ -336,11 +336,11 @@ def _number(path: Path, key: str, value: Any, least: float, most: float) -> floa
 def _gray(path: Path, name: Any) -> NDArray[np.float64]:
     """Return the gray values of the image, 0 to 255."""
     if not isinstance(name, str) or not name or "\x00" in name:
-        raise DescriptionError(f"{path}: image: expected the name of an image file, came {shown(name)}.")
+        raise DescriptionError(f"{path}: image: expected the name of an image file, got {shown(name)}.")
     file = path.parent / name
     if not file.resolve().is_relative_to(path.parent.resolve()):
         raise DescriptionError(
-            f"{path}: image: expected a file in the folder of the map, came {shown(name)}. Copy the image there, and "
+            f"{path}: image: expected a file in the folder of the map, got {shown(name)}. Copy the image there, and "
             "change its name in the YAML file."
         )
     try:

@@ -93,7 +93,7 @@ def score_sheet(
     sheet = find_sheet(image, layout)
     if len(numbers) > 1 and is_gray(image):
         raise SheetError(
-            f"The picture is gray, and its {len(numbers)} pens are told apart by color. Take a photo in color."
+            f"The picture is gray, and its {len(numbers)} pens are identified by color. Take a photo in color."
         )
     picture = rectify(image, sheet, PX_PER_M)
     maps = separate_pens(ink_density(picture, layout, PX_PER_M), layout, PX_PER_M, numbers)

@@ -123,8 +123,8 @@ class Arena:
         round_ones = [str(k) for k, obstacle in enumerate(self.obstacles) if obstacle.radius]
         if round_ones:
             raise ValueError(
-                f"arena {self.name!r} has round obstacles ({', '.join(round_ones)}), expected straight walls, which is "
-                "all that Jyro knows. Use platform 'sim'"
+                f"arena {self.name!r} has round obstacles ({', '.join(round_ones)}), expected straight walls, "
+                "the only ones in Jyro. Use platform 'sim'"
             )
         if self.vary:
             raise ValueError(

@@ -40,7 +40,7 @@ def in_meters(values: Mapping[str, Any]) -> dict[str, Any]:
     scale = float(named) if type(named) in (int, float) else 0.0
     if not (scale > 0 and math.isfinite(scale)):
         names = ", ".join(f"'{name}'" for name in FILE_UNITS)
-        raise ValueError(f"unit: expected {names} or a length in meters, came {shown(unit)}")
+        raise ValueError(f"unit: expected {names} or a length in meters, got {shown(unit)}")
     if scale == 1:
         return in_si(rest)
     _refuse_other_units(rest, unit)
@@ -242,7 +242,7 @@ class ArenaFile(Described):
         for name, number in self.numbers().items():
             ends = (number.lowest, number.highest) if isinstance(number, Distribution) else (number,)
             if not name.endswith(NO_LENGTHS) and max(map(abs, ends)) > FARTHEST:
-                raise ValueError(f"{name}: expected at most {FARTHEST:g} m, came {max(ends, key=abs):g}")
+                raise ValueError(f"{name}: expected at most {FARTHEST:g} m, got {max(ends, key=abs):g}")
         return self
 
     @model_validator(mode="after")

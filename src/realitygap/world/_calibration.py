@@ -51,8 +51,8 @@ class Fitted(Settings):
             return values
         low, high, unit = values["prior_low"], values["prior_high"], values.get("unit", "")
         advice = (
-            f"The prior binds: the estimate is at an end of {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}. Build "
-            "on another robot (--base ROBOT)."
+            f"The estimate is at an end of its prior, {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}. "
+            "Build on another robot (--base ROBOT)."
         )
         return {**values, "identified": False, "advice": advice}
 
@@ -123,10 +123,11 @@ class Calibration(Settings):
         lengths = {len(values) for values in self.draws.values()}
         if len(lengths) > 1:
             raise ValueError(
-                f"draws: expected as many of each number, came {min(lengths)} to {max(lengths)}: a draw is one of each"
+                f"draws: expected as many of each number, got {min(lengths)} to {max(lengths)}: a draw is one "
+                "of each"
             )
         if lengths and not 1 <= max(lengths) <= MOST_DRAWS:
-            raise ValueError(f"draws: expected 1 to {MOST_DRAWS:,} of each number, came {max(lengths):,}")
+            raise ValueError(f"draws: expected 1 to {MOST_DRAWS:,} of each number, got {max(lengths):,}")
         return self
 
     def __repr__(self) -> str:

@@ -254,7 +254,7 @@ class Case(_Part):
         """
         if not isinstance(data, Mapping):
             raise CaseError(
-                f"{source}: expected a JSON object with steps, world and robots, came {shown(data)}."
+                f"{source}: expected a JSON object with steps, world and robots, got {shown(data)}."
             )
         mistakes = dict(_misspelt(data))
         suspected = set(mistakes)

@@ -79,8 +79,8 @@ def explained(error: Any) -> str:
     if error["type"] == "missing":
         return f"missing. Give {whole}."
     if error["type"] in ("float_type", "finite_number") and depth:
-        return f"expected a finite number, came {shown(error['input'])}."
-    return f"expected {entry if depth else whole}, came {shown(error['input'])}."
+        return f"expected a finite number, got {shown(error['input'])}."
+    return f"expected {entry if depth else whole}, got {shown(error['input'])}."
 
 
 def listed(source: str, mistakes: Mapping[str, str]) -> str:
@@ -145,7 +145,7 @@ def _drive_contradictions(
     ):
         yield (
             f"{here}.commands",
-            f"expected {n_steps} commands [v, w], one for each step, came {len(commands)}. "
+            f"expected {n_steps} commands [v, w], one for each step, got {len(commands)}. "
             f'Add the others, or set "steps" to {len(commands)}.',
         )
 
@@ -158,8 +158,8 @@ def _device_contradictions(here: str, device: Mapping[str, Any]) -> Iterator[tup
     if stock is not None and given != stock and {given, stock} & {"bumper", "light"}:
         yield (
             f"{here}.type",
-            f"a device of kind {device['kind']} is of type {shown(stock)}, came {shown(given)}. "
-            "Leave the type out, or change the kind.",
+            f"a device of kind {device['kind']} is of type {shown(stock)}, got {shown(given)}. Leave the type "
+            "out, or change the kind.",
         )
     elif stock is None and device["kind"] in ("range", "RangeSensor") and given == "light":
         yield f"{here}.type", 'a device of kind range cannot be of type "light". Set the kind to "light".'
@@ -204,19 +204,19 @@ def _layer_contradictions(
         if width is None and widths:
             width, what = widths[0], "as in the first row"
         if len(widths) > 1 and len(set(widths)) == 1 and widths[0] != width:
-            yield f"{place}.weights", f"expected {width} weights in each row ({what}), came {widths[0]}."
+            yield f"{place}.weights", f"expected {width} weights in each row ({what}), got {widths[0]}."
         else:
             for j, row in enumerate(weights):
                 if isinstance(row, list) and len(row) != width:
-                    yield f"{place}.weights[{j}]", f"expected {width} weights ({what}), came {len(row)}."
+                    yield f"{place}.weights[{j}]", f"expected {width} weights ({what}), got {len(row)}."
         if isinstance(bias, list) and len(bias) != len(weights):
             yield (
                 f"{place}.bias",
-                f"expected {len(weights)} numbers, one for each row of weights, came {len(bias)}.",
+                f"expected {len(weights)} numbers, one for each row of weights, got {len(bias)}.",
             )
         width, what = len(weights), f"outputs of layer {k}"
     if layers and width not in (None, 2):
         yield (
             f"{here}.layers[{len(layers) - 1}].weights",
-            f"expected 2 rows in the last layer, for v and w, came {width}.",
+            f"expected 2 rows in the last layer, for v and w, got {width}.",
         )

@@ -52,16 +52,16 @@ class Distribution(Settings):
         given = [kind for kind in KINDS if getattr(self, kind) is not None]
         if len(given) != 1:
             came = " and ".join(given) or "none"
-            raise ValueError(f"expected one of uniform, normal, log_uniform and choice, came {came}")
+            raise ValueError(f"expected one of uniform, normal, log_uniform and choice, got {came}")
         for kind, ends in (("uniform", self.uniform), ("log_uniform", self.log_uniform)):
             if ends is not None and not ends[0] <= ends[1]:
-                raise ValueError(f"expected {kind} = [lower, upper], came [{ends[0]:g}, {ends[1]:g}]")
+                raise ValueError(f"expected {kind} = [lower, upper], got [{ends[0]:g}, {ends[1]:g}]")
         if self.log_uniform is not None and self.log_uniform[0] <= 0:
-            raise ValueError(f"expected log_uniform above 0, came {self.log_uniform[0]:g}")
+            raise ValueError(f"expected log_uniform above 0, got {self.log_uniform[0]:g}")
         if self.normal is not None and self.normal[1] < 0:
-            raise ValueError(f"expected a standard deviation of at least 0, came {self.normal[1]:g}")
+            raise ValueError(f"expected a standard deviation of at least 0, got {self.normal[1]:g}")
         if self.choice is not None and not self.choice:
-            raise ValueError("expected choice with at least one number, came none")
+            raise ValueError("expected choice with at least one number, got none")
         if self.least is not None and self.most is not None and self.least > self.most:
             raise ValueError(f"least is {self.least:g}, more than most, {self.most:g}")
         return self

@@ -68,8 +68,8 @@ def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], 
             values.setdefault("name", Path(origin).stem)
     if str(file) in chain or len(chain) >= MOST_BASES:
         raise DescriptionError(
-            f"{origin}: `base` leads back to it, or through more than {MOST_BASES} robots. Expected a robot that "
-            "stands by itself in the end."
+            f"{origin}: `base` leads back to it, or through more than {MOST_BASES} robots. Expected a robot "
+            "without `base` at the end of the chain."
         )
     if is_calibration(values):
         return _calibrated(_as_calibration(values, origin), origin, [*chain, str(file)]), origin
@@ -88,8 +88,9 @@ def load_calibration(path: str | Path) -> Calibration:
     values = read_toml(file, str(file))
     if not is_calibration(values):
         raise DescriptionError(
-            f"{file} is no calibration: it does not say format = {Calibration.model_fields['format'].default!r}. "
-            "Expected a file that `realitygap calibrate` wrote."
+            f"{file} is not a calibration: it does not have format = "
+            f"{Calibration.model_fields['format'].default!r}. Expected a file that `realitygap calibrate` "
+            "wrote."
         )
     return _as_calibration(values, str(file))
 
@@ -164,7 +165,9 @@ def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
     for kind, common in each.items():
         entries = values.get(kind)
         if not isinstance(entries, list) or not isinstance(common, dict):
-            raise DescriptionError(f"{origin}: [each.{kind}] goes with [[{kind}]], of which there are none.")
+            raise DescriptionError(
+                f"{origin}: [each.{kind}] is only for [[{kind}]], of which there are none."
+            )
         values[kind] = [common | entry if isinstance(entry, dict) else entry for entry in entries]
     return values
 

@@ -227,7 +227,7 @@ def _limited(name: str, drawn: Distribution, limits: Limits) -> Distribution:
         ValueError: It does not.
     """
     if drawn.normal is not None and not limits.least <= drawn.normal[0] <= limits.most:
-        raise ValueError(f"{name}: expected a mean {_in_words(limits)}, came {drawn.normal[0]:g}")
+        raise ValueError(f"{name}: expected a mean {_in_words(limits)}, got {drawn.normal[0]:g}")
     if drawn.normal is not None and drawn.lowest <= limits.least and limits.open_least:
         raise ValueError(
             f"{name}: a normal distribution reaches {limits.least:g}, and this number must be more. Add `least`"
@@ -240,7 +240,7 @@ def _limited(name: str, drawn: Distribution, limits: Limits) -> Distribution:
     is_low = drawn.lowest <= limits.least if limits.open_least else drawn.lowest < limits.least
     if is_low or drawn.highest > limits.most:
         raise ValueError(
-            f"{name}: expected numbers {_in_words(limits)}, came {drawn.lowest:g} to {drawn.highest:g}"
+            f"{name}: expected numbers {_in_words(limits)}, got {drawn.lowest:g} to {drawn.highest:g}"
         )
     return drawn
 

@@ -77,18 +77,18 @@ def box_as_corners(values: Any) -> Any:
         return values
     rest = {key: value for key, value in values.items() if key != "box"}
     if "corner" in values:
-        raise ValueError("expected box or corner, came both")
+        raise ValueError("expected box or corner, got both")
     box, radius = values["box"], values.get("radius", 0.0)
     sizes = [size for size in box if type(size) in (int, float)] if isinstance(box, list | tuple) else []
     if len(sizes) != 2 or len(box) != 2:
-        raise ValueError(f"expected box = [length, width], came {shown(box)}")
+        raise ValueError(f"expected box = [length, width], got {shown(box)}")
     if not isinstance(radius, int | float):
         return rest  # what is wrong with it is said by its own field
     across, up = sizes[0] / 2 - radius, sizes[1] / 2 - radius
     if not (across >= 0 and up >= 0 and max(sizes) > 0) or not math.isfinite(across + up):
         raise ValueError(
-            f"expected box = [length, width] of finite sizes, each at least twice the radius, {radius:g}, "
-            f"came {shown(box)}"
+            f"expected box = [length, width] of finite sizes, each at least twice the radius, {radius:g}, got "
+            f"{shown(box)}"
         )
     corners = dict.fromkeys([(across, up), (-across, up), (-across, -up), (across, -up)])  # a side may be 0
     return rest | {"corner": [{"x": x, "y": y} for x, y in corners]}
@@ -100,7 +100,10 @@ def why_no_part(corners: Sequence[tuple[float, float]], radius: float) -> str:
     if n < 3:
         if radius > 0 and (n == 1 or corners[0] != corners[1]):
             return ""
-        return f"expected a radius of more than 0 for {n} corner{'s' if n > 1 else ''} that differ, came {radius:g}"
+        return (
+            f"expected a radius of more than 0 for {n} corner{'s' if n > 1 else ''} that differ, got "
+            f"{radius:g}"
+        )
     edges = [(b[0] - a[0], b[1] - a[1]) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
     for k, edge in enumerate(edges):
         if edge == (0.0, 0.0):

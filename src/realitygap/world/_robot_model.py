@@ -195,11 +195,11 @@ class RangeSensor(Settings):
             raise ValueError(f"rays is {self.rays}, expected an odd number: one looks straight ahead")
         if self.response == "table" and len(self.table) < 2:
             raise ValueError(
-                f"expected a table of at least 2 rows with response 'table', came {len(self.table)}"
+                f"expected a table of at least 2 rows with response 'table', got {len(self.table)}"
             )
         if self.response != "table" and self.table:
             raise ValueError(
-                f"response is {self.response!r}, which needs no table. Leave it out, or say 'table'"
+                f"response is {self.response!r}, which needs no table. Leave it out, or set 'table'"
             )
         far = [sample.distance for sample in self.table]
         if any(a >= b for a, b in pairwise(far)):

@@ -124,7 +124,7 @@ class ArenaSettings(Settings):
         arena = _arena_of(info.data["preset"], info.data["read"])
         if isinstance(start, str):
             if info.data["read"] is not None or arena.name != "paper":
-                raise ValueError("goes with the paper's arena, expected [x, y, heading]")
+                raise ValueError("is only for the paper's arena, expected [x, y, heading]")
             return start
         x, y, heading = start
         if enclosing_walls(arena.walls) and not is_inside(arena, x, y):

@@ -143,19 +143,19 @@ def _root(text: str) -> ElementTree.Element:
     """The drawing; entities, which can make a small file huge, are refused."""
     declared = text.partition("<!DOCTYPE")[2].partition(">")[0]
     if "<!ENTITY" in text or "[" in declared:
-        raise ValueError("it declares entities of its own, which are not read. Save it as plain SVG")
+        raise ValueError("it declares entities which are not read. Save it as plain SVG")
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise ValueError(f"it is no SVG: {error}") from None
+        raise ValueError(f"it is not SVG: {error}") from None
     except ValueError as error:
-        raise ValueError(f"it is no SVG: {error}") from None
+        raise ValueError(f"it is not SVG: {error}") from None
     for element in root.iter():
         for key, value in element.attrib.items():
             if len(value) > MOST_LETTERS and key not in ("d", "points"):
                 raise ValueError(f"{_name(element)}: {key[:60]} has more than {MOST_LETTERS:,} letters")
     if root.tag.removeprefix(SVG) != "svg":
-        raise ValueError(f"it is no SVG: expected <svg>, came <{_tag(root)}>")
+        raise ValueError(f"it is not SVG: expected <svg>, got <{_tag(root)}>")
     return root
 
 
@@ -166,17 +166,17 @@ def _to_meters(root: ElementTree.Element) -> Affine:
     if len(box) != 4 or not (box[2] > 0 and box[3] > 0):
         if root.get("viewBox") is not None or root.get("data-meters-per-unit") is None:
             raise ValueError(
-                f"viewBox: expected four numbers, width and height above 0, came {shown(root.get('viewBox'))}"
+                f"viewBox: expected four numbers, width and height above 0, got {shown(root.get('viewBox'))}"
             )
         box = [0.0, 0.0, 0.0, 0.0]
     stated = root.get("data-meters-per-unit")
     if stated is not None:
         scale = (_numbers(stated) or [0.0])[0]
         if not scale > 0:
-            raise ValueError(f"data-meters-per-unit: expected a number above 0, came {shown(stated)}")
+            raise ValueError(f"data-meters-per-unit: expected a number above 0, got {shown(stated)}")
     elif size[0] is None:
         raise ValueError(
-            f"width: expected a length such as 800mm, to know how large the drawing is, came "
+            f"width: expected a length such as 800mm, to know how large the drawing is, got "
             f'{shown(root.get("width"))}. Or state data-meters-per-unit="0.001"'
         )
     else:

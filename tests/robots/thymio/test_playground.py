@@ -182,7 +182,7 @@ def test_a_recording_is_played_back_as_it_was(playground, tmp_path):
         assert again.observe() == seen[0]
         again.drive(Command(0.5, -0.25))
         assert again.observe().raw == seen[1].raw
-    with pytest.raises(RecordError, match="is there already"):
+    with pytest.raises(RecordError, match="exists already"):
         Thymio(playground.port, record=file)
 
 

@@ -21,7 +21,7 @@ CERTAIN = 0.05
 
 @dataclass(frozen=True)
 class Independence:
-    """How far readings depend on each other.
+    """The dependence of readings on each other.
 
     Attributes:
         placements: In how many placements the robot stood.
@@ -43,7 +43,7 @@ class Independence:
 
     @property
     def weight(self) -> float:
-        """What a reading counts, against an independent one."""
+        """The weight of a reading, relative to an independent one."""
         return self.effective / self.readings if self.readings else 1.0
 
 

@@ -35,7 +35,7 @@ SensorModel = PulseReadings | MixtureReadings
 
 @dataclass(frozen=True)
 class SensorFit:
-    """What was fitted to the readings of a sensor.
+    """The fit to the readings of a sensor.
 
     Attributes:
         name: Of the sensor, such as range.0.
@@ -82,7 +82,9 @@ def fit_sensor(
     refuse_response(robot, number, sensor.response)
     placements = [placement for placement in placements if len(placement.readings)]
     if not placements:
-        raise ValueError(f"There are no readings of range.{number}: expected those of a robot that stands.")
+        raise ValueError(
+            f"There are no readings of range.{number}: expected readings of a robot that does not move."
+        )
     apart = independence(placements, rng)
     model = _model(robot, number, placements, apart.weight)
 
@@ -164,7 +166,7 @@ def _unknown_battery(name: str) -> Fitted:
 
 
 def _curve(model: SensorModel, cone: float, rays: int, direction: float, values: Array) -> dict[str, Array]:
-    """What the fit reads before a wall that the robot faces."""
+    """Return the reading of the fit in front of a wall that the robot faces."""
     ahead = np.linspace(0.0, 1.1 * max(model.places.near.max(), 0.1), CURVE)
     angles = direction + (np.linspace(-cone, cone, rays) if rays > 1 else np.zeros(1))
     cosines = np.maximum(np.cos(angles), 1e-3)

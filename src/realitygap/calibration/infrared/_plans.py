@@ -1,4 +1,4 @@
-"""Where to put the robot for the calibration of its range sensors, and what it read there.
+"""The placements for the calibration of range sensors, and their readings.
 
 Source: Rosenzweig & Remy, section 2.3: fifty readings at each distance, 3 in apart. Differs: at least three placements
 at each distance, in rounds, so that a battery that drains is not taken for distance, nor a crooked placement for the
@@ -72,7 +72,7 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
         refuse_response(robot, k, sensor.response)
     distances = sensor_distances(robot)
     if not arena.walls:
-        raise ValueError(f"Arena {arena.name!r} has no wall to stand before.")
+        raise ValueError(f"Arena {arena.name!r} has no wall to face.")
     xs = [x for wall in arena.walls for x in wall[::2]]
     ys = [y for wall in arena.walls for y in wall[1::2]]
     front = max(sensor.x for sensor in robot.range)
@@ -80,7 +80,8 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
     distances = [distance for distance in distances if distance <= room]
     if not distances:
         raise ValueError(
-            f"Arena {arena.name!r} is too short for a robot to stand {sensor_distances(robot)[0]:.3g} m from a wall."
+            f"Arena {arena.name!r} is too short to place a robot {sensor_distances(robot)[0]:.3g} m from a "
+            "wall."
         )
     n = PLACEMENTS * len(distances) if n is None else n
     middle = (min(ys) + max(ys)) / 2

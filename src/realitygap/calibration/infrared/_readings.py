@@ -37,7 +37,7 @@ def refuse_response(robot: RobotModel, number: int, response: str) -> None:
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the robot was put once, and what the sensor read there.
+    """One placement of the robot, and the readings of the sensor there.
 
     Attributes:
         distances: (rays,) along the sensor's rays to what is nearest [m], at most its reach.

@@ -45,7 +45,7 @@ class Scale:
         return np.asarray((np.asarray(value) - self.low) / (self.high - self.low))
 
     def center(self, values: Array) -> float:
-        """What stands for draws.
+        """Return the center of samples.
 
         A decay is averaged as 1 / L: with log A it makes the readings' logarithms straight lines, so that the average
         of draws that agree with what was read agrees with it, too.
@@ -79,7 +79,12 @@ OUTLIER = (
     Scale("outlier_width", 0.005, 0.15, "ratio", "m", _FAR),
 )
 BURST = Scale(
-    "burst", 0.0, 1.0, "even", "", "Record where several pulses come back and some are missed: 4 to 12 in."
+    "burst",
+    0.0,
+    1.0,
+    "even",
+    "",
+    "Record at distances where some pulses return and some are missed: 4 to 12 in.",
 )
 INCIDENCE = Scale("incidence", 0.0, 4.0, "even", "", "Record near walls that are not faced.")
 BATTERY = Scale(
@@ -88,7 +93,7 @@ BATTERY = Scale(
     1.0,
     "even",
     "1/V",
-    "Record with a full and with a nearly empty battery: its voltage did not vary, or is not known.",
+    "Record with a full and with a nearly empty battery: its voltage did not vary, or is unknown.",
 )
 """Change of the logarithm of the amplitude with each volt."""
 

@@ -33,7 +33,7 @@ def stack(members: Sequence[T]) -> T:
     if isinstance(first, tuple):
         return type(first)(*(stack(parts) for parts in zip(*members, strict=True)))
     if any(member != first for member in members):
-        raise ValueError(f"Expected the same number in each, came {members}.")
+        raise ValueError(f"Expected the same number in each, got {members}.")
     return first
 
 

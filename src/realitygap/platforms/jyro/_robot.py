@@ -84,7 +84,7 @@ class JyroRobot(ProgramRobot):
         )
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for 0.1 s of the simulation."""
+        """Run one command for 0.1 s of the simulation."""
         self._check_open()
         given = np.array([check_command(command)], np.float64)
         step_robots(self._scene, self._fleet, given, self._cells, self._counts)
@@ -92,7 +92,7 @@ class JyroRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """Its pose."""
         return Pose(*poses_of(self._fleet.poses[0, :, :1].T, self._placed.start)[0].tolist())
 
     @property

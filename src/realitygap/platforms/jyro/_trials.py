@@ -121,7 +121,7 @@ def jyro_rules(
     bias_value: float,
     inputs: Sequence[str] = (),
 ) -> TrialRules:
-    """How a trial on `jyro` is run, in the form that kernels read.
+    """Return the rules of a trial on `jyro`, in the form that kernels read.
 
     Args:
         platform: Its settings.

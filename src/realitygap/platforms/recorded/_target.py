@@ -1,4 +1,4 @@
-"""Trials that were observed before, as a target: it carries out nothing, and shows what is in a file."""
+"""Earlier trials as a target: it runs nothing, and returns the trials of a file."""
 
 from __future__ import annotations
 
@@ -98,8 +98,9 @@ class RecordedTarget(RepeatableTarget):
             ]
             if taken[genome] >= len(there):
                 raise RecordError(
-                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, and one more is "
-                    f"asked for; most of its trials have {self.steps} steps. Ask for fewer, or record more."
+                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, but one more "
+                    f"was requested; most of its trials have {self.steps} steps. Request fewer, or record "
+                    "more."
                 )
             trial = _seen_as(there[taken[genome]], observe)
             taken[genome] += 1

@@ -40,7 +40,7 @@ Finely = tuple[int, int]
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """What m robots did in k trials of t commands, in single precision; row 0 is the start.
+    """Robots (m) in k trials of t commands, in single precision; row 0 is the start.
 
     What was not to be kept has no steps.
 
@@ -97,7 +97,7 @@ class Play:
         if self.genomes:
             del shapes["commands"]
             if len(self.genomes) != k:
-                raise ValueError(f"Came {len(self.genomes)} genomes and {k} starts, expected one for each.")
+                raise ValueError(f"Got {len(self.genomes)} genomes and {k} starts, expected one for each.")
             if len({genome.interface for genome in self.genomes}) > 1:
                 raise ValueError(
                     "The genomes have different inputs or outputs, expected genomes of one kind."
@@ -109,7 +109,7 @@ class Play:
                 raise ValueError(f"{name} has shape {came}, expected {expected}.")
         if k == 0 or self.n_steps < 1:
             raise ValueError(
-                f"Came {k} trials of {self.n_steps} commands, expected at least one of one command."
+                f"Got {k} trials of {self.n_steps} commands, expected at least one of one command."
             )
 
 
@@ -307,7 +307,7 @@ class SimEnsemble:
         ranges = dict(self._ranges)
         for name, value in (given or {}).items():
             if not np.isfinite(value).all():
-                raise ValueError(f"{name}: expected finite numbers, came one that is not.")
+                raise ValueError(f"{name}: expected finite numbers, got one that is not.")
             low, high = ranges.get(name, (np.inf, -np.inf))
             ranges[name] = (min(low, float(value.min())), max(high, float(value.max())))
         which = (inputs, *sorted(ranges.items()))
@@ -407,7 +407,7 @@ class _Work:
 
     @cached_property
     def _draws(self) -> Draws:
-        """What the platform draws for each trial, where no set gives it."""
+        """Return the numbers that the platform samples for each trial, if no set gives them."""
         own = {name: value for name, value in self.own.numbers.items() if name in self.scene.rows}
         return Draws({name: value for name, value in own.items() if name not in self.given})
 

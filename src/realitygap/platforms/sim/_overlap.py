@@ -1,4 +1,4 @@
-"""Whether robots that are put into an arena stand in something."""
+"""Overlaps between robots and an arena at the start."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def overlaps(part: Obstacle, other: Obstacle) -> bool:
 
 
 def as_obstacles(arena: Arena) -> list[Obstacle]:
-    """All that stands in an arena: its obstacles, and its walls without a width."""
+    """Return all obstacles of an arena: its obstacles, and its walls without a width."""
     walls = [Obstacle(0.0, 0.0, 0.0, ((x1, y1), (x2, y2))) for x1, y1, x2, y2 in arena.walls]
     return [*arena.obstacles, *walls]
 
 
 def _is_beside(part: Obstacle, other: Obstacle) -> bool:
-    """Whether all corners of another are in front of one side, before rounding; always so beside a single corner."""
+    """Return whether all corners of another body are in front of one side; True for a single corner."""
     corners, others = part.placed, other.placed
     if len(corners) == 1:
         return len(others) == 1

@@ -112,7 +112,7 @@ class SimRobot(ProgramRobot):
         return Observation(readings, bool(self._room.lanes.stalled[0] > 0), readings, channels)
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for `step_s` of the simulation."""
+        """Run one command for `step_s` of the simulation."""
         self._check_open()
         self._commands[:, 0] = check_command(command)
         shape, rules, room = self._scene.shape, self._rules, self._room
@@ -156,7 +156,7 @@ class SimRobot(ProgramRobot):
 
     @property
     def odometry(self) -> Pose:
-        """Where a program reckons the robot to be, from its encoders and where it began.
+        """Pose that a program would estimate from the encoders and the start.
 
         Raises:
             RobotError: The robot has no encoders.
@@ -174,7 +174,7 @@ class SimRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Where it is."""
+        """Its pose."""
         pose = self._room.lanes.pose
         here = np.array([[pose.x[0], pose.y[0], pose.heading[0]]])
         return Pose(*poses_of(here, self._scene.arena.start)[0].tolist())

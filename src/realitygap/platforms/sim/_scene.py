@@ -51,7 +51,7 @@ class SimScene:
 
     @property
     def drawn_names(self) -> tuple[str, ...]:
-        """Of the numbers that are drawn, in the order in which records have them."""
+        """Names of the sampled numbers, in the order of the records."""
         return tuple(name for name, value in self.numbers.items() if isinstance(value, Distribution))
 
     @property
@@ -111,7 +111,7 @@ def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise:
         for k in range(len(robot.range)):
             if highest(numbers[f"range.{k}.noise_uniform"]) > 0:
                 raise ValueError(
-                    f"noise is {noise:g}, and the robot has range.{k}.noise_uniform of its own, the same kind "
+                    f"noise is {noise:g}, and the robot has range.{k}.noise_uniform in its file, the same kind "
                     "of noise. Leave one of them out."
                 )
         numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}
@@ -202,7 +202,7 @@ def parts_of_step(
     step_s: float,
     halves: Sequence[ArrayLike] = (),
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Parts in which contact is looked for: of a step, and of its beginning while the command before still goes on.
+    """Return the parts with contact checks: of a step, and of its start while the previous command continues.
 
     Args:
         robot: Whose bodies they are.
@@ -223,8 +223,8 @@ def parts_of_step(
         substeps = -(-substeps // 6)
     if substeps.max() > MOST_PARTS:
         raise ValueError(
-            f"the robot drives up to {way.max():,.4g} m in a step, which takes {substeps.max():,} parts to look for "
-            f"contact in; expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
+            f"the robot drives up to {way.max():,.4g} m in a step, which needs {substeps.max():,} parts to "
+            f"look for contact in; expected at most {MOST_PARTS:,}. Is drive.speed in m/s, and step_s in s?"
         )
     while_late = np.maximum(1.0, np.ceil(substeps * np.minimum(latest / step_s, 1.0)))
     return substeps, np.where(latest > 0, while_late, 0.0).astype(np.int64)
@@ -237,12 +237,12 @@ def own_half(robot: RobotModel, number: int) -> NDArray[np.float64]:
 
 
 def _latest(most: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-    """How late a command may be [s]."""
+    """Return the maximum delay of a command [s]."""
     return np.add(most["drive.delay"], most["drive.delay_jitter"])
 
 
 def _farthest(most: Mapping[str, ArrayLike], step_s: float) -> NDArray[np.float64]:
-    """What a wheel drives in a step at most [m]: at any gain and bias, and with noise of six standard deviations."""
+    """Return the maximum distance of a wheel in a step [m], with noise of six standard deviations."""
     gain, bias = (
         np.maximum(most[f"drive.{name}_left"], most[f"drive.{name}_right"]) for name in ("gain", "bias")
     )

@@ -92,10 +92,11 @@ def as_numbers(values: Mapping[Any, Any]) -> tuple[dict[str, float | Distributio
             found[name] = value
         elif isinstance(value, bool) or not isinstance(value, int | float):
             problems.append(
-                f"{name}: expected a number, or how it is drawn, such as {{ uniform = [0.1, 0.2] }}, came {value!r}"
+                f"{name}: expected a number, or how it is drawn, such as {{ uniform = [0.1, 0.2] }}, got "
+                f"{value!r}"
             )
         elif not math.isfinite(value):
-            problems.append(f"{name}: expected a finite number, came {value!r}")
+            problems.append(f"{name}: expected a finite number, got {value!r}")
         else:
             found[name] = float(value)
     return found, problems
@@ -128,8 +129,8 @@ class SimSettings(SimulatedPlatform):
 
     robot: Annotated[RobotModel, BeforeValidator(_as_robot)] = Field(
         default_factory=lambda: _named_robot(DEFAULT_ROBOT),
-        description=f"A robot by name (`realitygap show robot`), the file of one, or a calibration, the robot with the "
-        f"numbers that were fitted; {DEFAULT_ROBOT} when not given. Results keep all that is in it.",
+        description="A robot by name (`realitygap show robot`), the file of one, or a calibration, the robot with the "
+        f"numbers that were fitted; {DEFAULT_ROBOT} when not given. Results store its whole content.",
     )
     steps: int = Field(
         100, ge=1, le=100_000, description="Steps of a trial: commands (section 2.2, the paper's robot: 100)."

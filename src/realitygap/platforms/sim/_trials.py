@@ -114,7 +114,7 @@ class SimTrials:
         return self._kept
 
     def _table_of(self, drawn: NDArray[np.float64]) -> NDArray[np.floating]:
-        """(p, n) the numbers of n trials, or (p, 1) where none is drawn. Only what is drawn is written anew."""
+        """Return the numbers of n trials, (p, n), or (p, 1) if none is sampled; only sampled ones are rewritten."""
         n = len(drawn)
         if not self.drawn_names:
             return self._fixed
@@ -126,7 +126,7 @@ class SimTrials:
 
 
 def sim_rules(scene: SimScene, bias_value: float) -> SimRules:
-    """How a trial is run, in the form that kernels read."""
+    """Return the rules of a trial, in the form that kernels read."""
     platform, grid, start = scene.platform, scene.arena.grid, scene.arena.start
     in_cells = [(start.x - grid.x) / grid.cell, (start.y - grid.y) / grid.cell]
     cells = [round(place) if abs(place - round(place)) < SNAP["double"] else place for place in in_cells]

@@ -62,7 +62,7 @@ class ThymioPlatform(Platform):
         description="Target of a wheel at full command; some robots go no faster than 300 to 400.",
     )
     reading_max: float = Field(
-        4505.0, gt=0, le=32_767, description="Infrared reading that counts as 1, as near as can be told."
+        4505.0, gt=0, le=32_767, description="Infrared reading that counts as 1, as near as measurable."
     )
     ground_white: float = Field(
         938.0, ge=0, le=1023, description="Reading of a ground sensor on a white floor."

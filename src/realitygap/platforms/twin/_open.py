@@ -43,7 +43,7 @@ class SimTwin(SimRobot):
 
     @property
     def number(self) -> int:
-        """Of the trial that the next `reset` begins."""
+        """Number of the trial that the next `reset` starts."""
         return self._number
 
     @number.setter
@@ -57,7 +57,7 @@ class SimTwin(SimRobot):
         self._points = [self.pose]
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for `step_s` of the simulation."""
+        """Run one command for `step_s` of the simulation."""
         super().drive(command)
         self.clock.sleep(self.step_s)
         self._points.append(self.pose)

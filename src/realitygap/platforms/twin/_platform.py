@@ -1,4 +1,4 @@
-"""The platform `twin`: a robot of real physics in MuJoCo, whose file is read in a process of its own."""
+"""The platform `twin`: a robot with physics by MuJoCo, whose file is read in a separate process."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class TwinPlatform(Platform):
     sha256: str = Field(
         "",
         pattern="^([0-9a-f]{64})?$",
-        description="Of the file: one that has changed is another twin.",
+        description="SHA-256 of the file. A changed file is another twin.",
         json_schema_extra={"hidden": True},
     )
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")

@@ -45,7 +45,7 @@ class TwinProcess:
 
     @property
     def pid(self) -> int | None:
-        """Of the process; None where there is none."""
+        """Process ID, or None without a process."""
         return None if self._process is None else self._process.pid
 
     def start(self) -> Any:
@@ -87,7 +87,7 @@ class TwinProcess:
         return reply["result"]
 
     def last_words(self) -> str:
-        """How it ended, and what it said last."""
+        """Return the exit status of the process, and its last message."""
         with contextlib.suppress(OSError, ValueError):
             size = self._said.seek(0, os.SEEK_END)
             self._said.seek(max(0, size - TOLD))
@@ -153,7 +153,7 @@ class TwinPool:
         except _EndedError:
             words = self._processes[0].last_words()
             self.close()
-            raise RobotError(f"The process of twin {file} does not come up: {words}.") from None
+            raise RobotError(f"The process of twin {file} does not start: {words}.") from None
         except BaseException:
             self.close()
             raise
@@ -170,7 +170,7 @@ class TwinPool:
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Of the processes that run."""
+        """IDs of the running processes."""
         return tuple(pid for process in self._processes if (pid := process.pid) is not None)
 
     def ask_all(self, requests: Sequence[Mapping[str, Any]]) -> Iterator[Any]:
@@ -221,7 +221,7 @@ def _end_all(processes: Sequence[TwinProcess], closed: threading.Event) -> None:
 
 
 def _error(kind: str, text: str) -> Exception:
-    """What went wrong in the other process, as an error of this one."""
+    """Return the error of the other process, as an error of this one."""
     found = getattr(errors, kind, None)
     if isinstance(found, type) and issubclass(found, errors.RealityGapError):
         return found(text)

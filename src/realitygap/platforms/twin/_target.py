@@ -1,4 +1,4 @@
-"""A twin as a target: it lives in processes of its own, and shows what a robot shows."""
+"""A twin as a target: it runs in separate processes, and shows only the data of a robot."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ class TwinTarget(RepeatableTarget):
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Of its processes."""
+        """IDs of its processes."""
         return self._pool.pids
 
     @property
     def sha256(self) -> str:
-        """Of its file, as the process that read it found it."""
+        """SHA-256 of its file, as the process read it."""
         return self._pool.sha256
 
     @property

@@ -39,7 +39,7 @@ def release_twins() -> None:
 
 
 def close_twins() -> None:
-    """End the processes of all twins on which studies are carried out, whatever they are at."""
+    """End the processes of all twins of studies, whatever they are doing."""
     with _lock:
         pools = list(_pools.values())
         _last.clear()
@@ -63,8 +63,8 @@ def shared_pool(file: str, sha256: str, arena: Arena) -> TwinPool:
             if sha256 not in ("", pool.sha256):
                 pool.close()
                 raise StudyError(
-                    f"The twin's file {file} has changed: its SHA-256 begins with {pool.sha256[:12]}, "
-                    f"expected {sha256[:12]}. Put the old file back, or begin anew with the new one."
+                    f"The twin's file {file} has changed: its SHA-256 begins with {pool.sha256[:12]}, expected "
+                    f"{sha256[:12]}. Restore the old file, or restart with the new one."
                 )
             _pools[name] = pool
         _last[:] = [pool]

@@ -42,7 +42,7 @@ class _Twin:
         self._fleet: list[TwinRobot | SimTwin] = []
 
     def facts(self) -> dict[str, Any]:
-        """What is known of any robot, and the hash of the file."""
+        """Return the facts known of any robot, and the hash of the file."""
         robot = self._robot
         return {
             "step_s": robot.step_s,

@@ -92,7 +92,7 @@ class Identity(Device):
             if self.forwardness == ahead:
                 return
         raise RobotError(
-            f"The Fluke on {self.info.port} does not keep '{ahead}' ahead: it was told three times, and says "
+            f"The Fluke on {self.info.port} does not keep '{ahead}' ahead: after three requests, it reports "
             f"'{self.forwardness}'. Switch it off and on, then try again."
         )
 

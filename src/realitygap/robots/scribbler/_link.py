@@ -196,7 +196,7 @@ def _advice(name: str, error: Exception) -> str:
         return "`import realitygap.emulator` makes such ports known."
     if "://" in name:
         return "Is the address right, and does something listen there?"
-    return "Is the robot on, paired and connected? `realitygap robot list` names the ports that are there."
+    return "Is the robot on, paired and connected? `realitygap robot list` lists the existing ports."
 
 
 class Link:
@@ -273,7 +273,7 @@ class Link:
         """
         with self.lock:
             if not self._is_open:
-                raise RobotError(f"{self.name} is closed: open the robot anew before '{request.name}'.")
+                raise RobotError(f"{self.name} is closed. Reopen the robot before '{request.name}'.")
             if self.watch is not None:
                 self.watch()
             fault, lost, n_sent = None, False, 0
@@ -316,7 +316,9 @@ class Link:
                 if request.answer or request.echoed:
                     got = read_answer(port, request, self.fluke)
                     if port.in_waiting:
-                        raise Fault("More came than the answer", ProtocolError, got, understood=True)
+                        raise Fault(
+                            ("More bytes arrived than the answer has"), ProtocolError, got, understood=True
+                        )
             except _HANG_UPS as error:
                 raise HangUp(f"The port hung up ({error})", RobotError, got) from error
             try:
@@ -660,7 +662,7 @@ class Link:
         again = (
             ""
             if request.repeatable or not n_sent
-            else f" It is not safe to repeat '{request.name}': was it carried out?"
+            else f" It is not safe to repeat '{request.name}': it may have been executed."
         )
         kind = fault.kind if fault is not None else RobotError
         return kind(

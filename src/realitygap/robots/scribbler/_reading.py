@@ -106,7 +106,7 @@ def _read_until(port: Port, end: bytes, wait_s: float, longest: int, more: int =
     while (at := buffer.find(end, searched)) < 0:
         searched = max(len(buffer) - len(end) + 1, 0)
         if len(buffer) > longest:
-            raise Fault(f"{len(buffer)} bytes came without an end", ProtocolError, bytes(buffer[:64]))
+            raise Fault(f"{len(buffer)} bytes arrived without an end", ProtocolError, bytes(buffer[:64]))
         if silent >= (GAP_S if buffer else wait_s):
             raise _short(bytes(buffer), len(buffer) + 1 + more, silent, 0)
         got = port.read(max(port.in_waiting, 1 + more))
@@ -116,12 +116,12 @@ def _read_until(port: Port, end: bytes, wait_s: float, longest: int, more: int =
     if len(buffer) < n:
         buffer += _read_exactly(port, n - len(buffer), GAP_S)
     if len(buffer) > n:
-        raise Fault("More came than the answer", ProtocolError, bytes(buffer), understood=True)
+        raise Fault("More bytes arrived than the answer has", ProtocolError, bytes(buffer), understood=True)
     return bytes(buffer)
 
 
 def _short(got: bytes, n: int, patience: float, n_echo: int) -> Fault:
     if not got:
         return Fault(f"No answer within {patience:.1f} s", RobotTimeout)
-    text = f"Only {len(got)} of {n} bytes came within {patience:.1f} s"
+    text = f"Only {len(got)} of {n} bytes arrived within {patience:.1f} s"
     return Fault(text, RobotTimeout, got, understood=len(got) >= max(n_echo, 1))

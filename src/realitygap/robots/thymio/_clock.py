@@ -59,7 +59,7 @@ class BoardClock:
         if passed:
             self._moved_at = host
         elif host - self._moved_at > CLOCK_STANDS_S:
-            raise RobotError("The clock on board of the Thymio stands still: its program does not run.")
+            raise RobotError("The clock on board of the Thymio does not advance: its program does not run.")
         self._ticks, self._at = ticks, host
         self._measure_rate(host)
 

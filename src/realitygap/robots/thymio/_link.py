@@ -204,7 +204,7 @@ class Link:
                 events.append(messages.local_event(message.payload))
             counts = (len(variables), len(events))
             if counts[0] > found[0].n_variables or counts[1] > found[0].n_events:
-                raise ProtocolError(f"The robot on {self.name} described more than it said.")
+                raise ProtocolError(f"The robot on {self.name} described more than it announced.")
             return counts == (found[0].n_variables, found[0].n_events)
 
         self._send(messages.get_description(node))
@@ -296,7 +296,8 @@ class Link:
                 if self.read(robot, (offset, len(values))) == [tuple(values)]:
                     return
             raise RobotError(
-                f"The Thymio on {self.name} does not take values: quit other programs that use it, and try again."
+                f"The Thymio on {self.name} does not accept values. Quit other programs that use it, and try "
+                "again."
             )
 
     def emit(self, event: int, values: Sequence[int]) -> None:

@@ -104,6 +104,6 @@ def _off_screen(width: int, height: int) -> Any:
             context.make_current()
             return context
     raise RobotError(
-        "This machine cannot draw in three dimensions without a screen: neither EGL (Debian: libegl1) nor OSMesa "
-        "(libosmesa6) is there. Take the view from above."
+        "This machine cannot draw in three dimensions without a screen: neither EGL (Debian: libegl1) nor "
+        "OSMesa (libosmesa6) is installed. Use the view from above."
     )

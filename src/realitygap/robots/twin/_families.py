@@ -124,7 +124,7 @@ FAMILIES: dict[str, Family] = {
         },
     ),
     "delayed": Family(
-        "commands that come late, and unevenly so",
+        "late commands, with an uneven delay",
         {
             "motors.delay": Range(0.12, 0.4),
             "motors.delay_jitter": Range(0.03, 0.12),

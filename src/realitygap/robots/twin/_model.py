@@ -93,7 +93,7 @@ class TwinMotors(Settings):
     """How commands turn the wheels."""
 
     speed: Annotated[float, Field(ge=0.01, le=1)] = Field(
-        0.15, description="Of a wheel at full command [m/s]."
+        0.15, description="Speed of a wheel at full command [m/s]."
     )
     ahead: Literal[1, -1] = Field(
         1, description="Which end is ahead: 1 the one with caster and Fluke (+x), -1 the other one."

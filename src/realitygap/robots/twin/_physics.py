@@ -90,8 +90,8 @@ class Physics:
         self._mujoco.mj_step(self.mj_model, self.mj_data, nstep=steps)
         if any(warning.number for warning in self._lost):  # then it has begun anew, somewhere else
             raise RobotError(
-                "The twin's physics came apart: its file asks for more than steps of 5 ms can follow. Use softer "
-                "motors (motors.stiffness, motors.torque) or a heavier body."
+                "The twin's physics diverged: its file needs steps of less than 5 ms. Use softer motors "
+                "(motors.stiffness, motors.torque) or a heavier body."
             )
 
     @property

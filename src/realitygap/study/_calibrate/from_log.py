@@ -68,7 +68,7 @@ def calibrate_from_log(
     fit, compared = _fit(path, log, robot, hold_out, seed)
     notes = [f"Mapping: {origin}.", *log.notes, *_notes(diagnosis), *fit.notes]
     if n_logs > 1:
-        notes.append(f"The longest of {n_logs} trials is fitted{f', {log.name}' if log.name else ''}.")
+        notes.append(f"The fit uses the longest of {n_logs} trials{f', {log.name}' if log.name else ''}.")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
     numbers: dict[str, float] = {key: value for key, value in given.items() if value}
     draws = fit.draws

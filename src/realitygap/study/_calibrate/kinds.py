@@ -1,4 +1,4 @@
-"""What can be calibrated: the trials that it takes, and the fit to them."""
+"""The kinds of calibration: their trials, and the fit to them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from .whole import ALL_TRIALS, all_plans, fit_everything
 
 @dataclass(frozen=True)
 class Kind:
-    """What can be calibrated.
+    """A kind of calibration.
 
     Attributes:
         plans: Trials for an arena, a robot and a budget.
@@ -158,7 +158,7 @@ def _ends_at_a_wall(trial: TrialRecord, robot: RobotModel, arena: Arena) -> bool
 
 
 def _moved_in_sim(trial: TrialRecord, robot: RobotModel, arena: Arena) -> Moved:
-    """How the simulated robot moves in a trial, without noise, where nothing stands in its way.
+    """Simulate the motion of a robot in a trial, without noise and without obstacles.
 
     Raises:
         ValueError: A command turns it by so much that turns cannot be counted.
@@ -215,8 +215,8 @@ def _fit_sensors(
     standing = [trial for trial in trials if len(trial.commands) and not np.any(trial.commands)]
     if not standing:
         raise ValueError(
-            "In no trial the robot stands still: expected readings before a wall, as `realitygap calibrate sensors` "
-            "records them."
+            "The robot is never still: expected trials with readings in front of a wall, as `realitygap "
+            "calibrate sensors` records them."
         )
     found = {trial.readings.shape[1] for trial in standing}
     if found != {len(robot.range)}:
@@ -255,13 +255,13 @@ def _said_of_placements(placements: Sequence[Placement]) -> tuple[str, ...]:
     if min(Counter(placement.group for placement in placements).values()) >= LEAST_PLACEMENTS:
         return ()
     return (
-        f"Some distances have fewer than {LEAST_PLACEMENTS} placements: what lies between placements cannot be told "
-        "there, and intervals may be too narrow.",
+        f"Some distances have fewer than {LEAST_PLACEMENTS} placements, so the variation between placements is "
+        "unknown there. Intervals may be too narrow.",
     )
 
 
 def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]:
-    """What Figure 3 draws of a sensor."""
+    """Return the data of a sensor for Figure 3."""
     return {
         "name": fit.name,
         "distances_m": [float(placement.distances.min()) for placement in placements],
@@ -299,7 +299,7 @@ def _fit_contact(
 
 
 def _of_purpose(trials: Sequence[TrialRecord], purpose: str) -> list[TrialRecord]:
-    """The trials that were carried out for it; all with commands where none was."""
+    """Return the trials of a purpose, or all with commands if none has it."""
     return [trial for trial in trials if trial.purpose == purpose] or [
         trial for trial in trials if len(trial.commands)
     ]

@@ -58,7 +58,7 @@ def calibrate(
     operator: Operator | None = None,
     tell: Tell | None = None,
 ) -> Calibration:
-    """Carry out the trials of a calibration on a target, and fit a simulated robot to what is observed.
+    """Run the trials of a calibration on a target, and fit a simulated robot to the observations.
 
     Args:
         kind: path, sensors, motion, contact or all.
@@ -80,11 +80,11 @@ def calibrate(
     """
     _refuse(kind, target, robot, observe, budget)
     if choose and kind != "all":
-        raise StudyError(f"--choose goes with all: the trials of {kind} are known before the first of them.")
+        raise StudyError(f"--choose is only for all: the trials of {kind} are fixed in advance.")
     if choose and budget is not None and budget < LEAST_TO_CHOOSE:
         raise StudyError(
-            f"--budget is {budget}, and the last trials can be chosen where there are at least {LEAST_TO_CHOOSE}: the "
-            "first ones have to tell which. Give more, or leave out --choose."
+            f"--budget is {budget}, but choosing the last trials needs at least {LEAST_TO_CHOOSE}, because the "
+            "choice depends on the first ones. Give more, or leave out --choose."
         )
     around: Target = OperatedTarget(target, operator) if operator is not None else RuledTarget(target)
     if trials_file is None:
@@ -145,7 +145,7 @@ def _chosen(
 
 
 def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:
-    """Return where a calibration can be carried out.
+    """Raise an error if a calibration cannot run.
 
     Raises:
         StudyError: It cannot be.
@@ -154,7 +154,7 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
     base, made = load_robot(robot), KINDS[kind]
     if budget is not None and budget < made.least:
         raise StudyError(
-            f"--budget is {budget}, and a calibration of {kind} takes at least {made.least} trials."
+            f"--budget is {budget}, but a calibration of {kind} needs at least {made.least} trials."
         )
     if observe not in made.observes:
         raise _too_little_seen(kind, observe)
@@ -164,8 +164,8 @@ def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budg
 
 def _too_little_seen(kind: str, observe: Observe) -> StudyError:
     return StudyError(
-        f"Of {observe} alone nothing is told of {kind}. Let more be observed (--observe "
-        f"{' or '.join(KINDS[kind].observes)}); `calibrate all` makes do with cells."
+        f"{observe} alone does not identify {kind}. Record more (--observe "
+        f"{' or '.join(KINDS[kind].observes)}); `calibrate all` also works with cells."
     )
 
 
@@ -353,7 +353,7 @@ def calibration_of(
 
 
 def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
-    """What an earlier calibration says of numbers that a later one has not fitted anew.
+    """Return the warnings of an earlier calibration about numbers that a later one has not refitted.
 
     `range.amplitude` is that of all sensors together, and `range.0.amplitude` of one; steps of a path follow from
     gains.
@@ -382,9 +382,9 @@ def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
     except ValueError as error:
         said = "; ".join(line.removeprefix("RobotModel.") for line in str(error).split("\n"))
         raise StudyError(
-            f"What was fitted to {target} makes no robot: {said} Did it go back when it was told to go ahead, or turn "
-            "the other way? See which end of it is ahead, and that left and right are not swapped. Trials that were "
-            "kept are safe."
+            f"The numbers fitted to {target} are not a valid robot: {said} Did it drive backward on a forward "
+            "command, or turn in the wrong direction? Check which end is the front, and that left and right "
+            "are not swapped. Saved trials are safe."
         ) from None
 
 

@@ -72,7 +72,7 @@ def calibrate_all(
     keep: Callable[[TrialRecord], None] | None = None,
     threads: int | None = None,
 ) -> Calibration:
-    """Carry out trials on a target and fit all parameters of `sim` to what was observed.
+    """Run trials on a target, and fit all parameters of `sim` to the observations.
 
     Half of the trials are commands that change often, from many places; the other half are random controllers from
     the arena's start.
@@ -191,7 +191,7 @@ class _Fit:
         return evidence_of(trials, genomes, self.arena.grid.n_cells)
 
     def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
-        """What is left of the prior.
+        """Return the part of the prior that remains.
 
         With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
         where `sim` cannot make both, the first knows how the robot moves and the second what comes of it.
@@ -254,7 +254,7 @@ class _Fit:
         return [TrialPlan(**{**vars(plan), "number": number + k}) for k, plan in enumerate(plans)]
 
     def _unseen(self, plan: TrialPlan) -> list[Evidence]:
-        """What a trial that was not carried out would tell, seen from afar."""
+        """Predict the information in a trial that was not run."""
         n, s = plan.steps, len(self.robot.range)
         commands = plan.commands if plan.genome is None else np.zeros((n, 2))
         start = plan.start or self.arena.start
@@ -263,7 +263,7 @@ class _Fit:
         return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
 
     def _as_it_is(self) -> Parts:
-        """Of no trials: the robot's own numbers."""
+        """Return the calibration without trials: the robot's own numbers."""
         plain = {
             name: value.center if isinstance(value, Distribution) else value
             for name, value in self.robot.numbers().items()

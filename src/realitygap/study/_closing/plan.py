@@ -36,7 +36,7 @@ class TwinName(NamedTuple):
 
 @dataclass(frozen=True)
 class ClosingPlan:
-    """What is done with how many twins.
+    """The plan of the study: twins, budgets, and trials.
 
     Attributes:
         study: Study whose first condition on `sim` is evolved, the paper's objective search on a robot.
@@ -99,7 +99,7 @@ class ClosingPlan:
 
     @property
     def n_units(self) -> int:
-        """Files of results in all."""
+        """Total number of files of results."""
         return sum(1 for name in self.names for _ in self.units(name))
 
     def units(self, name: TwinName) -> Iterator[str]:

@@ -29,7 +29,7 @@ from .twin import ClosingTwin
 
 @dataclass(frozen=True)
 class ClosingProgress:
-    """How far the study is.
+    """The progress of the study.
 
     Attributes:
         n_done: Units that are there.
@@ -49,7 +49,7 @@ def closing_the_gap(
     processes: int | None = None,
     tell: Callable[[ClosingProgress], None] | None = None,
 ) -> dict[str, Any]:
-    """Carry out the study, or what is missing of it, and sum up.
+    """Run the study, or the missing parts of it, and summarize it.
 
     Each twin is drawn from its family into a file, which only the process that simulates it reads. The held-out
     controllers are tried on it; the simulator is calibrated by each budget of trials and way to observe, and judged by
@@ -141,7 +141,7 @@ def _carry_out(
 def _carry_out_apart(
     plan: ClosingPlan, names: list[TwinName], folder: Path, processes: int, show: Callable[[], None]
 ) -> None:
-    """Twins in processes of their own, as many at once; whatever ends this ends them."""
+    """Run twins in parallel processes; if this process ends, they end, too."""
     context = multiprocessing.get_context("spawn")
     left = list(names)
     under_way: list[tuple[Any, Connection]] = []
@@ -166,7 +166,7 @@ def _carry_out_apart(
 
 
 def _report(pipe: Connection, plan: ClosingPlan, name: TwinName, folder: Path) -> None:
-    """One twin in a process of its own, which sends what went wrong, or None."""
+    """Run one twin in a separate process, which sends its error, or None."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     problem: BaseException | None = None
     try:
@@ -179,7 +179,7 @@ def _report(pipe: Connection, plan: ClosingPlan, name: TwinName, folder: Path) -
 
 
 def _end_with_parent() -> None:
-    """A study that was killed leaves nobody behind who writes to its folder beside the next one."""
+    """End this process with its parent, so that no other process writes to the folder."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         wait([parent.sentinel])

@@ -1,4 +1,4 @@
-"""What came of `closing-the-gap`: each goal with its figure, its interval, and whether it is met."""
+"""The results of `closing-the-gap`: each goal with its figure, its interval, and its verdict."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Row = dict[str, Any]
 
 
 def summarize_closing(folder: str | Path) -> dict[str, Any]:
-    """Sum up what there is of the study in a folder; what is missing is said.
+    """Summarize the existing parts of the study in a folder, and list the missing ones.
 
     Returns:
         `plan`; `twins`: of each one the RMS gap before and after by observation and budget, whether it counts, and
@@ -70,7 +70,7 @@ def summarize_closing(folder: str | Path) -> dict[str, Any]:
 
 
 def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
-    """What is there, by twin and unit."""
+    """Read the existing results, by twin and unit."""
     found: dict[str, dict[str, Row]] = {}
     for name in plan.names:
         for unit in plan.units(name):
@@ -89,7 +89,7 @@ def _goal_budget(plan: ClosingPlan) -> int:
 
 
 def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | None:
-    """What came of a twin; None while not even the gap of the simulator as it is is known."""
+    """Return the results of a twin, None before its gap to the uncalibrated simulator is measured."""
     before = units.get("gap-none-0")
     if before is None:
         return None
@@ -126,7 +126,7 @@ def standard_error(estimate: Row) -> float | None:
 
 
 def _calibrated(unit: Row, before: Row) -> Row:
-    """One calibration: how far the gap fell, and what the fit says of itself."""
+    """Return the fall of the gap with one calibration, and the checks of the fit."""
     after, fit = unit["gap"]["rms"], unit["calibration"]
     known = after["estimate"] is not None and before["estimate"]
     return {
@@ -145,7 +145,7 @@ def _calibrated(unit: Row, before: Row) -> Row:
 
 
 def _measures(unit: Row) -> Row:
-    """Of a gap, what figures need."""
+    """Return the numbers of a gap that figures need."""
     gap = unit["gap"]
     names = ("srcc", "srcc_disattenuated", "mmrv", "mmrv_floor", "level")
     found: Row = {name: gap[name]["estimate"] for name in names}
@@ -279,7 +279,7 @@ def is_met(low: float | None, high: float | None, goal: float, sense: str) -> bo
 def _median_goal(
     name: str, found: Sequence[tuple[Row, Row, float | None]], goal: float, *, above: bool
 ) -> Row:
-    """A goal of a median over twins; a twin of which the figure is not known is said, and not counted."""
+    """Return a goal for a median over twins; twins without the figure are listed and not counted."""
     known = [(twin, after, value) for twin, after, value in found if value is not None]
     figure = median_interval([value for _, _, value in known])
     sense = "at least" if above else "at most"
@@ -372,11 +372,11 @@ def _why_unknown(name: str, after: Row) -> str:
     gap = after["gap"]
     if name.startswith("MMRV") and gap["mmrv_floor"] == 0 and gap["mmrv"] is not None:
         return f"its floor is 0, the same order in both halves of its trials; MMRV is {gap['mmrv']:.3f}"
-    return "its trials are too few to tell"
+    return "it has too few trials to decide"
 
 
 def _why(row: Row, after: Row, value: float) -> Row:
-    """What is known of a twin that misses a goal."""
+    """Return the facts about a twin that misses a goal."""
     names = ("misspecified", "misspecification_p", "at_prior_end")
     return {
         "twin": row["twin"],

@@ -81,7 +81,7 @@ class ClosingTwin:
 
     @cached_property
     def condition(self) -> Condition:
-        """What is evolved in simulation; its platform is the simulator as it is."""
+        """The condition evolved in simulation, on the uncalibrated simulator."""
         return choose_condition(self.plan.study, None, self.plan.seed)
 
     @cached_property
@@ -124,7 +124,7 @@ class ClosingTwin:
         return GapSide(condition.name, condition.label, crossed.mean(axis=2), crossed)
 
     def _gap(self, target: Target, observe: str, budget: int) -> dict[str, Any]:
-        """The gap to the simulator as it is, or as a calibration by so many trials makes it."""
+        """Measure the gap to the uncalibrated simulator, or to the calibration with this number of trials."""
         if not budget:
             return self._measured(self.condition, None)
         calibration = self._calibration(target, cast("Observe", observe), budget)
@@ -157,7 +157,7 @@ class ClosingTwin:
         return {"random": slice(0, n), "champions": slice(n, None)}
 
     def _calibration(self, target: Target, observe: Observe, budget: int) -> Calibration:
-        """That by so many trials, which is made where it is not there; its trials are kept as they come."""
+        """Return the calibration with this number of trials; run it first if it does not exist."""
         place = self.folder / "calibrations" / f"{self.name}-{observe}-{budget}"
         path = place.with_suffix(".toml")
         if not path.exists():

@@ -102,8 +102,8 @@ def gap_between(
     steps = STEPS
     if len(recorded) == 1:
         raise StudyError(
-            f"The trials in {target.partition(':')[2]} are of one controller, expected at least 2: a gap is told from "
-            "how several differ. Record more, such as with: realitygap gap SIM TARGET -o FILE"
+            f"The trials in {target.partition(':')[2]} are of one controller, expected at least 2: a gap is "
+            "estimated from several. Record more, for example with: realitygap gap SIM TARGET -o FILE"
         )
     if recorded:
         n_controllers, trials = min(n_controllers, len(recorded)), min(trials, recorded[0][1])
@@ -112,18 +112,15 @@ def gap_between(
     calibration = calibration_of(sim)
     if why and calibration is None:
         raise StudyError(
-            f"Parts of the model are switched in from a calibration, and {sim} is none. Make one with: realitygap "
-            f"calibrate all --robot {target} --observe {observe or 'cells'} -o fit.toml; then measure the gap of "
-            "sim:fit.toml."
+            f"--why needs a calibration, but {sim} is not one. Make one with: realitygap calibrate all --robot "
+            f"{target} --observe {observe or 'cells'} -o fit.toml; then measure the gap of sim:fit.toml."
         )
     if why and noise:
         raise StudyError(
             f"--why switches parts of the model in without the paper's noise, and --noise is {noise:g}. Leave one out."
         )
     if why and trials < 2:
-        raise StudyError(
-            "Why there is a gap needs at least 2 trials of each controller, to tell it from noise."
-        )
+        raise StudyError("--why needs at least 2 trials of each controller, to separate the gap from noise.")
     tell_of = say or (lambda _: None)
     if recorded:
         tell_of(f"The {n_controllers} controllers of {target}, {trials} trials each.")
@@ -153,8 +150,8 @@ def gap_between(
     ):
         if costly.label == "REAL" and results is None and not isinstance(costly, RecordedTarget):
             raise StudyError(
-                f"{n_controllers * trials} trials on {target} would be kept nowhere, and lost where anything goes "
-                "wrong. Name a file for them (-o FILE.jsonl): the same command goes on there."
+                f"{n_controllers * trials} trials on {target} would not be saved. Name a file for them (-o "
+                "FILE.jsonl), so that the same command can resume."
             )
         found = study_gap(
             source,
@@ -211,13 +208,14 @@ def _refuse_elsewhere(evolved: Sequence[Controller], named: str, platform: str) 
         where = each.selected_on or "nowhere"
         if each.kind != "champion" or where.partition(":")[0] != platform.partition(":")[0]:
             raise StudyError(
-                f"{each.name} of {named} was evolved {'on ' if each.selected_on else ''}{where}, expected champions "
-                f"evolved on {platform}: the re-evolved gap is between such of both platforms."
+                f"{each.name} of {named} was evolved {'on ' if each.selected_on else ''}{where}, expected "
+                f"champions evolved on {platform}. The re-evolved gap compares champions evolved on each "
+                "platform."
             )
 
 
 def _misspecified(calibration: Calibration | None) -> bool | None:
-    """What the predictive check of a calibration said; that of a part can find fault, and acquits of nothing."""
+    """Return the verdict of a calibration's predictive check; for a partial calibration, True or None, never False."""
     if calibration is None:
         return None
     return calibration.misspecified if calibration.kind == "all" else calibration.misspecified or None

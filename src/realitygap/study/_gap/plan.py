@@ -1,4 +1,4 @@
-"""How many controllers and trials a question about the gap takes."""
+"""The numbers of controllers and trials that a question about the gap needs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Question = Literal["effect", "margin", "correlation"]
 
 @dataclass(frozen=True)
 class Spreads:
-    """What a plan has to know of trials.
+    """The spreads of trials that a plan needs.
 
     Attributes:
         noise: Standard deviation of trials about their controller's mean, in units of the score.
@@ -48,7 +48,7 @@ class Spreads:
 
 @dataclass(frozen=True)
 class GapPlan:
-    """How many controllers it takes with so many trials of each.
+    """A plan: the number of controllers needed for each number of trials.
 
     Attributes:
         question: effect, margin or correlation.
@@ -66,7 +66,7 @@ class GapPlan:
 
     @property
     def best(self) -> Needed | None:
-        """The row with the fewest trials on the target in all; None where no gap can be measured by so many."""
+        """The row with the fewest trials on the target; None if no row can be measured."""
         there = [row for row in self.needed if row.controllers and row.controllers <= MOST_CONTROLLERS]
         return min(there, key=lambda row: row.on_target or 0) if there else None
 
@@ -106,7 +106,7 @@ def recorded_spreads(path: str, task: Task | None = None) -> Spreads:
     repeated = [values for values in by_genome.values() if len(values) > 1]
     if len(repeated) < 2:
         raise StudyError(
-            f"{path} has {len(repeated)} controllers that were tried more than once, expected at least 2."
+            f"{path} has {len(repeated)} controllers with more than one trial, expected at least 2."
         )
     r = min(len(values) for values in repeated)
     values = np.array([values[:r] for values in repeated])

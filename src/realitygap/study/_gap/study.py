@@ -1,4 +1,4 @@
-"""The gap between two platforms, measured: the same controllers carried out on both."""
+"""The gap between two platforms, measured by running the same controllers on both."""
 
 from __future__ import annotations
 
@@ -301,7 +301,7 @@ def _replay(source: Target, observed: Sequence[TrialRecord], n: int, tell: Tell 
 
 
 def _luck(controllers: Sequence[Controller], task: Task) -> Estimate:
-    """What champions lose on fresh seeds, on the platform where they were selected."""
+    """Measure the loss of champions on fresh seeds, on the platform that selected them."""
     if not have_same_score(task_of(controllers), task):
         return Estimate.refusal(0, f"The controllers were selected for another score than {task.score_name}.")
     lost = [

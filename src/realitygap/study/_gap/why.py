@@ -86,7 +86,8 @@ def why_gap(
     """
     if target.trials < 2:
         raise StudyError(
-            f"{target.name} has one trial of each controller, which does not tell noise from a gap. Ask for 2 or more."
+            f"{target.name} has one trial of each controller, so noise and gap cannot be separated. Request 2 "
+            "or more."
         )
     robot = load_robot(calibration.robot)
     default = {name: value for name, value in robot.numbers().items() if isinstance(value, float | int)}

@@ -17,7 +17,7 @@ from .target import KeptTarget
 
 
 class Simulation:
-    """Evolution in simulation, the same for all strategies: so many runs of so many repeats.
+    """Evolution in simulation, the same for all strategies: runs and repeats.
 
     Args:
         runs: Runs in a replicate.
@@ -51,10 +51,10 @@ class Simulation:
 
 
 class Calibrates(Protocol):
-    """How calibrations come about that strategies share."""
+    """A source of the calibrations that strategies share."""
 
     def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
-        """The calibration where so many trials are left, and the robot on whose numbers it builds.
+        """Return the calibration for the remaining trials, and its base robot.
 
         Its `trials` are what it spends of them.
         """
@@ -63,7 +63,7 @@ class Calibrates(Protocol):
 
 @dataclass(frozen=True)
 class Attempt:
-    """What a strategy has at hand.
+    """The resources of a strategy.
 
     Attributes:
         condition: Evolved in simulation.

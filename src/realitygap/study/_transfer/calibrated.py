@@ -135,6 +135,6 @@ class Calibrating:
                     seed=self.seed,
                 )
             except ValueError as error:
-                raise StudyError(f"{error} The trials are kept in {trials}.") from error
+                raise StudyError(f"{error} The trials are saved in {trials}.") from error
         write_whole(path, calibration.to_toml().encode(), within=self.folder)
         return calibration

@@ -90,8 +90,9 @@ def needs_sim(condition: Condition, strategy: str) -> SimPlatform:
     sim = as_sim(condition.on)
     if sim is None:
         raise StudyError(
-            f"Strategy {strategy!r} changes numbers of the simulated robot, and condition {condition.name!r} is on "
-            f"platform {condition.platform!r}, which has none. Choose a condition on platform 'sim'."
+            f"Strategy {strategy!r} changes numbers of the simulated robot, but platform "
+            f"{condition.platform!r} of condition {condition.name!r} has none. Choose a condition on platform "
+            "'sim'."
         )
     return sim
 

@@ -1,4 +1,4 @@
-"""What came of a transfer: quality on the target by strategy and budget, with intervals."""
+"""The result of a transfer: quality on the target by strategy and budget, with intervals."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Transferred:
 
 @dataclass(frozen=True)
 class Strategist:
-    """What came of a strategy with one budget.
+    """The result of a strategy with one budget.
 
     Attributes:
         strategy: Its name.
@@ -64,7 +64,7 @@ class Strategist:
 
 @dataclass(frozen=True)
 class TransferResult:
-    """A transfer, carried out.
+    """The result of a transfer.
 
     Attributes:
         study: Folder or catalogue name of what was evolved.

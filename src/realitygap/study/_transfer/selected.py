@@ -40,7 +40,7 @@ def halving(attempt: Attempt) -> Champion:
 
 
 def best_on_target(attempt: Attempt, champions: Sequence[Champion]) -> Champion:
-    """What is left of the budget, spent on the first of some champions once each; the first when nothing is left."""
+    """Spend the rest of the budget on the first champions, once each. Return the best, or the first without budget."""
     tried = champions[: attempt.left]
     if not tried:
         return champions[0]

@@ -74,7 +74,7 @@ NUMBERS = 10_000
 
 @dataclass(frozen=True)
 class TransferPlan:
-    """What a transfer does; a folder belongs to one plan.
+    """The plan of a transfer; a folder belongs to one plan.
 
     Attributes:
         study: Name or file.
@@ -276,7 +276,7 @@ class _Work:
         self.simulation = Simulation(self.plan.runs, self.plan.repeats)
 
     def refuse(self, strategies: Sequence[str]) -> None:
-        """Return where all strategies can be carried out, before trials are spent on one of them.
+        """Raise an error if any strategy cannot run on this target.
 
         Raises:
             StudyError: One cannot be.
@@ -328,7 +328,7 @@ class _Work:
         ]
 
     def _calibration(self, replicate: int) -> Calibrating:
-        """How the replicate's calibrations come about."""
+        """Return the source of the replicate's calibrations."""
         file = Path(self.plan.calibration) if self.plan.calibration else None
         first, observe = replicate * NUMBERS, self.plan.observe
         seed = (SEED_STRIDE * self.plan.seed + replicate) % 2**53

@@ -1,4 +1,4 @@
-"""A target whose trials are kept as they come: what is there already is not carried out again."""
+"""A target that saves its trials and does not repeat saved ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .._wrapped_targets import WrappedTarget
 
 
 class KeptTarget(WrappedTarget):
-    """A target with a file beside it, and a number of trials that it allows.
+    """A target with a file of trials and a limit to their number.
 
     A trial is known by its number: who asks for the same trials in the same order, after whatever interruption, gets
     what is in the file, and the rest is carried out. One that was cut off is kept, too, and carried out again.
@@ -53,7 +53,8 @@ class KeptTarget(WrappedTarget):
         """
         if self.spent + len(plans) > self.budget:
             raise ValueError(
-                f"There are {len(plans)} trials to carry out after {self.spent}, expected at most {self.budget} in all."
+                f"There are {len(plans)} trials to run after {self.spent}, expected at most {self.budget} in "
+                "total."
             )
         self.spent += len(plans)
         numbered = [replace(plan, number=self._first_number + plan.number) for plan in plans]
@@ -81,5 +82,5 @@ class KeptTarget(WrappedTarget):
         return trial
 
     def close(self) -> None:
-        """Let go of the file; whoever opened the target closes that."""
+        """Close the file. The code that opened the target closes the target."""
         self._file.close()

@@ -68,7 +68,7 @@ def transferability(attempt: Attempt) -> Champion:
 
 
 def _generations(attempt: Attempt) -> int:
-    """So many that there are as many evaluations as in all runs of the other strategies."""
+    """Return the number of generations with as many evaluations as all runs of the other strategies."""
     neat = attempt.condition.neat
     return max(1, attempt.simulation.runs * neat.population * neat.generations // POPULATION)
 
@@ -100,7 +100,7 @@ class _Known:
         self.differences.append(score - float(fitness))
 
     def farthest(self, fitness: Values, visits: Values) -> int:
-        """Which of n individuals is farthest from all of them; the fittest where there is none."""
+        """Return the individual of n that is farthest from all of them; the fittest if there are none."""
         if not self.visits:
             return int(fitness.argmax())
         return int(distances(visits, np.stack(self.visits)).min(axis=1).argmax())

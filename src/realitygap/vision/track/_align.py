@@ -51,7 +51,7 @@ def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArr
     if room < 0:
         raise VisionError(
             f"The trial lasts {times[-1]:.1f} s, and the robot is seen for {track.times[-1] - track.times[0]:.1f} s. "
-            "Film it from before it begins until it stands."
+            "Film it from before the start until it stops."
         )
     step = max(COARSE_S, room * len(times) / MOST_TRIED)
     tried = track.times[0] + np.arange(0.0, room + 1e-9, step)

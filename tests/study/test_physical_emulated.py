@@ -226,7 +226,7 @@ def test_the_papers_physical_study_runs_unattended(tmp_path):
     summary = summarize(result.folder)
     assert summary["label"].to_list() == ["EMULATED", "EMULATED"]
     assert summary["line_median"].min() > 0.15
-    assert 'id="figure-8"' in write_report(result.folder).read_text()
+    assert 'id="figure-individuals-novelty"' in write_report(result.folder).read_text()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import polars as pl
 
 from realitygap._medians import interval_ranks, median_interval, quartiles
-from realitygap.report._tally import Measure, Results, Tally, label_of, read_tally
+from realitygap.records import ResultsFolder
+from realitygap.report._driven import read_driven
+from realitygap.report._tally import (
+    Measure,
+    Results,
+    Tally,
+    label_of,
+    labeled_conditions,
+    no_trials,
+    run_bests_of,
+)
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")
 _MEASURES: tuple[Measure, ...] = ("line", "ends")
@@ -41,27 +53,40 @@ def summarize(folder: Results) -> pl.DataFrame:
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
-    tally = read_tally(folder, with_uncounted=True)
     rows = []
-    for condition in tally.conditions:
-        name = condition["name"]
-        n = len(tally.replicates(name))
+    for condition, runs in _runs_by_condition(folder):
+        n = len(runs)
         ranks = interval_ranks(n)
         row: dict[str, Any] = {
-            "condition": name,
+            "condition": condition["name"],
             "label": label_of(condition),
             "n": n,
             "interval_coverage": None if ranks is None else ranks.coverage,
             "published": condition.get("published"),
         }
         for measure in _MEASURES if n else ():
-            row |= {f"{measure}_{key}": value for key, value in _describe(tally, name, measure).items()}
+            row |= {f"{measure}_{key}": value for key, value in _describe(runs[measure].to_numpy()).items()}
         rows.append(row)
     return pl.DataFrame(rows, schema=SUMMARY_SCHEMA)
 
 
-def _describe(tally: Tally, condition: str, measure: Measure) -> dict[str, float | None]:
-    values = tally.run_bests(condition, measure)
+def _runs_by_condition(folder: Results) -> Iterator[tuple[Mapping[str, Any], pl.DataFrame]]:
+    """Yield each condition with the best coverage of its runs, of which only those of one are in memory."""
+    if isinstance(folder, Tally):
+        for condition in folder.conditions:
+            yield condition, folder.runs.filter(pl.col("condition") == condition["name"])
+        return
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    is_empty = True
+    for condition in labeled_conditions(folder):
+        runs = run_bests_of(folder, condition["name"])
+        is_empty &= runs.is_empty()
+        yield condition, runs
+    if is_empty:
+        raise no_trials(folder, read_driven(folder))
+
+
+def _describe(values: npt.NDArray[np.float64]) -> dict[str, float | None]:
     if np.isnan(values).any():  # nobody counted a robot's cells, or saw where its steps end
         return dict.fromkeys(_STATISTICS)
     middle = quartiles(values)

@@ -170,14 +170,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     best = pl.concat(parts) if parts else pl.DataFrame(schema=_BEST)
     driven = read_driven(folder)
     if best.is_empty():
-        begun = (
-            " No run on a robot is complete; `realitygap trials list` shows how far they are."
-            if driven
-            else ""
-        )
-        raise RecordError(
-            f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.{begun}"
-        )
+        raise no_trials(folder, driven)
     uncounted = () if with_uncounted else _uncounted(best)
     best = best.filter(~pl.col("condition").is_in(list(uncounted)))
     if best.is_empty():
@@ -191,6 +184,16 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
         _labeled(each, driven) for each in conditions_of(description) if each["name"] not in uncounted
     ]
     return Tally(folder, description, best, driven, uncounted)
+
+
+def no_trials(folder: ResultsFolder, driven: Mapping[str, Driven]) -> RecordError:
+    """Return the error for a folder without trials."""
+    begun = (
+        " No run on a robot is complete; `realitygap trials list` shows how far they are." if driven else ""
+    )
+    return RecordError(
+        f"{folder.path} holds no trials yet, so there is nothing to report. Run the study first.{begun}"
+    )
 
 
 def _uncounted(best: pl.DataFrame) -> tuple[str, ...]:
@@ -219,6 +222,20 @@ def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
     """The resolved settings of a condition; empty where the description has none."""
     settings = condition.get("settings")
     return settings if isinstance(settings, dict) else {}
+
+
+def run_bests_of(folder: ResultsFolder, condition: str) -> pl.DataFrame:
+    """Return the best coverage of each run of a condition, with a row of `replicate`, `line` and `ends` for each run.
+
+    Memory holds one chunk, and these rows.
+    """
+    parts = [
+        frame.group_by("replicate", maintain_order=True).agg(
+            pl.col("coverage_line").max().alias("line"), pl.col("coverage_ends").max().alias("ends")
+        )
+        for frame in folder.frames(condition, ["replicate", "coverage_line", "coverage_ends"])
+    ]
+    return pl.concat(parts) if parts else pl.DataFrame(schema=["replicate", "line", "ends"])
 
 
 def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:

@@ -201,7 +201,7 @@ def test_a_full_disk_stops_the_run_with_a_message_and_loses_nothing(tmp_path):
         "run", "paper", "--replicates", "200", "--chunk", "100", "--out", "r",
         cwd=tmp_path, preexec_fn=limit_file_size, env=environment,
     )  # fmt: skip
-    one_message(full, "goes on")
+    one_message(full, "to resume")
     assert len(list((tmp_path / "r" / "trials").glob("*.parquet"))) == 9 * 4
     done = realitygap("run", "paper", "--replicates", "8", "--out", "r", cwd=tmp_path)
     assert "36 of 72 runs computed" in done.stdout

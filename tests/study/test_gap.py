@@ -147,7 +147,7 @@ def test_what_is_kept_is_not_carried_out_again_and_comes_out_the_same(some, tmp_
 def test_a_file_of_another_target_is_refused(some, tmp_path):
     path = tmp_path / "trials.jsonl"
     run_gap(sim(), sim(), some, trials=2, results=path)
-    with pytest.raises(RecordError, match="something else"):
+    with pytest.raises(RecordError, match="another kind"):
         run_gap(sim(), open_target("jyro", ARENA), some, trials=2, results=path)
 
 

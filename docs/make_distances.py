@@ -23,9 +23,9 @@ import polars as pl
 
 from realitygap import ResultsFolder, run_study
 from realitygap.evolution import DISTANCES
+from realitygap.gap import Estimate
 from realitygap.report import (
     DistanceAudit,
-    Estimate,
     Interval,
     audit_distance,
     bca_interval,
@@ -72,10 +72,12 @@ def weights(audits: dict[str, DistanceAudit]) -> str:
     rows = [
         [
             name,
-            f"{each.front_over_back.value:.2f}",
+            f"{each.front_over_back.estimate:.2f}",
             _span(each.front_over_back, ".2f"),
-            "all alike" if np.isnan(each.order_correlation.value) else _signed(each.order_correlation.value),
-            "" if np.isnan(each.order_correlation.value) else _span(each.order_correlation),
+            "all alike"
+            if each.order_correlation.estimate is None
+            else _signed(each.order_correlation.estimate),
+            "" if each.order_correlation.estimate is None else _span(each.order_correlation),
             f"{each.highest_over_lowest:.2f}",
         ]
         for name, each in audits.items()
@@ -92,7 +94,7 @@ def lengths(audits: dict[str, DistanceAudit]) -> str:
         for straight in STRAIGHT:
             usual = straight == audit.straight
             found = (audit if usual else audit_distance(name, straight=straight, n_walks=10)).confounds[0]
-            row.append(f"{_signed(found.correlation.value)} ({_span(found.correlation)})")
+            row.append(f"{_signed(found.correlation.estimate)} ({_span(found.correlation)})")
         rows.append(row)
     return _csv(["Distance", *(f"straight on {100 * each:.0f} %" for each in STRAIGHT)], rows)
 
@@ -105,7 +107,10 @@ def on_trials(study: ResultsFolder) -> str:
             found = audit_distance(name, study, n_walks=10).confounds
             chosen = [each for each in found if each.of in ("random walks", AUDITED)]
             rows.append(
-                [name, *(f"{_signed(each.correlation.value)} ({_span(each.correlation)})" for each in chosen)]
+                [
+                    name,
+                    *(f"{_signed(each.correlation.estimate)} ({_span(each.correlation)})" for each in chosen),
+                ]
             )
     rows.append(["shorter within longer", *(f"{100 * each.contained:.0f} %" for each in chosen)])
     return _csv(["Distance", "random walks", f"trials of “{AUDITED}”"], rows)

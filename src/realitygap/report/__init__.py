@@ -46,7 +46,6 @@ from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
     Confound,
     DistanceAudit,
-    Estimate,
     audit_distance,
     distance_notes,
 )
@@ -110,7 +109,6 @@ __all__ = [
     "DoubtfulValue",
     "Drawing",
     "Each",
-    "Estimate",
     "Finding",
     "Interval",
     "IntervalRanks",

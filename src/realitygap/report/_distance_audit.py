@@ -16,6 +16,7 @@ from realitygap import _special as special
 from realitygap._medians import CONFIDENCE
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, CellOrder, behavior_distance, measure_of, pack_behaviors
+from realitygap.gap import Estimate
 from realitygap.kernels.neat import distances
 from realitygap.records import ResultsFolder
 from realitygap.report._questions import grid_of
@@ -40,21 +41,6 @@ _LEAST_PAIRS = 10
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """A number with its 95 % interval.
-
-    Attributes:
-        value: from all walks or pairs.
-        low: lower bound, and
-        high: upper one; NaN where there is none.
-    """
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
 class Confound:
     """How far a distance is one of lengths, over pairs of behaviors.
 
@@ -64,7 +50,7 @@ class Confound:
         n_pairs: pairs, no behavior in two of them.
         mean_cells: cells of a behavior, on average.
         contained: of the cells of the shorter behavior, the share that the longer one visited too, on average [0..1].
-        correlation: Spearman's, of the distance with the difference of the numbers of cells; NaN where either is the
+        correlation: Spearman's, of the distance with the difference of the numbers of cells; refused if either is the
             same for all pairs. Interval: Bonett & Wright (2000).
         length_difference: (n_pairs,) [cells].
         distance: (n_pairs,) in the unit of the distance.
@@ -82,7 +68,8 @@ class Confound:
     @property
     def shared(self) -> float:
         """Of the variance of the ranks of distances, the share that goes with the lengths [0..1]."""
-        return self.correlation.value**2
+        found = self.correlation.estimate
+        return math.nan if found is None else found**2
 
 
 @dataclass(frozen=True)
@@ -207,14 +194,22 @@ def audit_distance(
         leverage=mean.reshape(rows, columns),
         leverage_low=low.reshape(rows, columns),
         leverage_high=high.reshape(rows, columns),
-        front_over_back=Estimate(_front_over_back(mean[order][None])[0], *np.quantile(front, _BEYOND)),
-        order_correlation=Estimate(_trend(mean[order][None])[0], *np.quantile(trend, _BEYOND)),
+        front_over_back=_estimate(_front_over_back(mean[order][None])[0], front, n_walks),
+        order_correlation=_estimate(_trend(mean[order][None])[0], trend, n_walks),
         highest_over_lowest=float(mean.max() / mean.min()) if mean.min() > 0 else math.inf,
         confounds=confounds,
     )
 
 
 _BEYOND = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
+
+
+def _estimate(value: float, resampled: Values, n_walks: int) -> Estimate:
+    """Return a number of random walks with the interval of its (b,) resamples."""
+    if math.isnan(value):
+        return Estimate.refusal(n_walks, "all cells weigh the same")
+    low, high = np.quantile(resampled, _BEYOND)
+    return Estimate(float(value), float(low), float(high), n_walks)
 
 
 # random walks
@@ -348,14 +343,16 @@ def spearman(one: Values, other: Values) -> Estimate:
     from scipy import stats  # takes a third of a second, which most commands can do without
 
     if len(one) < _LEAST_PAIRS or np.ptp(one) == 0 or np.ptp(other) == 0:
-        return Estimate(math.nan, math.nan, math.nan)
+        return Estimate.refusal(
+            len(one), "all pairs are alike in one of the two, or there are fewer than ten"
+        )
     # two sums of one distance in another order are one distance
     value = float(np.corrcoef(stats.rankdata(one.round(9)), stats.rankdata(other.round(9)))[0, 1])
     if abs(value) >= 1:
-        return Estimate(value, value, value)
+        return Estimate(value, value, value, len(one))
     beyond = special.ndtri(_BEYOND[1]) * math.sqrt((1 + value**2 / 2) / (len(one) - 3))
     low, high = (math.tanh(math.atanh(value) + side * beyond) for side in (-1, 1))
-    return Estimate(value, low, high)
+    return Estimate(value, low, high, len(one))
 
 
 def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) -> ResultsFolder:
@@ -424,28 +421,28 @@ def _compared(distance: BehaviorDistance) -> str:
 
 def _weight_note(audit: DistanceAudit) -> str:
     front, trend = audit.front_over_back, audit.order_correlation
-    if math.isnan(trend.value):
+    if trend.estimate is None:
         return f"Weight: all cells weigh the same, {audit.leverage.mean():.3g}."
     lead = {1: "low-numbered cells weigh most", -1: "high-numbered cells weigh most", 0: "cells weigh alike"}
     return (
         f"Weight: {lead[weight_bias(audit)]}. The first quarter of cells, as the paper sorts them, counts "
-        f"{front.value:.2f} times as much as the last ({front.low:.2f} to {front.high:.2f}); Spearman's correlation of "
-        f"weight with the place in that order is {in_words(trend)}."
+        f"{front.estimate:.2f} times as much as the last ({front.low:.2f} to {front.high:.2f}); Spearman's correlation "
+        f"of weight with the place in that order is {in_words(trend)}."
     )
 
 
 def weight_bias(audit: DistanceAudit) -> int:
     """1 where low-numbered cells weigh more, -1 where high-numbered ones do, 0 where neither is shown by a tenth."""
     front = audit.front_over_back
-    if front.low > _TENTH:
+    if front.low is not None and front.low > _TENTH:
         return 1
-    return -1 if front.high < 1 / _TENTH else 0
+    return -1 if front.high is not None and front.high < 1 / _TENTH else 0
 
 
 def _length_note(confound: Confound) -> str:
     found = confound.correlation
     where = f"{confound.label}, {confound.of}" if confound.label else confound.of
-    if math.isnan(found.value):
+    if found.estimate is None:
         return f"Length, {where}: no correlation, all pairs being alike in one of the two."
     return (
         f"Length, {where}: Spearman's correlation of distance with the difference in cells is {in_words(found)}, "
@@ -465,5 +462,5 @@ def _used_note(audit: DistanceAudit) -> str:
 
 def in_words(found: Estimate) -> str:
     """A correlation with its interval."""
-    signs = [f"{value:+.2f}".replace("-", "−") for value in (found.value, found.low, found.high)]
+    signs = [f"{value:+.2f}".replace("-", "−") for value in (found.estimate, found.low, found.high)]
     return f"{signs[0]} ({signs[1]} to {signs[2]})"

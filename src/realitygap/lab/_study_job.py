@@ -50,11 +50,6 @@ class StudyJob(Job):
         self._ending: tuple[str, bool] | None = None
         super().__init__(order, root, changed)
 
-    @property
-    def is_driving(self) -> bool:
-        """Whether a trial is under way."""
-        return self.card is not None and not self.is_over
-
     def stop_robot(self) -> None:
         """Stop the motors, and with them the trial."""
         self._child.tell({"do": "stop"})

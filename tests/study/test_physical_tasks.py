@@ -80,7 +80,7 @@ def test_a_witness_scores_the_way_along_walls_and_its_cells(tmp_path):
 
 
 def test_nobody_who_sees_poses_is_an_error_before_the_robot_drives(tmp_path):
-    with pytest.raises(StudyError, match=r"task 'wall' is scored by its poses.*A camera"):
+    with pytest.raises(StudyError, match=r"task 'wall' is scored by its poses.*Use a camera"):
         drive(study_of("wall"), tmp_path / "r", operator=Person())
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:
         assert ledger.sittings() == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +26,8 @@ from realitygap.testing import check_platform
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Floor, Grid, Obstacle, Pose, load_arena, load_robot, paper_arena
 from tests.commands import run_command
+from tests.harness import needs_enki
 
-HAS_ENKI = shutil.which("g++") is not None and Path("/usr/include/enki/PhysicalEngine.h").exists()
-needs_enki = pytest.mark.skipif(not HAS_ENKI, reason="needs the system packages g++ and libenki-dev")
 ARENA = paper_arena()
 WIDTH, DEPTH = 1.0668, 0.6096
 DELAY_S = 0.1 / 3

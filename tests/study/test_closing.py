@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.platforms import SimPlatform, SimTarget, harness_path
+from realitygap.platforms import SimPlatform, SimTarget, build_enki
 from realitygap.report import goal_table, write_closing_page
 from realitygap.study import PLANS, SMALL, ClosingPlan, closing_the_gap, summarize_closing
 from realitygap.study._closing.plan import adopt_plan
@@ -19,6 +19,7 @@ from realitygap.study._closing.summary import is_met, median_interval, pooled_fa
 from realitygap.study._closing.twin import ClosingTwin, held_out
 from realitygap.trials import TrialPlan
 from realitygap.world import Calibration, paper_arena
+from tests.harness import needs_enki
 
 pytestmark = pytest.mark.slow
 
@@ -315,10 +316,9 @@ def test_folder_made_before_plans_of_other_platforms_opens(right, tmp_path):
     adopt_plan(tmp_path / "old", PLAN)
 
 
-@pytest.mark.skipif(
-    not harness_path().exists(), reason="needs the harness of Enki: realitygap twin build-enki"
-)
+@needs_enki
 def test_sitting_on_another_platform_is_judged_and_calibrated(tmp_path):
+    build_enki()
     study = tmp_path / "study.toml"
     study.write_text(
         '[study]\nname = "thymio"\n[platform.sim]\nrobot = "thymio"\nstep_s = 0.5\n'

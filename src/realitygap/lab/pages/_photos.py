@@ -165,7 +165,7 @@ class SheetPhotos:
     def _show_photo(self, photo: SheetPhoto) -> None:
         with ui.card().classes("lab-card").props(f'data-photo="{photo.state}"'):
             with ui.row().classes("lab-row"):
-                ui.label(photo.name).props('role="heading" aria-level="3"')
+                ui.label(photo.name).props('role="heading" aria-level="2"')
                 ui.label(photo.state).classes("lab-state")
             if photo.state in ("waiting", "reading"):
                 ui.linear_progress(show_value=False).props(f'indeterminate aria-label="{photo.said}"')

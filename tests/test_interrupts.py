@@ -82,6 +82,17 @@ def drop():
     Library._finalize_specific = finalize_interrupted
     work(1.0)
 """
+IN_A_CLASS_BODY = """
+class Attribute:
+    def __set_name__(self, owner, name):
+        signal.raise_signal(signal.SIGINT)
+def drop():
+    try:
+        class Owner:
+            attribute = Attribute()
+    except KeyboardInterrupt as error:  # Python 3.12 and newer; 3.11 does what follows
+        raise RuntimeError("Error calling __set_name__") from error
+"""
 IN_A_BLOCK = """
 from realitygap._interrupts import kept_interrupts
 try:
@@ -171,6 +182,13 @@ def test_process_of_the_lab_ends_with_130_after_an_interrupt_that_python_drops()
     done = run(DROPS["callback from C"] + IN_A_PROCESS_OF_THE_LAB)
     assert done.returncode == 130, done.stderr
     assert '"interrupted"' in done.stdout
+
+
+@pytest.mark.parametrize("place", [IN_A_COMMAND, IN_A_PROCESS_OF_THE_LAB])
+def test_interrupt_in_a_class_body_that_python_reports_as_another_error(place: str) -> None:
+    done = run(IN_A_CLASS_BODY + place)
+    assert done.returncode == 130, done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_interrupt_while_a_module_of_an_extra_is_loaded_is_no_missing_extra(

@@ -99,7 +99,7 @@ def test_sigterm_removes_the_link_of_a_port_with_exec_too(tmp_path):
     process, _ = start("--link", str(link), "--exec", "sleep 20")
     assert link.is_symlink()
     process.send_signal(signal.SIGTERM)
-    assert process.wait(20) == 128 + signal.SIGTERM
+    assert process.wait(20) == 128 + signal.SIGTERM, process.stderr.read()
     assert not link.is_symlink()
 
 

@@ -74,6 +74,10 @@ def main() -> None:
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)
+    except RuntimeError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 reports one in a class body so
+            sys.exit(130)
+        raise
 
 
 @contextlib.contextmanager

@@ -10,7 +10,7 @@ import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
-from threading import RLock, Thread
+from threading import Event, RLock, Thread
 from typing import Protocol
 
 from realitygap.errors import RobotError
@@ -375,6 +375,7 @@ class Server:
         self._stopped = False
         self._is_away = False
         self._thread: Thread | None = None
+        self._ended = Event()
         self._begun: float | None = None  # when its time would have begun; None while it waits
 
     @property
@@ -389,13 +390,16 @@ class Server:
 
     def run(self) -> None:
         """Serve until `stop`."""
-        while not self._stopped:
-            ready = self._selector.select(self._pause())
-            for key, _ in ready:
-                self._take(key.data, key.fileobj)
-            if self._waits:
-                self._answer(is_silent=not ready)
-            self._exchange()
+        try:
+            while not self._stopped:
+                ready = self._selector.select(self._pause())
+                for key, _ in ready:
+                    self._take(key.data, key.fileobj)
+                if self._waits:
+                    self._answer(is_silent=not ready)
+                self._exchange()
+        finally:
+            self._ended.set()
 
     def stop(self) -> None:
         """Let `run` return; may be called from another thread or a signal handler."""
@@ -407,7 +411,7 @@ class Server:
         """Stop, and let go of the channel."""
         self.stop()
         if self._thread is not None:
-            self._thread.join(5.0)
+            self._ended.wait(5.0)  # no join: a signal may have come before the thread began
         self._channel.close()
         if self._door:
             self._door.close()

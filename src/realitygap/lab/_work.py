@@ -53,6 +53,8 @@ def _work(channel: Channel) -> int:
         channel.say("error", text=str(error))
         return 1
     except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 reports one in a class body so
+            raise KeyboardInterrupt from error
         traceback.print_exc()
         channel.say(
             "error", text=f"This is a mistake in realitygap, and nothing that was written is lost: {error!r}."

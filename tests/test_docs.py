@@ -160,10 +160,10 @@ def test_numbers_on_the_page_of_the_paper_are_those_of_its_study(tmp_path):
 
 @pytest.mark.slow
 def test_numbers_and_figures_of_several_robots_are_those_of_the_example(tmp_path):
-    make_company = _load("make_company")
-    table, figures = make_company.make(tmp_path)
-    assert make_company.TABLE.read_text("utf-8") == table
-    assert {path.name: path.read_text("utf-8") for path in make_company.FIGURES.iterdir()} == figures
+    make_team = _load("make_team")
+    table, figures = make_team.make(tmp_path)
+    assert make_team.TABLE.read_text("utf-8") == table
+    assert {path.name: path.read_text("utf-8") for path in make_team.FIGURES.iterdir()} == figures
 
 
 def test_tables_on_the_page_of_closing_the_gap_follow_from_its_data():

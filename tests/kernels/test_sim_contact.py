@@ -311,7 +311,7 @@ def test_the_order_of_obstacles_does_not_matter() -> None:
     np.testing.assert_array_equal(one.stalled, two.stalled)
 
 
-def test_a_robot_goes_the_same_way_in_any_lane_and_company() -> None:
+def test_a_robot_goes_the_same_way_in_any_lane_and_team() -> None:
     rng = np.random.default_rng(5)
     world = reference.World(planes(), [put(BOX, 0.5, 0.3, 0.4, 0.0)])
     starts = free_starts(rng, 60, body(), world)

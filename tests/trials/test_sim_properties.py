@@ -198,7 +198,7 @@ def test_the_order_of_obstacles_changes_no_bit(model: str, name: str, order: lis
         np.testing.assert_array_equal(one, two)
 
 
-def test_a_robot_goes_the_same_way_alone_and_in_company() -> None:
+def test_a_robot_goes_the_same_way_alone_and_in_a_team() -> None:
     """A push beside a box took the box into account only if some robot of the block was near the box."""
     rng = np.random.default_rng(6)
     n, steps = cases(LANES, 8), cases(40, 6)
@@ -206,10 +206,10 @@ def test_a_robot_goes_the_same_way_alone_and_in_company() -> None:
         arena, platform = furnished(divided=divided), quiet("box", model)
         starts = starts_in(arena, platform.model, n, rng)
         commands = np.stack([rng.uniform(-0.6, 1, (steps, n)), rng.uniform(-0.8, 0.8, (steps, n))], 1)
-        company = driven(platform, arena, starts, commands)
+        team = driven(platform, arena, starts, commands)
         for k in range(0, n, 4):
             alone = driven(platform, arena, starts[k : k + 1], commands[:, :, k : k + 1])
-            for here, there in zip(company, alone, strict=True):
+            for here, there in zip(team, alone, strict=True):
                 np.testing.assert_array_equal(
                     here[:, k], there[:, 0], f"{model}, divided: {divided}, robot {k}"
                 )

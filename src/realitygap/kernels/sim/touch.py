@@ -34,7 +34,7 @@ from .walls import touch_walls
 TILT = 1e-5
 SURELY = 1e-5  # [m] by which boxes must be apart for what is in them to be so: more than rounding does
 # A quarter of a body's reach: in a part of a step it moves less. An obstacle that is farther is no contact. The
-# limit depends on the lane alone, so a trial goes the same way in any company.
+# limit depends on the lane alone, so a trial goes the same way in any team.
 WITHIN = 0.25
 # A face that is passed at its end gives way to one that is not and is nearly as far in front.
 OVERHANG = 1e-3

@@ -11,11 +11,11 @@ from realitygap.world import Arena, check_drawn_starts
 
 from .._fleet import Fleet
 from .._platform import Platform
-from ._company import SimCompany, company_scenes
 from ._fleet import SimFleet
 from ._robot import SimRobot
 from ._scene import sim_inputs, sim_scene
 from ._settings import SimSettings
+from ._team import SimTeam, team_scenes
 from ._trials import SimTrials
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class SimPlatform(SimSettings):
             ValueError: The robot or the arena lacks an input, or a number is out of its range.
         """
         if arena.others:
-            company_scenes(self, arena, inputs, noise)
+            team_scenes(self, arena, inputs, noise)
         else:
             sim_scene(self, arena, inputs, noise)
 
@@ -66,7 +66,7 @@ class SimPlatform(SimSettings):
     ) -> PlatformTrials:
         """Set the platform up for many trials in one call."""
         if arena.others:
-            return SimCompany(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
+            return SimTeam(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
 
         return SimTrials(self, arena, rules, inputs=inputs, noise=noise, bias_value=bias_value)
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from realitygap.kernels.math.stack import stack
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
-from realitygap.kernels.sim.company import Company, run_company_trials
 from realitygap.kernels.sim.lanes import make_sim_room, make_sim_trace
+from realitygap.kernels.sim.team import Team, run_team_trials
 from realitygap.tasks import TraceArrays
 from realitygap.trials import REAL, Draws, TrialBatch, Tried, counters_of_robot
 from realitygap.world import MOST_ROBOTS, Arena, Obstacle, check_drawn_starts
@@ -25,7 +25,7 @@ from ._settings import ARENA, SimSettings
 from ._trials import sensor_names, sim_rules
 
 
-class SimCompany:
+class SimTeam:
     """Several robots of the platform `sim` in one arena, ready to try networks of one kind; a `PlatformTrials`.
 
     A trial is that of a `SimWorld`: in each step the robots move one after the other, then all look. Cells are those
@@ -40,7 +40,7 @@ class SimCompany:
         bias_value: Of the constant input.
 
     Raises:
-        ValueError: As `company_scenes`.
+        ValueError: As `team_scenes`.
     """
 
     distance_unit = 1.0
@@ -55,7 +55,7 @@ class SimCompany:
         noise: float,
         bias_value: float,
     ) -> None:
-        self.scenes = company_scenes(platform, arena, inputs, noise)
+        self.scenes = team_scenes(platform, arena, inputs, noise)
         first = self.scenes[0]
         own = first.arena.obstacles[: len(arena.obstacles)]
         self.arena = replace(first.arena, obstacles=own, others=arena.others)
@@ -66,7 +66,7 @@ class SimCompany:
         self.drawn_names = self._draws.names
         self._rules = rules
         self._dtype = REAL[platform.precision]
-        self._company = Company(
+        self._team = Team(
             stack([scene.shape for scene in self.scenes]),
             stack([sim_rules(scene, bias_value) for scene in self.scenes]),
             np.array([scene.origin for scene in self.scenes]),
@@ -98,8 +98,8 @@ class SimCompany:
         cells = np.zeros((n, n_cells), np.uint8)
         end_cells = np.zeros((n if ends else 0, n_cells), np.uint8)
         ended, counts = np.zeros((n, 2)), np.zeros((n, 3), np.int32)
-        run_company_trials(
-            self._company,
+        run_team_trials(
+            self._team,
             np.stack(list(self._tables(drawn))),
             self._rules,
             networks,
@@ -134,9 +134,7 @@ class SimCompany:
             yield table
 
 
-def company_scenes(
-    platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float
-) -> list[SimScene]:
+def team_scenes(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float) -> list[SimScene]:
     """Return the scene of each robot: the outlines of the others are its last obstacles.
 
     Raises:

@@ -38,7 +38,7 @@ _room_of = member_of(SimRoom)
 _trace_of = member_of(SimTrace)
 
 
-class Company(NamedTuple):
+class Team(NamedTuple):
     """The r robots of an arena; each is simulated from its own origin."""
 
     shapes: SimShape  # stacked: the others' outlines are the last obstacles of each
@@ -49,15 +49,15 @@ class Company(NamedTuple):
 
 
 @kernel
-def _meet(company, shape, rooms, robot):
+def _meet(team, shape, rooms, robot):
     """Put the others where they are now, in the trials of a robot."""
     p = rooms.lanes.p[robot]
-    pose, origins = rooms.lanes.pose, company.origins
+    pose, origins = rooms.lanes.pose, team.origins
     real = p.dtype.type
-    number = company.first_other
+    number = team.first_other
     for other in range(origins.shape[0]):
         if other != robot:
-            for _ in range(company.parts):
+            for _ in range(team.parts):
                 row = shape.row_obstacle[number]
                 for lane in range(LANES):
                     x = origins[other, 0] + float(pose.x[other, lane])
@@ -69,28 +69,28 @@ def _meet(company, shape, rooms, robot):
 
 
 @kernel
-def _place_others(company, shape, lanes):
-    for number in range(company.first_other, shape.row_obstacle.size):
+def _place_others(team, shape, lanes):
+    for number in range(team.first_other, shape.row_obstacle.size):
         place_obstacle(shape, lanes, number)
 
 
 @kernel
-def _run_block(company, tables, neat, key, counters, first, n_lanes, rooms, cells, counts, trace):
-    n_robots = company.origins.shape[0]
+def _run_block(team, tables, neat, key, counters, first, n_lanes, rooms, cells, counts, trace):
+    n_robots = team.origins.shape[0]
     keep = trace.stalled.shape[1] > 0 and first < trace.stalled.shape[2]
     visited, ends, n_line = rooms.lanes.visited[0], rooms.lanes.ends[0], rooms.lanes.n_line[0]
     for robot in range(n_robots):
         shape, rules, room = (
-            _shape_of(company.shapes, robot),
-            _rules_of(company.rules, robot),
+            _shape_of(team.shapes, robot),
+            _rules_of(team.rules, robot),
             _room_of(rooms, robot),
         )
         start_block(shape, rules, tables[robot], counters[robot], first, n_lanes, room.lanes)
-    for step in range(-1, company.rules.n_steps):
+    for step in range(-1, team.rules.n_steps):
         for robot in range(n_robots):
             shape, rules, room = (
-                _shape_of(company.shapes, robot),
-                _rules_of(company.rules, robot),
+                _shape_of(team.shapes, robot),
+                _rules_of(team.rules, robot),
                 _room_of(rooms, robot),
             )
             lanes = room.lanes
@@ -100,8 +100,8 @@ def _run_block(company, tables, neat, key, counters, first, n_lanes, rooms, cell
                 take_answers(neat, lanes)
                 if keep:
                     _keep_answers(_trace_of(trace, robot), lanes, neat, first, n_lanes, step)
-                _meet(company, shape, rooms, robot)
-                _place_others(company, shape, lanes)
+                _meet(team, shape, rooms, robot)
+                _place_others(team, shape, lanes)
                 drive(shape, rules, key, lanes, step)
                 settle(shape, lanes, room.near)
                 feel_motion(shape, rules, key, lanes, step)
@@ -115,13 +115,13 @@ def _run_block(company, tables, neat, key, counters, first, n_lanes, rooms, cell
             )  # fmt: skip
         for robot in range(n_robots):
             shape, rules, room = (
-                _shape_of(company.shapes, robot),
-                _rules_of(company.rules, robot),
+                _shape_of(team.shapes, robot),
+                _rules_of(team.rules, robot),
                 _room_of(rooms, robot),
             )
             if step >= 0:
-                _meet(company, shape, rooms, robot)
-                _place_others(company, shape, room.lanes)
+                _meet(team, shape, rooms, robot)
+                _place_others(team, shape, room.lanes)
             sense(shape, rules, key, room.lanes, step + 1)
             if keep:
                 _keep_state(_trace_of(trace, robot), room.lanes, first, n_lanes, step + 1)
@@ -134,13 +134,13 @@ def _run_block(company, tables, neat, key, counters, first, n_lanes, rooms, cell
 
 
 @kernel
-def run_company_trials(
-    company, tables, neat, networks, which, key, counters, rooms, cells, ends, ended, counts, trace
+def run_team_trials(
+    team, tables, neat, networks, which, key, counters, rooms, cells, ends, ended, counts, trace
 ):
     """Run n trials of r robots, a block after the other.
 
     Args:
-        company: `Company`.
+        team: `Team`.
         tables: (r, p, n) the numbers of each robot and its surroundings, or (r, p, 1) for all trials.
         neat, networks: How networks are activated, and the networks, at least one.
         which: (r, n) int32, the network of each robot.
@@ -158,11 +158,11 @@ def run_company_trials(
         n_lanes = min(LANES, n - first)
         for robot in range(which.shape[0]):
             wire(networks, which[robot], first, n_lanes, neat, _room_of(rooms, robot).wiring)
-        _run_block(company, tables, neat, key, counters, first, n_lanes, rooms, cells, counts, trace)
+        _run_block(team, tables, neat, key, counters, first, n_lanes, rooms, cells, counts, trace)
         for lane in range(n_lanes):
             ended[first + lane, 0] = rooms.lanes.pose.x[0, lane]
             ended[first + lane, 1] = rooms.lanes.pose.y[0, lane]
             if ends.shape[0] > 0:
                 list_cells(
-                    rooms.lanes.ends[0], lane, company.shapes.columns, company.shapes.rows, ends[first + lane]
+                    rooms.lanes.ends[0], lane, team.shapes.columns, team.shapes.rows, ends[first + lane]
                 )

@@ -22,7 +22,7 @@ from realitygap.platforms import (
     trace_genomes,
     try_genomes,
 )
-from realitygap.platforms.sim._company import SimCompany
+from realitygap.platforms.sim._team import SimTeam
 from realitygap.tasks import AvoidTask
 from realitygap.trials import MOST_TEAMS, NoiseKey, Tried, counters_of, counters_of_robot
 from realitygap.world import Arena, Distribution, Pose, paper_arena
@@ -50,7 +50,7 @@ def tried(
     quiet: bool = False,
     **settings: Any,
 ) -> Tried:
-    """Trials of a company with every step kept."""
+    """Trials of a team with every step kept."""
     noise = 0.0 if quiet else 0.1
     platform = SimPlatform(**{"steps": 40, "set": TRACK, "noise": not quiet, **settings})
     trials = open_trials(platform, arena, genomes[0].rules, noise=noise, bias_value=genomes[0].bias_value)
@@ -79,10 +79,10 @@ def same(first: Tried, second: Tried, trials: Sequence[int], n_robots: int) -> b
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
-def test_company_equals_the_world_with_the_same_commands_and_random_numbers(precision: Any) -> None:
+def test_team_equals_the_world_with_the_same_commands_and_random_numbers(precision: Any) -> None:
     """Bit for bit: readings, stalls, cells; noise and numbers drawn for each robot included."""
     n, n_robots = 6, 3
-    company = tried(population(n), precision=precision)
+    team = tried(population(n), precision=precision)
     platform = SimPlatform(steps=40, set=TRACK, precision=precision)
     met = 0
     for k in range(n):
@@ -96,34 +96,34 @@ def test_company_equals_the_world_with_the_same_commands_and_random_numbers(prec
             for robot, body in enumerate(robots):
                 column = n_robots * k + robot
                 readings = np.array(list(body.readings.values()))
-                assert np.array_equal(readings, company.trace.readings[step, :, column])
-                assert body.stalled == company.trace.stalled[step, column]
+                assert np.array_equal(readings, team.trace.readings[step, :, column])
+                assert body.stalled == team.trace.stalled[step, column]
                 visited += [
                     cell for cell in body._cells[0, : body._room.lanes.n_line[0]] if cell not in visited
                 ]
                 if step < 40:
-                    body.move(*company.trace.commands[step, :, column].astype(float))
+                    body.move(*team.trace.commands[step, :, column].astype(float))
             met += sum(body.stalled for body in robots)
             if step < 40:
                 world.step()
-        assert company.batch.behavior(k).tolist() == visited
+        assert team.batch.behavior(k).tolist() == visited
     assert met > 20  # robots and walls were met
 
 
-def test_company_of_one_robot_equals_trials_of_one_robot() -> None:
+def test_team_of_one_robot_equals_trials_of_one_robot() -> None:
     genomes, arena = population(70), paper_arena()
     platform = SimPlatform(steps=40, set=TRACK)
     ready: dict[str, Any] = {
         "inputs": ("obstacle", "stall", "time"), "noise": 0.1, "bias_value": genomes[0].bias_value
     }  # fmt: skip
     which, counters = np.arange(70, dtype=np.int32), counters_of(NoiseKey(KEY), 70)
-    alone, company = (
+    alone, team = (
         trials(platform, arena, genomes[0].rules, **ready).carry_out(
             decode_all(genomes), which, KEY, counters, ends=True, trace=True
         )
-        for trials in (SimTrials, SimCompany)
+        for trials in (SimTrials, SimTeam)
     )
-    assert same(alone, company, range(70), 1)
+    assert same(alone, team, range(70), 1)
 
 
 def test_trial_does_not_depend_on_its_neighbors_in_a_block() -> None:
@@ -170,7 +170,7 @@ def test_each_robot_follows_its_own_network() -> None:
 def test_coverage_is_that_of_all_robots() -> None:
     """Against the plain reference: cells on the lines between the poses of every robot."""
     genomes = population(12)
-    company = tried(genomes, precision="double")
+    team = tried(genomes, precision="double")
     grid = ARENA.grid
     trajectories = trace_genomes(
         SimPlatform(steps=40, set=TRACK, precision="double"),
@@ -179,7 +179,7 @@ def test_coverage_is_that_of_all_robots() -> None:
         noise=0.1,
         noise_key=NoiseKey(KEY),
     )
-    assert np.array_equal(trajectories.arrays.poses, company.trace.poses)
+    assert np.array_equal(trajectories.arrays.poses, team.trace.poses)
     for k in range(12):
         cells: set[int] = set()
         for robot in range(3):
@@ -187,7 +187,7 @@ def test_coverage_is_that_of_all_robots() -> None:
             path = ((poses[:, :2] - [grid.x, grid.y]) / grid.cell).tolist()
             lines = [cells_on_line(*a, *b) for a, b in itertools.pairwise(path)]
             cells |= set(first_visits([cell for line in lines for cell in line], grid.columns, grid.rows))
-        assert set(company.batch.behavior(k).tolist()) == cells
+        assert set(team.batch.behavior(k).tolist()) == cells
         assert trajectories.coverage_line[3 * k] == trajectories.coverage_line[3 * k + 2] == len(cells) / 72
     starts = np.round(trajectories.poses[:3, 0], 6)
     assert starts == pytest.approx(np.array([ARENA.start, *OTHERS]), abs=1e-6)
@@ -251,7 +251,7 @@ def test_random_numbers_of_robots_do_not_repeat() -> None:
         ),
     ],
 )  # fmt: skip
-def test_companies_that_cannot_be_are_refused(platform: Any, arena: Arena, message: str) -> None:
+def test_teams_that_cannot_be_are_refused(platform: Any, arena: Arena, message: str) -> None:
     genomes = population(1)
     with pytest.raises(ValueError, match=message):
         open_trials(platform, arena, genomes[0].rules, noise=0.0, bias_value=1.0)

@@ -1,9 +1,9 @@
 """Several robots in one arena: the table and the pictures of the page "Evolve several robots in one arena".
 
-    uv run python docs/make_company.py            # some 20 seconds
+    uv run python docs/make_team.py            # some 20 seconds
 
-Runs `realitygap run examples/several-robots.toml` in a temporary folder, and writes docs/data/company.csv and
-docs/images/company/*.svg.
+Runs `realitygap run examples/several-robots.toml` in a temporary folder, and writes docs/data/team.csv and
+docs/images/team/*.svg.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from realitygap.report import draw_choices, draw_trial, summarize
 
 HERE = Path(__file__).parent
 STUDY = HERE.parent / "examples" / "several-robots.toml"
-TABLE = HERE / "data" / "company.csv"
-FIGURES = HERE / "images" / "company"
+TABLE = HERE / "data" / "team.csv"
+FIGURES = HERE / "images" / "team"
 NETWORKS = {"alike": "one for all", "mixed": "one each", "robot": ""}
 
 

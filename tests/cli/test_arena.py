@@ -42,6 +42,13 @@ def test_words_that_do_not_go_together_have_one_message(words, message):
         run(*words)
 
 
+def test_usage_errors_state_the_given_value():
+    done = run("paper", "--resolution", "0", "-o", "a.yaml")
+    assert done.exit_code == 2
+    assert "Invalid value for '--resolution'" in done.stderr
+    assert done.stderr.endswith("greater than or equal to 0.0001, got '0'\n")
+
+
 def test_an_arena_by_the_name_of_a_map_says_how_to_convert_it():
     with pytest.raises(DescriptionError, match=r"Convert it: realitygap arena room\.yaml -o arena\.toml"):
         load_arena("room.yaml")

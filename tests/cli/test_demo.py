@@ -50,3 +50,10 @@ def test_demo_refuses_a_file_as_folder(tmp_path):
     done = realitygap("demo", "--out", "tour", cwd=tmp_path)
     assert done.returncode == 1
     assert done.stderr == "realitygap: --out is the file tour, expected a folder. Name another one.\n"
+
+
+def test_demo_refuses_an_empty_name_of_a_folder(tmp_path):
+    done = realitygap("demo", "--out", "", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr == "realitygap: --out is empty, expected a folder. Name one, or leave --out out.\n"
+    assert not list(tmp_path.iterdir())

@@ -149,6 +149,8 @@ def test_what_cannot_be_a_bag_has_one_message(tmp_path):
     write_bag(trial(), HEAD, tmp_path / "trial.mcap")
     with pytest.raises(LogError, match=r"trial\.mcap exists already"):
         write_bag(trial(), HEAD, tmp_path / "trial.mcap")
+    with pytest.raises(LogError, match=r"b\.txt ends in \.txt, expected a file that ends in \.mcap"):
+        write_bag(trial(), HEAD, tmp_path / "b.txt")
     with pytest.raises(LogError, match="Trial 7 has no command"):
         write_bag(trial(commands=np.empty((0, 2))), HEAD, tmp_path / "a.mcap")
     with pytest.raises(LogError, match=r"Trial 7 has 5 range sensors, and the robot .* has"):

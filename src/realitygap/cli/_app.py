@@ -18,10 +18,20 @@ from ._commands import COMMANDS, Command, root_help
 
 
 class _RootGroup(TyperGroup):
-    """The root, with the list of all commands also if only one is loaded."""
+    """The root command. It lists all commands even if only one is loaded, and usage errors state the given value."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         formatter.write(root_help(formatter.width + 2))
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            from pydantic import ValidationError  # here, because its import takes long
+
+            if isinstance(error.__cause__, ValidationError):
+                error.message += f", got {error.__cause__.errors()[0]['input']!r}"
+            raise
 
 
 class _GroupedCommand(TyperCommand):

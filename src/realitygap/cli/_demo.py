@@ -18,7 +18,7 @@ _ROBOT = "scribbler:emulator://s2?fluke=2&speed=off"
 
 def demo(
     out: Annotated[
-        Path | None,
+        str | None,
         typer.Option(metavar="DIR", help="Folder for the results. [default: a new temporary folder]"),
     ] = None,
     open_page: Annotated[
@@ -59,18 +59,24 @@ def demo(
         show_page(folder / "paper" / "report.html")
 
 
-def _made(out: Path | None) -> Path:
-    """Return the folder for the results, which exists from now on.
+def _made(out: str | None) -> Path:
+    """Make the folder for the results and return it.
+
+    Args:
+        out: Name as given. A `Path` would not do: the path of an empty name is the current folder.
 
     Raises:
-        StudyError: The name is that of a file.
+        StudyError: The name is empty, or belongs to a file.
     """
     if out is None:
         return Path(tempfile.mkdtemp(prefix="realitygap-demo-"))
-    if out.exists() and not out.is_dir():
-        raise StudyError(f"--out is the file {out}, expected a folder. Name another one.")
-    out.mkdir(parents=True, exist_ok=True)
-    return out
+    if not out:
+        raise StudyError("--out is empty, expected a folder. Name one, or leave --out out.")
+    folder = Path(out)
+    if folder.exists() and not folder.is_dir():
+        raise StudyError(f"--out is the file {folder}, expected a folder. Name another one.")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:

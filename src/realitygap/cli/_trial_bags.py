@@ -33,7 +33,9 @@ def export_trials(
     wheel_diameter_mm: Annotated[
         float | None,
         typer.Option(
-            min=0.1, metavar="MM", help="Diameter of the wheels, which turns ways into angles. [default: 65]"
+            min=0.1,
+            metavar="MM",
+            help="Diameter of the wheels, which converts distances to angles. [default: 65]",
         ),
     ] = None,
 ) -> None:

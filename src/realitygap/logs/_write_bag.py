@@ -22,17 +22,17 @@ from ._log_map import Commands, LogMap, Poses, Readings, Wheels
 from ._source import Floats
 
 WHEEL_DIAMETER_MM = 65.0
-"""Diameter of the wheels by which ways become angles, if none is given."""
+"""Default diameter of the wheels, which converts distances to angles [mm]."""
 
 BEGIN_S = 1.0
 """Time of the first command; 0 is no time in ROS."""
 
 INFRARED = 1
-"""What `sensor_msgs/Range` calls infrared sensors."""
+"""Radiation type of infrared sensors in `sensor_msgs/Range`."""
 
 _NS = 1_000_000_000
 _STORE = "ROS2_JAZZY"
-"""Whose definitions of messages are written."""
+"""Distribution of ROS 2 whose message definitions are written."""
 
 _VERSION = 9
 """Version of the metadata of a bag; ROS 2 Jazzy writes it."""
@@ -65,23 +65,23 @@ def write_bag(
 
     | topic | message | content |
     |---|---|---|
-    | /cmd_vel | geometry_msgs/TwistStamped | the command of each step at its begin, and a stop at the end |
-    | /odom | nav_msgs/Odometry | poses as they were observed, speeds by their differences |
+    | /cmd_vel | geometry_msgs/TwistStamped | the command at the start of each step, and a stop at the end |
+    | /odom | nav_msgs/Odometry | observed poses, and speeds from their differences |
     | /joint_states | sensor_msgs/JointState | angles of left_wheel_joint and right_wheel_joint |
     | /range_0, ... | sensor_msgs/Range | (1 - reading) times the longest reach: nominal, no measured distance |
 
-    A topic is left out if nobody observed what it has. Stalls and crossed cells are in no topic.
+    A topic without observations is left out. Stalls and crossed cells are in no topic.
 
     Args:
         trial: The trial.
-        head: What it has in common with others: robot, arena, label.
-        out: A file that ends in .mcap, or a folder that is not there.
-        times: (t + 1,) when each command began and the last one ended [s]; by `step_s` if not given.
-        wheel_diameter_mm: Diameter of the wheels, by which ways become angles [mm].
+        head: Robot, arena, and label of the trial.
+        out: A file that ends in .mcap, or a new folder without an ending.
+        times: (t + 1,) start of each command, and end of the last one [s]. Default: multiples of `step_s`.
+        wheel_diameter_mm: Diameter of the wheels, which converts distances to angles [mm].
 
     Raises:
-        LogError: There is something in the place, the trial has no command, or the robot has other sensors or its front
-            at -x.
+        LogError: `out` exists already or has another ending, the trial has no command, or the robot has other sensors
+            or its front at -x.
         MissingExtraError: The extra `ros` is not installed.
         RecordError: The place belongs to a study's results, or cannot be written.
         ValueError: The diameter is not above 0.
@@ -107,6 +107,11 @@ def _check(trial: TrialRecord, robot: RobotModel, out: Path, wheel_diameter_mm: 
     if not (math.isfinite(wheel_diameter_mm) and wheel_diameter_mm > 0):
         raise ValueError(f"wheel_diameter_mm is {wheel_diameter_mm!r}, expected a length above 0.")
     refuse_results(out)
+    if out.suffix not in ("", ".mcap"):
+        raise LogError(
+            f"{out} ends in {out.suffix}, expected a file that ends in .mcap, or a folder without an ending. "
+            "Name such a bag."
+        )
     if out.exists() or out.is_symlink():
         raise LogError(f"{out} exists already. Name a bag that is not.")
     if not len(trial.commands):

@@ -26,16 +26,16 @@ def export_trials(
 
     Args:
         source: A file of observed trials (.jsonl), or a folder of results with a ledger.
-        out: A file that ends in .mcap, or a folder that is not there. Several trials have their numbers in their names:
-            out-7.mcap.
-        trials: Numbers of trials; all that were driven if empty.
-        wheel_diameter_mm: Diameter of the wheels, by which ways become angles [mm].
+        out: A file that ends in .mcap, or a new folder without an ending. If there are several trials, their numbers
+            are added to the name: out-7.mcap.
+        trials: Numbers of trials. If empty, all driven trials.
+        wheel_diameter_mm: Diameter of the wheels, which converts distances to angles [mm].
 
     Yields:
-        What was written of each trial.
+        The bag, the mapping, and the number of messages of each trial.
 
     Raises:
-        LogError: There is something in the place, or a trial and its robot do not go together.
+        LogError: `out` exists already or has another ending, or a trial does not fit its robot.
         MissingExtraError: The extra `ros` is not installed.
         RecordError: The source cannot be read, or a bag cannot be written.
         StudyError: The source has no such trial, or none that was driven.

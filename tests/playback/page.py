@@ -46,6 +46,5 @@ def page_of(widget: Any, path: Path, width: int = 820, *, kind: str = "player") 
         .replace("export default { render };", "const widget = { render };")
     )
     values = {name: getattr(widget, name) for name in (PLAYER if kind == "player" else PANEL)}
-    style = files.joinpath(f"{kind}.css").read_text("utf-8")
-    path.write_text(PAGE % (style, width, module, json.dumps(values, allow_nan=False)), "utf-8")
+    path.write_text(PAGE % (widget._css, width, module, json.dumps(values, allow_nan=False)), "utf-8")
     return path

@@ -11,6 +11,7 @@ import pytest
 
 from realitygap.playback import DrivePanel, WorldPanel
 from realitygap.robots.jyro import Camera, JyroWorld, Pioneer
+from realitygap.world import paper_arena
 
 from .page import PANEL, page_of
 from .test_panel import Driven
@@ -26,8 +27,8 @@ def show(browser, tmp_path):  # noqa: F811
     complaints: list[str] = []
     contexts = []
 
-    def open_page(panel: Any, *, answers: bool = True) -> Any:
-        context = browser.new_context(viewport={"width": 900, "height": 800})
+    def open_page(panel: Any, *, answers: bool = True, **options: Any) -> Any:
+        context = browser.new_context(viewport={"width": 900, "height": 800}, **options)
         contexts.append(context)
         page = context.new_page()
         page.set_default_timeout(5_000)
@@ -182,3 +183,20 @@ def test_a_panel_that_is_taken_away_stops_and_listens_no_more(show, driven):
     page.evaluate("() => window.cleanup()")
     stops_after_driving(page, driven)
     assert page.evaluate("() => window.heard()") == 0
+
+
+def test_a_panel_is_as_dark_as_the_page_or_else_as_the_system(show):
+    world = JyroWorld(paper_arena())
+    world.add(Pioneer(0.5, 0.3))
+    page = show(WorldPanel(world), color_scheme="dark")
+    colors = """() => [['.rg-panel', 'backgroundColor'], ['.rg-panel', 'color'], ['.rg-panel-view svg rect', 'fill'],
+        ['.rg-panel-view svg path', 'stroke']]
+        .map(([name, key]) => getComputedStyle(document.querySelector(name))[key])"""
+    dark = ["rgb(28, 32, 38)", "rgb(230, 232, 235)", "rgb(28, 32, 38)", "rgb(230, 232, 235)"]
+    light = ["rgb(255, 255, 255)", "rgb(28, 31, 36)", "rgb(255, 255, 255)", "rgb(28, 31, 36)"]
+    assert page.evaluate(colors) == dark
+    page.evaluate("() => { document.body.dataset.jpThemeLight = 'true'; }")
+    assert page.evaluate(colors) == light
+    page.emulate_media(color_scheme="light")
+    page.evaluate("() => { document.body.dataset.jpThemeLight = 'false'; }")
+    assert page.evaluate(colors) == dark

@@ -11,6 +11,7 @@ from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._shown import card_of, picture_of, widget_of
+from ._theme import theme_rules, themed
 from ._x11 import hex_of, rgb_of
 
 __all__ = [
@@ -31,6 +32,8 @@ __all__ = [
     "hex_of",
     "picture_of",
     "rgb_of",
+    "theme_rules",
+    "themed",
     "to_image",
     "to_png",
     "widget_of",

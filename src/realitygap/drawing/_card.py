@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ._ink import Ink
 from ._picture import NOT_XML, Picture
+from ._theme import theme_rules, themed
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -23,9 +22,6 @@ MOST_ROWS = 100
 
 MOST_LETTERS = 600
 """Letters of a text that are shown."""
-
-_COLOR = re.compile('"(' + "|".join(Ink.names().values()) + ')"')
-_NAMES = {color: name for name, color in Ink.names().items()}
 
 
 @dataclass(frozen=True)
@@ -129,18 +125,14 @@ def _template() -> Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["svg"] = _themed
+    environment.filters["svg"] = lambda picture: themed(picture.to_svg(300.0))
     environment.globals["style"] = _style()
     return environment.get_template("card.html.jinja")
 
 
 def _style() -> str:
-    """Return the rules of a card, with the colors of all pages."""
-    files = resources.files("realitygap.drawing")
-    tokens = re.sub(r"/\*.*?\*/", "", files.joinpath("tokens.css").read_text("utf-8"))
-    light, dark = re.findall(r":root \{(.*?);\s*\}", tokens, re.DOTALL)
-    style = files.joinpath("cards/card.css").read_text("utf-8")
-    return " ".join(style.replace("@light", light).replace("@dark", dark).split())
+    style = resources.files("realitygap.drawing").joinpath("cards/card.css").read_text("utf-8")
+    return theme_rules(".rg-card") + " ".join(style.split())
 
 
 def _printable(value: Any) -> Any:
@@ -149,9 +141,3 @@ def _printable(value: Any) -> Any:
         return value
     text = NOT_XML.sub("", value)
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 1] + "…"
-
-
-def _themed(picture: Picture) -> str:
-    """The picture as SVG whose colors follow the theme, and are the light ones where styles are stripped."""
-    svg = picture.to_svg(300.0)
-    return _COLOR.sub(lambda match: f'"var(--ink-{_NAMES[match[1]]}, {match[1]})"', svg)

@@ -22,6 +22,7 @@ from ._chance import even, flipCoin, heads, odd, pickOne, pickOneInRange, random
 from ._colors import *
 from ._computer import Computer, beepScale, computer
 from ._functions import *
+from ._gamepad import getGamepad, getGamepadNow
 from ._graphics import (
     Circle,
     GraphWin,

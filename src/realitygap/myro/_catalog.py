@@ -16,6 +16,7 @@ DONE: dict[str, tuple[str, ...]] = {
         "forward", "backward", "turnLeft", "turnRight", "turn", "move", "translate", "rotate", "motors", "stop",
     ),
     "Driving by hand, in a notebook": ("joyStick", "Joystick", "joystick", "gamepad"),
+    "Gamepads": ("getGamepad", "getGamepadNow"),
     "Senses": (
         "getLight", "getIR", "getLine", "getStall", "getObstacle", "getBright", "getBlob", "getBattery",
         "getDistance", "getMicEnvelope", "getAll", "get", "senses", "wall",
@@ -69,7 +70,6 @@ DONE: dict[str, tuple[str, ...]] = {
 """What is done, by subject."""
 
 _WINDOW = "It opens a window of its own, which a notebook and a server have no screen for. {instead}"
-_GAMEPAD = "A cell that runs hears nothing from the page that reads the gamepad. Drive by gamepad()."
 _VOICE = "No voice comes with realitygap: speak() prints what it would say."
 _FILE_SOUND = (
     "It plays a file of sound on the computer's speaker. Play notes with playSong() or computer.playSong()."
@@ -100,8 +100,6 @@ LEFT_OUT: dict[str, str] = {
     "moveToTop": _WINDOW.format(instead="Nothing has to be moved to the top."),
     "Pixmap": "It is a picture of the window system. Use makePicture() and Image(point, picture).",
     "makePixmap": "It is a picture of the window system. Use makePicture() and Image(point, picture).",
-    "getGamepad": _GAMEPAD,
-    "getGamepadNow": _GAMEPAD,
     "setVoice": _VOICE,
     "getVoice": _VOICE,
     "getVoices": _VOICE,

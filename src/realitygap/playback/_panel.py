@@ -10,6 +10,7 @@ from functools import cache
 from importlib import import_module, resources
 from typing import Any
 
+from realitygap.drawing import theme_rules, themed
 from realitygap.errors import RealityGapError
 from realitygap.robots.jyro import Camera, JyroWorld, SceneRobot
 
@@ -46,7 +47,7 @@ def panel_class() -> type:
         """A panel in a notebook."""
 
         _esm = files.joinpath("panel.js").read_text("utf-8")
-        _css = files.joinpath("panel.css").read_text("utf-8")
+        _css = theme_rules(".rg-panel") + files.joinpath("panel.css").read_text("utf-8")
         title = traitlets.Unicode().tag(sync=True)
         svg = traitlets.Unicode().tag(sync=True)
         camera = traitlets.Unicode().tag(sync=True)
@@ -108,7 +109,7 @@ class DrivePanel(_Panel):
         self._drive, self._stop, self._picture = drive, stop, picture
         self._lock = threading.Lock()
         self._timer: threading.Timer | None = None
-        super().__init__(title, svg="" if picture is None else picture())
+        super().__init__(title, svg="" if picture is None else themed(picture()))
 
     def _obey(self, kind: str, content: dict[str, Any]) -> None:
         if kind == "drive":
@@ -121,7 +122,7 @@ class DrivePanel(_Panel):
 
     def _show(self) -> None:
         if self._picture is not None:
-            self.widget.svg = self._picture()
+            self.widget.svg = themed(self._picture())
 
     def _wait_again(self) -> None:
         if self._timer is not None:
@@ -204,7 +205,7 @@ class WorldPanel(_Panel):
         """Show the world as it is now."""
         cameras = [device for device in self.robot.devices if isinstance(device, Camera)]
         png = cameras[-1]._repr_png_() if cameras else b""
-        self.widget.svg = self.world.picture().to_svg()
+        self.widget.svg = themed(self.world.picture().to_svg())
         self.widget.camera = f"data:image/png;base64,{base64.b64encode(png).decode()}" if png else ""
         stalled = ", blocked" if self.robot.stalled else ""
         self.widget.clock = f"{self.world.time:.1f} s, step {self.world.n_steps}{stalled}"

@@ -1,0 +1,53 @@
+"""The colors of all pages for parts of a notebook, which follow the notebook's theme."""
+
+from __future__ import annotations
+
+import functools
+import re
+from importlib import resources
+
+from ._ink import Ink
+
+_BLACK = "#000000"
+_COLOR = re.compile('"(' + "|".join(Ink.names().values()) + f')"|(?<=stroke=)"({_BLACK})"')
+_NAMES = {color: name for name, color in Ink.names().items()} | {_BLACK: "text"}
+"""A black line, such as a wall of Jyro's, would vanish on a dark ground; black areas have an outline or a ground."""
+
+_DARK = (
+    'html[data-theme="dark"]',
+    'body[data-theme="dark"]',
+    'body[data-jp-theme-light="false"]',
+    "body.vscode-dark",
+)
+"""Pages that say that they are dark: of Sphinx themes, JupyterLab, and VS Code."""
+
+_NOT = ('[data-theme="light"]', "[data-jp-theme-light]", ".vscode-light")
+_NOT_LIGHT = f"html:not({_NOT[0]}) body{''.join(f':not({mark})' for mark in _NOT)}"
+"""Pages that do not say that they are light, so that the reader's system decides."""
+
+
+@functools.cache
+def theme_rules(selector: str) -> str:
+    """Return CSS that gives the elements of a selector the variables of `tokens.css`, light or dark as their page is.
+
+    Args:
+        selector: A class, such as ".rg-card". Only these elements and what they contain have the variables.
+    """
+    sheet = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
+    light, dark = (
+        " ".join(rules.split()) + "; --ink-ground: var(--card);"
+        for rules in re.findall(r":root \{(.*?);\s*\}", re.sub(r"/\*.*?\*/", "", sheet), re.DOTALL)
+    )
+    pages = ", ".join(f"{page} {selector}" for page in _DARK)
+    by_system = f"@media (prefers-color-scheme: dark) {{ {_NOT_LIGHT} {selector} {{ {dark} }} }}"
+    return f"{selector} {{ {light} }} {pages} {{ {dark} }} {by_system} "
+
+
+def themed(svg: str) -> str:
+    """Return a picture as SVG whose colors follow the theme, and are the light ones if styles are stripped."""
+
+    def variable(match: re.Match[str]) -> str:
+        color = match[1] or match[2]
+        return f'"var(--ink-{_NAMES[color]}, {color})"'
+
+    return _COLOR.sub(variable, svg)

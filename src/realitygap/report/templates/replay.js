@@ -478,7 +478,7 @@
     stage.draw(clock.at);
     drawNumbers(always);
     drawCursor();
-    if (!clock.playing) {
+    if (always || !clock.playing) {
       const text = describe();
       arena.setAttribute("aria-label", text);
       chart.setAttribute("aria-label", `Coverage so far. ${text}`);

@@ -62,6 +62,7 @@ def test_list_of_commands_cuts_no_line_at_any_width():
             assert f"{command.name} {command.summary}" in words
 
 
+@pytest.mark.slow
 def test_help_of_every_command_is_whole_at_any_width():
     members = [
         ([name, *rest], command)

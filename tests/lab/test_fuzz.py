@@ -159,6 +159,7 @@ def test_a_page_that_talks_nonsense_is_left_and_others_go_on(lab):
     carried_out(talk())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PAGES)
 def test_whatever_the_fields_of_a_page_say_it_goes_on(lab, tmp_path, path):
     make_study(lab.root)

@@ -87,6 +87,7 @@ def test_no_study_reads_files_outside_the_folder(lab, visit):
     assert list(lab.root.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
 def test_studies_have_a_picture_and_one_primary_action_and_can_be_found(lab, visit, size):
     page = visit(size=size)

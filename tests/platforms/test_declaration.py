@@ -103,6 +103,7 @@ def test_wheel_network_drives_as_the_network_of_the_same_commands(platform, recu
     assert wheels.cells == commands.cells
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "platform", ["sim", "jyro", "close.toml", "same.toml", "scribbler:emulator://s2?fluke=2&speed=off"]
 )
@@ -158,6 +159,7 @@ PLATFORMS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("platform", PLATFORMS)
 def test_every_input_drives_where_it_is_and_is_refused_in_one_message_elsewhere(platform, files):
     spec, driven, messages = spec_of(platform, files), [], {}

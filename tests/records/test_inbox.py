@@ -50,6 +50,7 @@ def test_an_inbox_of_an_earlier_sitting_is_gone(tmp_path):
         assert other != inbox
 
 
+@pytest.mark.slow
 def test_an_inbox_goes_while_others_still_deliver_into_it(tmp_path):
     """Before an inbox was renamed first, each of five runs of this test left one behind."""
     folder = make_folder(tmp_path / "r", 0)

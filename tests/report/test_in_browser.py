@@ -297,6 +297,7 @@ def test_dragging_over_the_curve_goes_through_time(show):
 # numbers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["coverage", "novelty", "turn", "ends"])
 def test_numbers_shown_are_those_recomputed(show, trials, name):
     chosen = [trials(name, 2, individual) for individual in range(4)]
@@ -641,6 +642,7 @@ def test_without_a_script_the_page_says_so(show):
     assert not page.locator("#replay-figure").is_visible()
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_text(show, tiny_study, monkeypatch, tmp_path):
     pack = _replay._pack_run
 
@@ -683,6 +685,7 @@ platform = "sim"
 """
 
 
+@pytest.mark.slow
 def test_all_robots_of_a_trial_are_replayed(show, tmp_path) -> None:
     folder = run_study(parse_study(SEVERAL, "several.toml"), tmp_path / "r").folder
     condition = Condition.from_settings("one", dict(folder.description["conditions"][0]["settings"]))

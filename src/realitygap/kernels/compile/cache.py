@@ -41,6 +41,7 @@ def _source(module: str) -> Path:
     return _FOLDER / f"{module.replace('.', '/')}.py"
 
 
+@functools.cache
 def _imported(module: str) -> set[str]:
     """Return the modules of kernels that one of them imports, named from the package of kernels on."""
     folder = f"{_PACKAGE}.{module}".split(".")[:-1]

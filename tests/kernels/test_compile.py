@@ -149,7 +149,7 @@ def modules_of_hash(module: str) -> set[str]:
     seen = []
     original = kernel_cache._imported
     try:
-        kernel_cache._imported = lambda module: (seen.append(module), original(module))[1]
+        kernel_cache._imported = lambda module, source: (seen.append(module), original(module, source))[1]
         kernel_cache.sources_hash.__wrapped__(module)
     finally:
         kernel_cache._imported = original

@@ -42,19 +42,21 @@ def _source(module: str) -> Path:
 
 
 @functools.cache
-def _imported(module: str) -> set[str]:
-    """Return the modules of kernels that one of them imports, named from the package of kernels on."""
+def _imported(module: str, source: bytes) -> set[str]:
+    """Return what a module of kernels with this source imports from the package of kernels, named from there on.
+
+    Some names are those of functions, and not of modules.
+    """
     folder = f"{_PACKAGE}.{module}".split(".")[:-1]
     imported = set()
-    for node in ast.walk(ast.parse(_source(module).read_bytes())):
+    for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom):
             parents = folder[: len(folder) + 1 - node.level] if node.level else []
             parent = ".".join([*parents, *filter(None, [node.module])])
             imported |= {parent, f"{parent}.__init__", *(f"{parent}.{alias.name}" for alias in node.names)}
         elif isinstance(node, ast.Import):
             imported |= {alias.name for alias in node.names}
-    within = {name.removeprefix(f"{_PACKAGE}.") for name in imported if name.startswith(f"{_PACKAGE}.")}
-    return {name for name in within if _source(name).exists()}
+    return {name.removeprefix(f"{_PACKAGE}.") for name in imported if name.startswith(f"{_PACKAGE}.")}
 
 
 @functools.cache
@@ -74,13 +76,15 @@ def sources_hash(module: str) -> str:
         files = (path.relative_to(_FOLDER).with_suffix("") for path in _FOLDER.rglob("*.py"))
         missing = {".".join(file.parts) for file in files}
     missing |= _COMPILER
-    covered: set[str] = set()
+    sources: dict[str, bytes] = {}
     while missing:
-        covered |= missing
-        missing = set().union(*map(_imported, missing)) - covered
-    for name in sorted(covered):
+        found = {name: _source(name).read_bytes() for name in missing}
+        sources |= found
+        imported = set().union(*(_imported(*item) for item in found.items()))
+        missing = {name for name in imported - set(sources) if _source(name).exists()}
+    for name in sorted(sources):
         digest.update(name.encode())
-        digest.update(_source(name).read_bytes())
+        digest.update(sources[name])
     return digest.hexdigest()
 
 

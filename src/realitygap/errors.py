@@ -98,9 +98,11 @@ def from_extra(module: str, extra: str) -> Any:
     except ImportError as error:
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
+        from realitygap._how_to_run import install_command  # here, because every command imports this module
+
         raise MissingExtraError(
             f"This needs {module.partition('.')[0]}, which comes with the extra '{extra}' and cannot be imported "
-            f"({error}). Install it: pip install 'realitygap[{extra}]'"
+            f"({error}). Install it: {install_command(extra)}"
         ) from error
 
 

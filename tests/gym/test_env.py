@@ -13,6 +13,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 import realitygap.gym
+from realitygap._how_to_run import install_command
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.platforms import JyroPlatform, SimPlatform, trace_genome, try_genomes
 from realitygap.trials import NoiseKey
@@ -281,7 +282,7 @@ def test_wrong_calls_are_refused():
 def test_a_missing_extra_is_one_message_with_the_command():
     code = "import sys; sys.modules['gymnasium'] = None; import realitygap.gym"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stderr.strip().endswith("Install it: pip install 'realitygap[gym]'")
+    assert done.stderr.strip().endswith(f"Install it: {install_command('gym')}")
 
 
 @pytest.mark.slow

@@ -40,7 +40,7 @@ def test_help_is_there_at_once():
 def test_a_missing_extra_is_one_message(tmp_path: Path):
     done = said_without("sys.modules['nicegui'] = None", "lab", str(tmp_path))
     assert done.returncode != 0
-    assert "realitygap[lab]" in done.stderr
+    assert "comes with the extra 'lab'" in done.stderr
     assert "Traceback" not in done.stderr
 
 

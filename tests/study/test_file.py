@@ -376,3 +376,25 @@ def test_every_named_study_resolves():
     assert {"distances", "paper", "paper-choices", "paper-robot", "sim-paper"} <= set(named_studies())
     for name in named_studies():
         assert load_study(name).about.name == name
+
+
+def test_settings_of_a_platform_that_no_condition_is_on_are_refused():
+    """The study ran on jyro, without a message."""
+    text = '[study]\nname = "a"\n[platform.sim]\nrobot = "khepera"\n[[condition]]\nname = "a"\n{}\n'
+    with pytest.raises(
+        StudyError, match=r'platform\.sim: no condition is on this platform\. Write platform = "sim"'
+    ):
+        parse_study(text.format(""), "a.toml")
+    assert parse_study(text.format('platform = "sim"'), "a.toml").conditions[0].on.robot.name == "khepera"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[[body]]\nbox = [1, 1]", "is a robot file, .*robot = 'x.toml'"),
+        ("wall = []", "is an arena file, .*'x.toml'"),
+    ],
+)
+def test_a_file_of_a_robot_or_an_arena_is_named_as_such(text, expected):
+    with pytest.raises(StudyError, match=expected):
+        parse_study(text, "x.toml")

@@ -11,6 +11,8 @@ from realitygap.study import (
     ConditionNotes,
     ReportSection,
     StudySection,
+    load_study,
+    named_studies,
     parse_study,
     study_template,
 )
@@ -48,6 +50,13 @@ def test_every_line_of_the_template_can_be_switched_on():
     study = parse_study(on, "on.toml")
     assert study.notes[0].published == [0.154, 0.222, 0.166]
     assert study.notes[1].baseline == study.conditions[0].name
+
+
+@pytest.mark.parametrize("source", named_studies())
+def test_a_copy_is_the_study_by_another_name(source):
+    study, copy = load_study(source), parse_study(study_template("mine", source), "mine.toml")
+    assert copy.conditions == study.conditions
+    assert (copy.about.name, copy.about.title) == ("mine", "mine")
 
 
 @pytest.mark.parametrize("name", ["", "a b", 'a"b', "a\n", "ä", "x" * 81, None])

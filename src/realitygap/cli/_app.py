@@ -16,6 +16,22 @@ from realitygap.kernels.compile.progress import report_compiling
 
 from ._commands import COMMANDS, Command, root_help
 
+_STUDY_SETTINGS = tuple(
+    f"--{name}"
+    for name in (
+        "noise",
+        "selection",
+        "arena",
+        "start",
+        "task",
+        "fitness",
+        "population",
+        "generations",
+        "steps",
+    )
+)
+"""What newcomers try as options of `run`."""
+
 
 class _RootGroup(TyperGroup):
     """The root command. It lists all commands even if only one is loaded, and usage errors state the given value."""
@@ -27,11 +43,29 @@ class _RootGroup(TyperGroup):
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
+            if hasattr(error, "param_type") and error.ctx is not None:  # something is missing
+                error.message = _example_of(error.ctx.command)
             from pydantic import ValidationError  # here, because its import takes long
 
             if isinstance(error.__cause__, ValidationError):
                 error.message += f", got {error.__cause__.errors()[0]['input']!r}"
             raise
+        except Exception as error:
+            # the class of an unknown option is not part of Typer's interface
+            if getattr(error, "option_name", None) in _STUDY_SETTINGS and error.ctx.command.name == "run":
+                error.possibilities = None
+                error.message = (
+                    f"No such option: {error.option_name}. It is a setting of the study file. Copy one and change it: "
+                    "realitygap new-study my-study.toml --from paper"
+                )
+            raise
+
+
+def _example_of(command: Any) -> str:
+    """Return the first example in the help of a command, as a sentence; empty if it has none."""
+    paragraphs = (" ".join(part.split()) for part in (command.help or "").split("\n\n"))
+    found = next((part for part in paragraphs if part.startswith("Example: ")), "")
+    return found.replace("Example:", "For example:")
 
 
 class _GroupedCommand(TyperCommand):

@@ -59,7 +59,7 @@ def arena(
 
     An arena becomes a map with an image next to it. Lights, the floor, the goal, and the cells are in no map.
 
-    It needs an extra: pip install 'realitygap[ros]'
+    It needs the extra 'ros'.
 
     Example: realitygap arena map.yaml -o room.toml
 

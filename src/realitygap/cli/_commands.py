@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 
+from realitygap._how_to_run import launcher
+
 NARROWEST = 50
 WIDEST = 80
 PURPOSE = (
@@ -42,9 +44,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("demo", "Take a two-minute tour with an emulated robot.", "_demo", "demo"),
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
         Command("drive", "Drive the conditions of a study that are on a robot.", "_drive", "drive"),
-        Command(
-            "new-study", "Write a template study file that documents every setting.", "_study", "new_study"
-        ),
+        Command("new-study", "Write a study file to change: a template, or a copy.", "_study", "new_study"),
         Command("lab", "Serve the web interface for studies, robots, and trials.", "_lab", "lab"),
     ),
     "Look at results": (
@@ -120,7 +120,7 @@ def root_help(columns: int) -> str:
             lines += _entry(f"  {command.name:<15} ", command.summary, width)
     lines += [
         "",
-        "  Start with: realitygap demo --open",
+        f"  Start with: {launcher()} demo --open",
         "",
         "  `realitygap COMMAND --help` describes a command.",
     ]

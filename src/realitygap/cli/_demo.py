@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._how_to_run import launcher
 from realitygap.errors import StudyError
 
 from ._browser import show_page
@@ -53,7 +54,7 @@ def demo(
         "  paper/report.html   report of the study: figures, tables, and trials to play\n"
         "  champion.gif        film of the controller in simulation\n"
         "  gap.html            report of the gap\n"
-        "Next, write your own study: realitygap new-study my-study.toml"
+        f"Next, change the paper's study: {launcher()} new-study my-study.toml --from paper"
     )
     if open_page:
         show_page(folder / "paper" / "report.html")

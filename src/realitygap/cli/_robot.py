@@ -42,6 +42,10 @@ def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
     """The functions of the robot's family and the robot on a port, stopped and let go of in the end."""
     from realitygap.robots import is_in_this_program
 
+    if port in ("sim", "jyro"):
+        raise RobotError(
+            f"{port} is a simulator, which has no port. For an emulated robot, use emulator://s2."
+        )
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
     if is_in_this_program(port):
@@ -143,6 +147,7 @@ def drive(
         opened.drive(Command(move, turn))
         opened.stop()
         recoveries = opened.faults.recoveries if hasattr(opened, "faults") else 0
+    typer.echo(f"Drove {seconds:g} s with move {move:g} and turn {turn:g}, then stopped.")
     if recoveries:
         typer.echo(f"The link was disturbed {recoveries} times; the robot stood still meanwhile.", err=True)
 
@@ -261,7 +266,7 @@ def export_recording(
 ) -> None:
     """Write a recording as MCAP.
 
-    Viewers of robotics data read MCAP. The command needs an extra: pip install 'realitygap[export]'.
+    Viewers of robotics data read MCAP. The command needs the extra 'export'.
 
     Example: realitygap robot export-recording session.jsonl -o session.mcap
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._how_to_run import launcher
 from realitygap.errors import StudyError
 
 from ._browser import show_page
@@ -92,6 +93,8 @@ def run(
 
     `realitygap drive` drives the conditions that are on a robot.
 
+    Example: realitygap run paper --open
+
     Example: realitygap run paper --replicates 1000
 
     In Python: realitygap.run_study("paper", replicates=1000)
@@ -135,10 +138,22 @@ def new_study(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file to write (.toml).")] = Path(
         "my-study.toml"
     ),
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="STUDY",
+            help="Study that comes with realitygap to start from, such as paper. [default: a template of all settings]",
+        ),
+    ] = None,
 ) -> None:
-    """Write a template study file that documents every setting.
+    """Write a study file to change: a template, or a copy.
+
+    The template documents every setting. A copy of a study that comes with realitygap has its own name.
 
     Example: realitygap new-study my-study.toml && realitygap run my-study.toml
+
+    Example: realitygap new-study quiet.toml --from paper
 
     In Python: realitygap.study.study_template("my-study")
     """
@@ -148,14 +163,15 @@ def new_study(
         raise StudyError(
             f"{path} does not end in .toml. Expected the name of a study file, such as my-study.toml."
         )
+    text = study_template(_as_name(path.stem), source)
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(study_template(_as_name(path.stem)))
+            file.write(text)
     except FileExistsError:
         raise StudyError(f"{path} exists and was not changed. Choose another name.") from None
     except OSError as error:
         raise StudyError(f"{path} cannot be written: {error.strerror}.") from error
-    typer.echo(f"Written: {path}. Run it with: realitygap run {shlex.quote(str(path))}")
+    typer.echo(f"Written: {path}. Run it with: {launcher()} run {shlex.quote(str(path))}")
 
 
 def _as_name(stem: str) -> str:
@@ -278,7 +294,7 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
         typer.echo(f"All {result.n_runs} runs existed already.")
     _print_physical(result)
     typer.echo(f"Results: {path}   in Python: {_reading(result.folder)}")
-    typer.echo(f"Report:  realitygap report {shlex.quote(str(path))}")
+    typer.echo(f"Report:  {launcher()} report {shlex.quote(str(path))}")
 
 
 def _reading(folder: ResultsFolder) -> str:

@@ -44,7 +44,7 @@ def export_trials(
     Commands are TwistStamped on /cmd_vel, poses Odometry on /odom, wheels JointState on /joint_states, and range
     sensors Range on /range_0 and so on. A mapping is written next to each bag, so that `realitygap import` reads it.
 
-    Several trials go to separate files, such as drive-7.mcap. It needs an extra: pip install 'realitygap[ros]'
+    Several trials go to separate files, such as drive-7.mcap. It needs the extra 'ros'.
 
     Example: realitygap export-trials trials.jsonl -o drive.mcap
 

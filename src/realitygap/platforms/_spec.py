@@ -31,6 +31,11 @@ def class_of(spec: str) -> type[Platform]:
     if name == PYTHON and rest:
         return loaded_platform(spec)
     if name not in platform_names():
+        if spec.endswith(".toml"):
+            raise StudyError(
+                f"{spec!r} is no platform. For a robot file or a calibration, write sim:{spec}. For a twin, "
+                f"write twin:{spec}."
+            )
         raise StudyError(f"{spec!r} is no platform. {did_you_mean(spec, known_specs())}")
     found = platform_class(name)
     if (colon and not (found.rest and rest)) or (found.needs_rest and not rest):

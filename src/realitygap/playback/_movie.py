@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from realitygap._how_to_run import install_command
 from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError, did_you_mean
 from realitygap.records import write_whole
@@ -155,8 +156,8 @@ def find_ffmpeg() -> str:
     with contextlib.suppress(ImportError, RuntimeError):
         return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     raise RealityGapError(
-        "An .mp4 needs the program ffmpeg, and there is none on the PATH. Install it, or: pip install "
-        "'realitygap[video]'. A .gif needs neither."
+        "An .mp4 needs the program ffmpeg, and there is none on the PATH. Install it, or: "
+        f"{install_command('video')}. A .gif needs neither."
     )
 
 

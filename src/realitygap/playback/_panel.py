@@ -10,6 +10,7 @@ from functools import cache
 from importlib import import_module, resources
 from typing import Any
 
+from realitygap._how_to_run import install_command
 from realitygap.drawing import theme_rules, themed
 from realitygap.errors import RealityGapError
 from realitygap.robots.jyro import Camera, JyroWorld, SceneRobot
@@ -38,7 +39,7 @@ def panel_class() -> type:
         anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
     except ImportError as error:
         raise RealityGapError(
-            "A panel needs anywidget, which is not installed: pip install 'realitygap[notebook]'. Without a notebook, "
+            f"A panel needs anywidget, which is not installed: {install_command('notebook')}. Without a notebook, "
             "drive on the page Robot of `realitygap lab`."
         ) from error
     files = resources.files("realitygap.playback")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from realitygap._how_to_run import install_command
 from realitygap.drawing import PENS, Disc, Ink, Line, Shape
 from realitygap.errors import RealityGapError
 from realitygap.world import Arena, floor_shapes, things_in
@@ -79,7 +80,7 @@ def player_class() -> type:
         anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
     except ImportError as error:
         raise RealityGapError(
-            "Trials are shown in a notebook by anywidget, which is not installed: pip install 'realitygap[notebook]'. "
+            f"Trials are shown in a notebook by anywidget, which is not installed: {install_command('notebook')}. "
             "realitygap.write_movie needs none."
         ) from error
     files = resources.files("realitygap.playback")

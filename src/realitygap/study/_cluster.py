@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from realitygap._how_to_run import install_command
 from realitygap.errors import ClusterError, StudyError
 from realitygap.records import Delivery, ResultsFolder
 from realitygap.runs import Condition
@@ -36,7 +37,6 @@ FIRST_CHUNKS = 4
 TRIES = 3
 # How often the workers are counted [s].
 COUNT_S = 1.0
-INSTALL = "pip install 'realitygap[cluster]'"
 
 
 @dataclass
@@ -287,7 +287,7 @@ def _require_dask() -> None:
         import distributed  # noqa: F401
     except ImportError:
         raise ClusterError(
-            f"--cluster needs packages that are not installed. Install them: {INSTALL}"
+            f"--cluster needs packages that are not installed. Install them: {install_command('cluster')}"
         ) from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from numbers import Integral
 from pathlib import Path
@@ -58,6 +59,17 @@ def named_studies() -> list[str]:
     )
 
 
+def read_named_study(name: str) -> str:
+    """Return the file of a study that comes with realitygap.
+
+    Raises:
+        StudyError: There is none of that name.
+    """
+    if name not in named_studies():
+        raise StudyError(f"Unknown study {name!r}. {did_you_mean(name, named_studies())}")
+    return (resources.files(__package__) / "studies" / f"{name}.toml").read_text("utf-8")
+
+
 def load_study(
     study: str | Path,
     *,
@@ -86,8 +98,7 @@ def _load_study(study: str | Path, seed: int | None, replicates: int | None) -> 
         raise TypeError(f"study is {study!r}, expected the name of one, or the path of a study file.")
     name = str(study)
     if name in named_studies():
-        text = (resources.files(__package__) / "studies" / f"{name}.toml").read_text("utf-8")
-        return parse_study(text, name, seed=seed, replicates=replicates)
+        return parse_study(read_named_study(name), name, seed=seed, replicates=replicates)
     path = Path(study)
     if not name or not path.exists():
         if path.suffix == ".toml" or len(path.parts) > 1:
@@ -125,6 +136,7 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
         data = parse_toml(text)
     except ValueError as error:
         raise StudyError(f"{origin} is not TOML: {error}.") from error
+    _refuse_other_files(data, origin)
     problems = Problems()
     find_files(data, Path(origin).parent, problems)
     study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
@@ -133,6 +145,22 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
         raise StudyFileError(head, problems.lines)
     return study
+
+
+def _refuse_other_files(data: dict[str, Any], origin: str) -> None:
+    """Raise an error that says how a study names the file, if it is a robot or an arena."""
+    if "study" in data or "condition" in data:
+        return
+    if {"body", "drive", "range"} & set(data):
+        raise StudyError(
+            f"{origin} is a robot file, expected a study file. A study names it as robot = {Path(origin).name!r} in "
+            "[platform.sim], and its conditions have platform = 'sim'."
+        )
+    if {"wall", "start"} & set(data):
+        raise StudyError(
+            f"{origin} is an arena file, expected a study file. A study names it as file = {Path(origin).name!r} in "
+            "[arena]."
+        )
 
 
 def _randomized(study: Study, randomize: str) -> Study:
@@ -177,12 +205,15 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     trials = problems.check(TrialsSection, problems.table("trials", data.get("trials", {})), "trials")
     base = {section: problems.table(section, data.get(section, {})) for section in SECTIONS}
     platforms = problems.table("platform", data.get("platform", {}))
+    of_platforms: dict[str, BaseModel] = {}
     for section, values in base.items():
         _check_section(section, values, section, problems)
     for key, value in platforms.items():
         if key in study_platforms():
             base[key] = problems.table(f"platform.{key}", value)
-            problems.check(platform_class(key), base[key], f"platform.{key}", is_part=True)
+            checked = problems.check(platform_class(key), base[key], f"platform.{key}", is_part=True)
+            if checked is not None:
+                of_platforms[key] = checked
         else:
             problems.add(f"platform.{key}", f"unknown platform. {did_you_mean(key, study_platforms())}")
     listed = data.get("condition", [])
@@ -209,6 +240,7 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
         if condition is not None and note is not None:
             conditions.append(condition)
             notes.append(note)
+    _refuse_unused(of_platforms, listed, problems)
     for index, note in enumerate(notes):
         if note.baseline is not None and note.baseline not in names:
             place = f"condition {conditions[index].name!r}.baseline"
@@ -218,6 +250,26 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     if problems.lines or about is None or report is None or trials is None:
         return None
     return Study(about=about, report=report, trials=trials, conditions=tuple(conditions), notes=tuple(notes))
+
+
+def _refuse_unused(tables: Mapping[str, BaseModel], conditions: Sequence[Any], problems: Problems) -> None:
+    """Record settings of platforms that no condition is on: the study would run on another platform."""
+    used = {
+        split_spec(str(each.get("platform", "jyro")))[0] for each in conditions if isinstance(each, Mapping)
+    }
+    for name, table in tables.items():
+        if name not in used and not _is_default(table):
+            problems.add(
+                f"platform.{name}",
+                f'no condition is on this platform. Write platform = "{name}" in a condition, or remove the settings.',
+            )
+
+
+def _is_default(table: BaseModel) -> bool:
+    try:
+        return table == type(table)()
+    except ValidationError:  # some settings have no default
+        return False
 
 
 def _check_section(section: str, values: dict[str, Any], place: str, problems: Problems) -> None:

@@ -15,7 +15,7 @@ from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import is_hidden
 from realitygap.world import RobotModel
 
-from ._file import DEFAULT_NEAT, SECTIONS, platform_sections
+from ._file import DEFAULT_NEAT, SECTIONS, platform_sections, read_named_study
 from ._study import ConditionNotes, ReportSection, StudySection, TrialsSection
 
 WIDTH = 100
@@ -27,19 +27,23 @@ _EXAMPLES = {
 }
 
 
-def study_template(name: str) -> str:
-    """A study file with two conditions in which every setting stands with its meaning and its default.
+def study_template(name: str, source: str | None = None) -> str:
+    """Return a study file to change: two conditions with every setting, its meaning, and its default, or a copy.
 
     Args:
         name: Of the study: letters, digits, dot, dash and underscore.
+        source: Study that comes with realitygap; its file is copied, with the new name as name and title.
 
     Raises:
         ValueError: It cannot be the name of a study.
+        StudyError: There is no study `source`.
     """
     if not (isinstance(name, str) and len(name) <= 80 and re.fullmatch(NAME_PATTERN, name)):
         raise ValueError(
             f"name is {name!r}, expected at most 80 letters, digits, '.', '-' and '_', a letter or digit first."
         )
+    if source is not None:
+        return _copy(source, name)
     parts = [
         _comment(
             "A study for `realitygap run`. A line that begins with '# key = value' shows the default: remove "
@@ -88,6 +92,13 @@ def study_template(name: str) -> str:
         )
     )
     return "\n\n".join(parts) + "\n"
+
+
+def _copy(source: str, name: str) -> str:
+    text = read_named_study(source)
+    for key in ("name", "title"):
+        text = re.sub(rf"^{key} = .*$", f"{key} = {_toml(name)}", text, count=1, flags=re.MULTILINE)
+    return f"# Copied from the study {source} to change it.\n{text}"
 
 
 def _example(key: str) -> list[str]:

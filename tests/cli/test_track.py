@@ -11,12 +11,18 @@ import pytest
 
 from realitygap.cli import main
 from realitygap.errors import VisionError
-from realitygap.records import LEDGER_NAME, PATH_PARTS, Ledger, read_observations, write_observations
+from realitygap.records import (
+    LEDGER_NAME,
+    PATH_PARTS,
+    Ledger,
+    ObservationsFile,
+    read_observations,
+    write_observations,
+)
 from realitygap.study import (
     calibrate_from,
     drive_study,
     gap_between,
-    keep_tracked,
     observations_head,
     open_target,
     place_trial,
@@ -177,7 +183,8 @@ def recorded(tmp_path_factory):
     for trial in trials:
         wanted = trial_of_file(folder / "bare.jsonl", trial.number)
         found = place_trial(wanted, _seen_by_camera(trial, rng), LEAD_S)
-        keep_tracked(folder / "tracked.jsonl", wanted, found)
+        with ObservationsFile(folder / "tracked.jsonl", wanted.head) as file:
+            file.append(found.trial)
     return folder, trials
 
 

@@ -38,7 +38,6 @@ from ._template import study_template
 from ._tracked import (
     TrackedTrial,
     TrialToTrack,
-    keep_tracked,
     note_of_track,
     place_trial,
     score_tracked,
@@ -103,7 +102,6 @@ __all__ = [
     "export_trials",
     "gap_between",
     "hold_out_of",
-    "keep_tracked",
     "load_study",
     "machine_facts",
     "marks_of",

@@ -15,7 +15,6 @@ from realitygap.records import (
     LEDGER_NAME,
     PATH_PARTS,
     Ledger,
-    ObservationsFile,
     ObservationsHead,
     ResultsFolder,
     Score,
@@ -197,16 +196,6 @@ def score_tracked(
     with Ledger.open(Path(folder) / LEDGER_NAME) as ledger:
         ledger.score(number, tracked.score, role)
         ledger.note(told, tracked.score.who, number)
-
-
-def keep_tracked(path: str | Path, wanted: TrialToTrack, tracked: TrackedTrial) -> None:
-    """Add a trial with its poses to a file of observed trials, from which `calibrate_from` fits.
-
-    Raises:
-        RecordError: The file has trials of something else, or cannot be written.
-    """
-    with ObservationsFile(path, wanted.head) as file:
-        file.append(tracked.trial)
 
 
 def note_of_track(camera: str, found: Tracked, placed: TrackedTrial) -> str:

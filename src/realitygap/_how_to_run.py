@@ -1,4 +1,4 @@
-"""How the reader of a message starts realitygap, and adds packages to it: by pip, or by uv in a clone."""
+"""Commands that start realitygap and add packages to it, by pip or by uv in a clone, for messages."""
 
 from __future__ import annotations
 

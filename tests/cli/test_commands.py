@@ -460,3 +460,22 @@ def test_message_shows_control_characters_of_a_file_as_escapes(tmp_path):
     done = realitygap("run", "study.toml", cwd=tmp_path)
     one_message(done, "\\x1b[2Jx\\u202e: unknown section")
     assert "\x1b" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("run",), "Missing argument 'STUDY'. For example: realitygap run paper --open"),
+        (("try", "x.json"), "Missing option '--on'. For example: realitygap try champion.json --on"),
+        (
+            ("run", "paper", "--noise", "0.3"),
+            "It is a setting of the study file. Copy one and change it: realitygap",
+        ),
+        (("gap", "rover.toml", "jyro"), "write sim:rover.toml"),
+        (("robot", "drive", "sim", "1"), "use emulator://s2"),
+    ],
+)
+def test_what_newcomers_type_gets_a_command_that_works(words, expected):
+    done = realitygap(*words)
+    assert done.returncode != 0
+    assert expected in " ".join(done.stderr.split())

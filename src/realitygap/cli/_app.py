@@ -51,14 +51,18 @@ class _RootGroup(TyperGroup):
                 error.message += f", got {error.__cause__.errors()[0]['input']!r}"
             raise
         except Exception as error:
-            # the class of an unknown option is not part of Typer's interface
-            if getattr(error, "option_name", None) in _STUDY_SETTINGS and error.ctx.command.name == "run":
-                error.possibilities = None
-                error.message = (
-                    f"No such option: {error.option_name}. It is a setting of the study file. Copy one and change it: "
-                    "realitygap new-study my-study.toml --from paper"
-                )
+            _refer_to_the_study_file(error)
             raise
+
+
+def _refer_to_the_study_file(error: Any) -> None:
+    """Say where a setting belongs that was given as an option of `run`; Typer exports no class for unknown options."""
+    if getattr(error, "option_name", None) in _STUDY_SETTINGS and error.ctx.command.name == "run":
+        error.possibilities = None
+        error.message = (
+            f"No such option: {error.option_name}. It is a setting of the study file. Copy one and change it: "
+            "realitygap new-study my-study.toml --from paper"
+        )
 
 
 def _example_of(command: Any) -> str:

@@ -114,7 +114,7 @@ _opened: dict[Path, Gamepad] = {}
 
 
 def _ask_device(file: int, request: int, size: int) -> bytes:
-    """Return what the device says of itself; nothing if it has no answer."""
+    """Return the answer of a device; nothing if it has none."""
     try:
         import fcntl
     except ImportError:  # Windows has no such devices
